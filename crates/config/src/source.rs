@@ -106,7 +106,7 @@ impl Source {
     /// Reads a TOML file.
     ///
     /// # Errors
-    /// The file is no regular file, is larger than [`trace::text_file::LARGEST_TEXT`], or is not UTF-8 text.
+    /// The file is no regular file, is larger than [`trace::text_file::LARGEST_TEXT`], or is not text in UTF-8 or UTF-16.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         Self::read_of(path, LARGEST_TEXT)
     }
@@ -336,5 +336,29 @@ mod tests {
             assert_eq!(toml_number(value), text);
             assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
         }
+    }
+    #[test]
+    fn a_file_in_utf_16_or_with_a_mark_is_the_same_text() {
+        let text = "[engine]\r\nname = \"Öl\"\r\n";
+        let path = std::env::temp_dir().join(format!("wetclutch-source-{}.toml", std::process::id()));
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            Source::read(&path)
+        };
+        let wide = |mark: bool, order: fn(u16) -> [u8; 2]| {
+            let mark = mark.then_some(0xfeff);
+            mark.into_iter().chain(text.encode_utf16()).flat_map(order).collect::<Vec<u8>>()
+        };
+        for (mark, order) in [(true, u16::to_le_bytes as fn(u16) -> [u8; 2]), (true, u16::to_be_bytes)] {
+            assert_eq!(read(&wide(mark, order)).unwrap().text, text);
+            assert_eq!(read(&wide(false, order)).unwrap().text, text);
+            // Half a letter at the end, and half of one that needs four bytes.
+            assert!(read(&[wide(mark, order), vec![0]].concat()).is_err());
+            assert!(read(&[wide(mark, order), order(0xd83d).to_vec()].concat()).is_err());
+        }
+        let marked = read(&[&[0xef, 0xbb, 0xbf], text.as_bytes()].concat()).unwrap();
+        assert!(marked.parse::<toml::Table>().unwrap().contains_key("engine"));
+        assert!(read(&[0xff, 0x80, 0x81]).is_err());
+        let _ = std::fs::remove_file(&path);
     }
 }

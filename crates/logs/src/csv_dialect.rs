@@ -5,7 +5,8 @@ use std::path::Path;
 
 use trace::Unit;
 
-use crate::csv_log::{is_time_name, split_unit};
+use crate::csv_log::{has_groups, split_unit};
+use crate::time_column::is_time_name;
 use crate::{LogError, error};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +16,8 @@ pub(crate) struct Dialect {
     /// Lines before the row of names.
     pub(crate) preamble: usize,
     pub(crate) units_row: bool,
+    /// Lines with something in them between the names, or units, and the first row: marks of sections.
+    pub(crate) marks: usize,
     /// Line of the first row.
     pub(crate) first: usize,
 }
@@ -64,9 +67,18 @@ impl<'a> Table<'a> {
             let are_most = 2 * numbers(row) >= filled(row) || !is_units(row);
             row.len() >= 2 && numbers(row) >= 1 && are_most && !has_time_name(row)
         };
-        let first = rows.iter().position(|row| is_data(row) && rows_after_agree(&rows, row.len()))?;
+        // Numbers of channels may stand above their names.
+        let is_above_names = |at: usize| {
+            let next = rows[at + 1..].iter().find(|row| filled(row) > 0);
+            let is_text = |row: &&Vec<Cow<str>>| filled(row) == row.len() && numbers(row) == 0 && !is_units(row);
+            next.filter(is_text).is_some_and(|row| row.len() == rows[at].len())
+        };
+        let is_first =
+            |at: &usize| is_data(&rows[*at]) && rows_after_agree(&rows, rows[*at].len()) && !is_above_names(*at);
+        let first = (0..rows.len()).find(is_first)?;
         // Numbers with either sign tell the delimiter, also those that are then refused.
-        let of_either = |row: &Vec<Cow<str>>| row.iter().filter(|cell| is_number(cell, delimiter != b',')).count();
+        let is_of_either = |cell: &&Cow<str>| is_number(cell, delimiter != b',') || has_groups(cell);
+        let of_either = |row: &Vec<Cow<str>>| row.iter().filter(is_of_either).count();
         let count = rows[first..].iter().map(of_either).sum();
         // One in the lines before says nothing of the numbers.
         let decimal_comma = decimal_comma && rows[first..].iter().any(has_comma);
@@ -101,7 +113,9 @@ impl<'a> Table<'a> {
             let has_number = || row.iter().any(|cell| is_number(cell, decimal_comma));
             row.len() >= 2 && row.iter().any(|cell| !cell.is_empty()) && (has_time_name(row) || !has_number())
         };
-        let filled: Vec<usize> = (0..first).rev().filter(|&i| !lines[i].trim().is_empty()).collect();
+        let is_mark = |i: usize| self.rows[i].len() == 1 && lines[i].starts_with('[') && !lines[i].contains('"');
+        let is_filled = |i: &usize| !lines[*i].trim().is_empty();
+        let filled: Vec<usize> = (0..first).rev().filter(is_filled).filter(|&i| !is_mark(i)).collect();
         if let Some(&open) = filled.iter().take(2).find(|&&i| lines[i].matches('"').count() % 2 == 1) {
             return Err(LogError::damaged(
                 path,
@@ -112,8 +126,11 @@ impl<'a> Table<'a> {
         let line = |nth: usize| {
             filled.get(nth).map(|&i| (i, &self.rows[i])).filter(|(_, row)| names(row.as_slice()) || is_units(row))
         };
-        let dialect =
-            |preamble: usize, units_row: bool| Dialect { delimiter, decimal_comma, preamble, units_row, first };
+        let dialect = |preamble: usize, units_row: bool| {
+            let above = filled.first().map_or(0, |above| above + 1);
+            let marks = (above..first).filter(is_filled).count();
+            Dialect { delimiter, decimal_comma, preamble, units_row, marks, first }
+        };
         match (line(0), line(1).filter(|(_, row)| names(row.as_slice()))) {
             (Some((_, units)), Some((names_at, _))) if is_units(units) => Ok(dialect(names_at, true)),
             (Some((names_at, row)), _) if names(row) => Ok(dialect(names_at, false)),

@@ -7,12 +7,14 @@ use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use trace::csv_file::{LONGEST_ROW, number};
-use trace::{Quantity, RecordError, Records, Unit};
+use trace::{RecordError, Records, Unit};
 
 use crate::columns::{Batch, Stream};
 use crate::csv_dialect::{Dialect, cells};
+use crate::row_order::RowOrder;
 use crate::samples::{Quality, Sample};
-use crate::stamp::{Midnight, StampForm};
+use crate::stamp::{self, Midnight, StampForm};
+use crate::time_column::{is_time_name, one_clock, time_column, time_unit};
 use crate::{Channel, LogError, TimeColumn, error};
 
 /// Rows in a batch; of many columns fewer, so that it has at most so many cells, or is one row.
@@ -50,13 +52,12 @@ impl CsvLog {
         time: Option<&TimeColumn>,
         is_followed: bool,
     ) -> Result<(Self, Vec<Channel>), LogError> {
-        let start = if head.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
-        let beginning = text(&head[start..]);
+        let beginning = text(&head);
         let dialect = Dialect::of(path, &beginning)?;
         let first = cells(beginning.lines().nth(dialect.first).unwrap_or_default(), dialect.delimiter);
         let stamp = |column: usize| first.get(column).and_then(|cell| StampForm::of(cell));
         let mut input = Beginning(Cursor::new(head)).chain(rest);
-        skip(&mut input, start, dialect.preamble).map_err(LogError::io(path))?;
+        skip(&mut input, dialect.preamble).map_err(LogError::io(path))?;
         let mut records = Records::new(Box::new(input), dialect.delimiter);
         read_row(path, &mut records, dialect.preamble)?;
         let titles: Vec<String> = records.cells().map(|cell| text(cell).trim().to_owned()).collect();
@@ -66,16 +67,10 @@ impl CsvLog {
         } else {
             Vec::new()
         };
-        let name_and_unit = |(i, title): (usize, &String)| {
-            let (name, own) = split_unit(title);
-            let unit = match units.get(i).filter(|unit| !unit.is_empty()) {
-                Some(unit) => unit.clone(),
-                None if !own.is_empty() => own,
-                None => Unit::of_name(&name).map_or(String::new(), |unit| unit.name.to_owned()),
-            };
-            (name, unit)
-        };
-        let names: Vec<(String, String)> = titles.iter().enumerate().map(name_and_unit).collect();
+        for _ in 0..dialect.marks {
+            read_row(path, &mut records, dialect.preamble)?;
+        }
+        let names = names_and_units(&titles, &units);
         let mut notes = Vec::new();
         // A column of clock times or dates is the time where no name says so.
         let named = names.iter().any(|(name, _)| is_time_name(name));
@@ -87,6 +82,11 @@ impl CsvLog {
             Some(form) => (column, TimeForm::Stamps(form)),
             None => (column, TimeForm::Numbers(time_unit(path, &names[column], time, &mut notes)?)),
         };
+        // The last line of the head may be cut.
+        let whole = beginning.lines().count().saturating_sub(usize::from(!beginning.ends_with('\n')));
+        let lines = beginning.lines().enumerate().take(whole).skip(dialect.first);
+        let size_s = if let TimeForm::Numbers(size) = time.1 { size } else { 1.0 };
+        one_clock(path, &names, (column, size_s), lines.map(|(line, text)| (line, cells(text, dialect.delimiter))))?;
         let named = |i: &usize| *i != time.0 && !names[*i].0.is_empty();
         let columns: Vec<usize> = (0..titles.len()).filter(named).collect();
         let (path, width) = (path.to_owned(), titles.len());
@@ -110,6 +110,11 @@ impl CsvLog {
         format!("CSV, delimiter {delimiter}, decimal {}", if self.dialect.decimal_comma { "comma" } else { "point" })
     }
 
+    /// Adds a note.
+    pub(crate) fn note(&mut self, note: &str) {
+        self.notes.push(note.to_owned());
+    }
+
     pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
         let Some(records) = self.records.take() else {
             return Err(LogError::file(&self.path, "the log was read already"));
@@ -119,7 +124,11 @@ impl CsvLog {
             log: self,
             records,
             text: Vec::new(),
-            midnight: Midnight::default(),
+            midnight: match self.time.1 {
+                TimeForm::Stamps(form) => form.turns(),
+                TimeForm::Numbers(_) => Midnight::default(),
+            },
+            order: RowOrder::default(),
             rows: 0,
             without_time: 0,
             first_without_time: String::new(),
@@ -155,6 +164,7 @@ struct Rows<'a> {
     /// A cell with a point in place of its comma.
     text: Vec<u8>,
     midnight: Midnight,
+    order: RowOrder,
     rows: u64,
     without_time: u64,
     first_without_time: String,
@@ -184,6 +194,31 @@ impl Rows<'_> {
         number(&self.text)
     }
 
+    /// Most rows have no time.
+    fn without_times(&self) -> LogError {
+        let (without, rows) = (self.without_time, self.rows);
+        let (first, decimal_comma) = (&self.first_without_time, self.log.dialect.decimal_comma);
+        let of_number = Some(hint(first, decimal_comma)).filter(|hint| !hint.is_empty());
+        let forms = || {
+            let date = if stamp::is_ambiguous(first) {
+                "; the day and the month of a date such as this cannot be told apart: write `2024-03-31 12:00:01.25`"
+            } else {
+                ""
+            };
+            format!(
+                "\nhint: times are numbers, `12:00:01.25`, `2024-03-31 12:00:01.25` or `31.03.2024 12:00:01.25`, all in one form{date}"
+            )
+        };
+        LogError::file(
+            &self.log.path,
+            format!(
+                "{without} of {rows} rows have no time, the first is `{}`{}",
+                error::shown(first),
+                of_number.map_or_else(forms, str::to_owned)
+            ),
+        )
+    }
+
     /// The time of the row, s; none where it has none.
     fn time_s(&mut self) -> Option<f64> {
         let (column, form) = self.log.time;
@@ -191,7 +226,7 @@ impl Rows<'_> {
             TimeForm::Numbers(size) => self.number(column).map(|time| time * size).filter(|time_s| time_s.is_finite()),
             TimeForm::Stamps(form) => {
                 let time_s = form.seconds(&text(self.records.cell(column)?))?;
-                Some(if matches!(form, StampForm::Clock(_)) { self.midnight.unwrap(time_s) } else { time_s })
+                Some(if form.has_turns() { self.midnight.unwrap(time_s) } else { time_s })
             }
         }
     }
@@ -217,6 +252,7 @@ impl Rows<'_> {
             self.without_time += 1;
             return;
         };
+        self.order.push(time_s);
         for i in 0..self.channels.len() {
             let channel = self.channels[i];
             let column = self.log.columns[channel];
@@ -234,13 +270,7 @@ impl Rows<'_> {
                     if self.first_text.is_none() {
                         let line = self.records.line() + self.log.dialect.preamble as u64;
                         let cell = text(self.records.cell(column).unwrap_or_default());
-                        self.hint = match () {
-                            () if has_groups(&cell) => "\nhint: write numbers without a sign between their thousands",
-                            () if number(cell.trim().as_bytes()).is_some() => {
-                                "\nhint: the decimal sign of the other numbers is a comma"
-                            }
-                            () => "",
-                        };
+                        self.hint = hint(&cell, self.log.dialect.decimal_comma);
                         self.first_text = Some(format!("line {line}: `{}`", error::shown(&cell)));
                     }
                     (f64::NAN, Quality::Missing)
@@ -259,17 +289,9 @@ impl Stream for Rows<'_> {
                     return Err(LogError::file(&self.log.path, "there are no rows"));
                 }
                 if 2 * self.without_time > self.rows {
-                    return Err(LogError::file(
-                        &self.log.path,
-                        format!(
-                            "{} of {} rows have no time, the first is `{}`\nhint: times are numbers, `12:00:01.25`, `2024-03-31 12:00:01.25` or \
-                             `31.03.2024 12:00:01.25`, all in one form",
-                            self.without_time,
-                            self.rows,
-                            error::shown(&self.first_without_time)
-                        ),
-                    ));
+                    return Err(self.without_times());
                 }
+                self.order.check(&self.log.path)?;
                 return Ok(false);
             }
             self.take_row(&mut batch.samples);
@@ -300,19 +322,53 @@ impl Stream for Rows<'_> {
     }
 }
 
+/// Name and unit of each column; the unit stands below its title, in it, or at the end of the name.
+fn names_and_units(titles: &[String], units: &[String]) -> Vec<(String, String)> {
+    let name_and_unit = |(i, title): (usize, &String)| {
+        let (name, own) = split_unit(title);
+        let unit = match units.get(i).filter(|unit| !unit.is_empty()) {
+            Some(unit) => unit.clone(),
+            None if !own.is_empty() => own,
+            None => Unit::of_name(&name).map_or(String::new(), |unit| unit.name.to_owned()),
+        };
+        (name, unit)
+    };
+    titles.iter().enumerate().map(name_and_unit).collect()
+}
+
 /// Reads a row; false at the end.
 fn read_row(path: &Path, records: &mut Records, preamble: usize) -> Result<bool, LogError> {
     records.advance().map_err(|error| match error {
         RecordError::Io(source) => LogError::Io { path: path.to_owned(), source },
-        RecordError::TooLong => LogError::damaged(
-            path,
-            format!("line {}", records.line() + preamble as u64),
-            format!(
-                "the row that begins here is longer than {} MiB\nhint: a quotation mark may not be closed",
-                LONGEST_ROW >> 20
-            ),
-        ),
+        RecordError::TooLong => too_long(path, records.line() + preamble as u64),
     })
+}
+
+/// The row that begins in this line is longer than any that is read.
+pub(crate) fn too_long(path: &Path, line: u64) -> LogError {
+    LogError::damaged(
+        path,
+        format!("line {line}"),
+        format!(
+            "the row that begins here is longer than {} MiB\nhint: the file has no line breaks, or a quotation mark is not closed",
+            LONGEST_ROW >> 20
+        ),
+    )
+}
+
+/// What to do about a cell that is no number because of its decimal sign, or of signs between its thousands.
+fn hint(cell: &str, decimal_comma: bool) -> &'static str {
+    let cell = cell.trim();
+    let is_comma =
+        !decimal_comma && cell.matches(',').count() == 1 && number(cell.replace(',', ".").as_bytes()).is_some();
+    match () {
+        () if is_comma => "\nhint: write all numbers with one decimal sign, and without a sign between their thousands",
+        () if has_groups(cell) => "\nhint: write numbers without a sign between their thousands",
+        () if !cell.is_empty() && number(cell.as_bytes()).is_some() => {
+            "\nhint: the decimal sign of the other numbers is a comma"
+        }
+        () => "",
+    }
 }
 
 /// Text of a file: UTF-8, or else Latin-1, in which every byte is a letter.
@@ -322,7 +378,7 @@ fn text(bytes: &[u8]) -> String {
 
 /// Whether a text is a number with thousands apart: `1,007.25`, `1.007,25`, `1 007,25`, `1'007.25`. Such a number is not read: `1,007` may
 /// as well be a little more than one.
-fn has_groups(text: &str) -> bool {
+pub(crate) fn has_groups(text: &str) -> bool {
     let text = text.trim().trim_start_matches(['+', '-']);
     let groups: Vec<&str> = text.split(['.', ',', '\'', ' ', '\u{a0}', '\u{202f}']).collect();
     let are_digits = groups.iter().all(|group| !group.is_empty() && group.bytes().all(|byte| byte.is_ascii_digit()));
@@ -331,12 +387,9 @@ fn has_groups(text: &str) -> bool {
     are_digits && groups[0].len() <= 3 && !between.is_empty() && between.iter().all(|group| group.len() == 3)
 }
 
-/// Passes over some bytes and then some lines.
-fn skip(input: &mut impl Read, bytes: usize, lines: usize) -> io::Result<()> {
+/// Passes over some lines.
+fn skip(input: &mut impl Read, lines: usize) -> io::Result<()> {
     let (mut byte, mut lines) = ([0], lines);
-    for _ in 0..bytes {
-        input.read_exact(&mut byte)?;
-    }
     while lines > 0 {
         input.read_exact(&mut byte)?;
         lines -= usize::from(byte[0] == b'\n');
@@ -358,91 +411,4 @@ pub(crate) fn split_unit(title: &str) -> (String, String) {
         }
     }
     (title.to_owned(), String::new())
-}
-
-/// Whether a name is that of the time.
-pub(crate) fn is_time_name(name: &str) -> bool {
-    const NAMES: &[&str] = &[
-        "time",
-        "t",
-        "zeit",
-        "timestamp",
-        "timestamps",
-        "times",
-        "elapsed",
-        "abszeit",
-        "relzeit",
-        "time_s",
-        "time_ms",
-        "time_us",
-        "time_ns",
-        "zeit_s",
-        "zeit_ms",
-        "t_s",
-        "t_ms",
-        "t_us",
-        "t_ns",
-        "epoch",
-        "epoch_s",
-        "epoch_ms",
-        "epoch_us",
-        "epoch_ns",
-        "unix_time",
-        "x_value",
-        "timestamp_s",
-        "timestamp_ms",
-        "timestamp_us",
-        "timestamp_ns",
-    ];
-    NAMES.contains(&name.to_lowercase().replace([' ', '-'], "_").as_str())
-}
-
-/// The column of the time.
-pub(crate) fn time_column(
-    path: &Path,
-    names: &[(String, String)],
-    titles: &[String],
-    wanted: Option<&TimeColumn>,
-) -> Result<usize, LogError> {
-    let found = match wanted {
-        Some(TimeColumn { name, .. }) => (0..names.len()).find(|&i| names[i].0 == *name || titles[i] == *name),
-        None => (0..names.len()).find(|&i| is_time_name(&names[i].0)),
-    };
-    found.ok_or_else(|| {
-        let wanted =
-            wanted.map_or("for the time".to_owned(), |time| format!("`{}` for the time", error::shown(&time.name)));
-        let some: Vec<String> = names.iter().take(12).map(|(name, _)| error::shown(name)).collect();
-        LogError::file(
-            path,
-            format!(
-                "there is no column {wanted}; the first columns are {}\nhint: name it `time_s`, or in the channel map under [time]",
-                some.join(", ")
-            ),
-        )
-    })
-}
-
-/// The size of the unit of a column with times, s.
-pub(crate) fn time_unit(
-    path: &Path,
-    (name, unit): &(String, String),
-    wanted: Option<&TimeColumn>,
-    notes: &mut Vec<String>,
-) -> Result<f64, LogError> {
-    let text = wanted.and_then(|time| time.unit.clone()).unwrap_or_else(|| unit.clone());
-    if text.is_empty() {
-        notes.push(format!("the column `{}` has no unit: taken as s", error::shown(name)));
-        return Ok(1.0);
-    }
-    match Unit::parse(&text) {
-        Some(Unit { quantity: Quantity::Time, size, .. }) => Ok(size),
-        _ => Err(LogError::file(
-            path,
-            format!(
-                "the time `{}` has the unit `{}`\nhint: it can be s, ms, us or ns; say it in the channel map under [time]",
-                error::shown(name),
-                error::shown(&text)
-            ),
-        )),
-    }
 }

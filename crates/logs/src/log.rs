@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use trace::csv_file::LONGEST_ROW;
+use trace::text::{BYTE_ORDER_MARK, Utf16, is_utf16};
 use trace::{Following, ShownPath as _};
 
 use crate::ahead::Crew;
@@ -17,8 +18,7 @@ use crate::csv_log::CsvLog;
 use crate::mdf::MdfLog;
 use crate::parquet_log::ParquetLog;
 use crate::samples::Samples;
-use crate::utf16::{Utf16, is_utf16};
-use crate::{LogError, error};
+use crate::{Format, LogError, csv_log, error};
 
 /// A channel of a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -65,6 +65,9 @@ enum Source {
     Can(CanLog),
 }
 
+/// The warning of a DBC that is given for a log without frames.
+pub const NO_FRAMES: &str = "the DBC has no effect: there are no frames of a CAN bus in this log";
+
 /// Bytes that tell the format of a file, and the lines that tell the form of a table.
 const HEAD: usize = 64 << 10;
 
@@ -92,16 +95,8 @@ impl Log {
         Self::of(path, options, Box::new(reader), true)
     }
 
-    fn of(path: &Path, options: &OpenOptions, mut reader: Box<dyn Read>, is_followed: bool) -> Result<Self, LogError> {
-        let io = LogError::io(path);
-        let mut head = first_bytes(&mut reader).map_err(&io)?;
-        if head.is_empty() {
-            return Err(LogError::file(path, "the file is empty"));
-        }
-        if is_utf16(&head) {
-            reader = Box::new(Utf16::new(head, reader));
-            head = first_bytes(&mut reader).map_err(&io)?;
-        }
+    fn of(path: &Path, options: &OpenOptions, reader: Box<dyn Read>, is_followed: bool) -> Result<Self, LogError> {
+        let (head, reader) = beginning(path, reader)?;
         let database = options.dbc.as_deref().map(Database::read).transpose()?;
         let is_file = path != Path::new("-");
         let (source, channels) = match Format::of(&head) {
@@ -112,7 +107,8 @@ impl Log {
                 ));
             }
             Format::Mdf if is_file => {
-                MdfLog::open(path, database).map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?
+                let time = options.time.as_ref();
+                MdfLog::open(path, database, time).map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?
             }
             Format::Parquet if is_file => {
                 ParquetLog::open(path, options.time.as_ref()).map(|(log, channels)| (Source::Parquet(log), channels))?
@@ -123,19 +119,7 @@ impl Log {
                     "MDF and Parquet files cannot be read from a pipe\nhint: give the file itself",
                 ));
             }
-            Format::Mdf3 => {
-                return Err(LogError::file(
-                    path,
-                    "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf",
-                ));
-            }
-            Format::OtherFrames => {
-                return Err(LogError::file(
-                    path,
-                    "these are frames of a bus in a form that is not read (PCAN trace, or a table of frames)\nhint: convert it, for example with \
-                     python-can: `python -m can.logconvert IN OUT.log`",
-                ));
-            }
+            Format::NotRead(why) => return Err(LogError::file(path, why)),
             Format::Can(kind) => {
                 let database = database.ok_or_else(|| {
                     LogError::file(
@@ -149,7 +133,30 @@ impl Log {
             Format::Csv => CsvLog::open(path, head, reader, options.time.as_ref(), is_followed)
                 .map(|(log, channels)| (Source::Csv(Box::new(log)), channels))?,
         };
-        Ok(Self { path: path.to_owned(), channels, source, threads: 1 })
+        let mut log = Self { path: path.to_owned(), channels, source, threads: 1 };
+        if options.dbc.is_some() && !log.has_frames() {
+            log.note(NO_FRAMES);
+        }
+        Ok(log)
+    }
+
+    /// Whether there are frames of a CAN bus in it.
+    fn has_frames(&self) -> bool {
+        match &self.source {
+            Source::Csv(_) | Source::Parquet(_) => false,
+            Source::Mdf(log) => log.has_frames(),
+            Source::Can(_) => true,
+        }
+    }
+
+    /// Adds a note.
+    fn note(&mut self, note: &str) {
+        match &mut self.source {
+            Source::Csv(log) => log.note(note),
+            Source::Parquet(log) => log.note(note),
+            Source::Mdf(log) => log.note(note),
+            Source::Can(_) => {}
+        }
     }
 
     /// Lets so many threads read [`Self::samples`] and [`Self::columns`]: the one that asks, and others that unpack the blocks of an MDF
@@ -287,6 +294,11 @@ impl Log {
     fn nearest(&self, name: &str) -> String {
         // One letter of three may be wrong, or stand before its neighbour.
         const ALIKE: f64 = 2.0 / 3.0;
+        if let Source::Mdf(log) = &self.source
+            && log.lacks_dbc()
+        {
+            return "the signals of its CAN frames are known only with a DBC: give it with --dbc".to_owned();
+        }
         let wanted = name.to_lowercase();
         let similar = |channel: &&Channel| {
             let name = channel.name.to_lowercase();
@@ -314,14 +326,38 @@ impl Log {
 /// Whether a regular file is of a format that needs a channel map, by its first bytes.
 ///
 /// # Errors
-/// The file cannot be read.
+/// The file cannot be read, or is of a format that is known and not read.
 pub fn needs_map(path: &Path) -> Result<bool, LogError> {
     let io = LogError::io(path);
+    // A pipe is opened once.
     if !path.metadata().map_err(&io)?.is_file() {
         return Ok(false);
     }
-    let head = first_bytes(&mut File::open(path).map_err(&io)?).map_err(&io)?;
-    Ok(is_utf16(&head) || !matches!(Format::of(&head), Format::Csv))
+    let file = File::open(path).map_err(&io)?;
+    match Format::of(&beginning(path, Box::new(file))?.0) {
+        Format::NotRead(why) => Err(LogError::file(path, why)),
+        format => Ok(format != Format::Csv),
+    }
+}
+
+/// The first bytes of a log and what comes behind them, as UTF-8 without a mark where it is text.
+fn beginning(path: &Path, mut reader: Box<dyn Read>) -> Result<(Vec<u8>, Box<dyn Read>), LogError> {
+    let io = LogError::io(path);
+    let mut head = first_bytes(&mut reader).map_err(&io)?;
+    if is_utf16(&head) {
+        reader = Box::new(Utf16::new(head, reader));
+        head = first_bytes(&mut reader).map_err(&io)?;
+    }
+    if head.starts_with(BYTE_ORDER_MARK) {
+        head.drain(..BYTE_ORDER_MARK.len());
+    }
+    if head.is_empty() {
+        return Err(LogError::file(path, "the file is empty"));
+    }
+    if head.len() > LONGEST_ROW && !head.iter().any(|byte| matches!(byte, b'\n' | b'\r' | 0)) {
+        return Err(csv_log::too_long(path, 1));
+    }
+    Ok((head, reader))
 }
 
 /// The first bytes of a file, or of a pipe as far as it has come: at least its first lines. Where lines are long, as many more as names,
@@ -332,7 +368,13 @@ fn first_bytes(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
     const MOST: usize = LONG_LINES * LONGEST_ROW;
     let (mut head, mut lines, mut long_lines, mut is_text) = (Vec::new(), 0, 0, true);
     let mut bytes = vec![0; HEAD];
-    while lines < LINES && long_lines < LONG_LINES && head.len() < if is_text { MOST } else { HEAD } {
+    let most = |lines: usize, is_text: bool| match () {
+        () if !is_text => HEAD,
+        // One byte more shows that the first line is too long.
+        () if lines == 0 => LONGEST_ROW + 1,
+        () => MOST,
+    };
+    while lines < LINES && long_lines < LONG_LINES && head.len() < most(lines, is_text) {
         match reader.read(&mut bytes) {
             Ok(0) => break,
             Ok(read) => {
@@ -358,54 +400,4 @@ pub enum CanKind {
     Asc,
     /// Vector's objects in containers.
     Blf,
-}
-
-/// Formats of files, as their first bytes tell them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// ASAM MDF 4.
-    Mdf,
-    /// MDF 2 and 3, which are not read.
-    Mdf3,
-    /// Parquet.
-    Parquet,
-    /// Frames of a bus.
-    Can(CanKind),
-    /// Frames in a form that is not read.
-    OtherFrames,
-    /// Anything else: a table as text.
-    Csv,
-}
-
-impl Format {
-    /// The format of a file that begins with these bytes.
-    pub fn of(head: &[u8]) -> Self {
-        if head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ") {
-            return if matches!(head.get(8), Some(b'2' | b'3')) { Self::Mdf3 } else { Self::Mdf };
-        }
-        if head.starts_with(b"PAR1") {
-            return Self::Parquet;
-        }
-        if head.starts_with(b"LOGG") {
-            return Self::Can(CanKind::Blf);
-        }
-        let text = String::from_utf8_lossy(head);
-        let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("//")).unwrap_or("");
-        let words: Vec<&str> = first.split_whitespace().collect();
-        let stamped = words.first().is_some_and(|word| word.starts_with('(')) && first.contains(')');
-        if stamped && words.len() >= 3 {
-            return Self::Can(CanKind::Candump);
-        }
-        let lower = first.to_lowercase();
-        if lower.starts_with(";$fileversion") || lower.starts_with("timestamp,arbitration_id,") {
-            return Self::OtherFrames;
-        }
-        if lower.starts_with("date ") && !first.contains([',', ';', '\t'])
-            || lower.starts_with("base hex")
-            || lower.starts_with("base dec")
-        {
-            return Self::Can(CanKind::Asc);
-        }
-        Self::Csv
-    }
 }

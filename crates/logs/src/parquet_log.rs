@@ -1,12 +1,14 @@
 //! Parquet files: a table of numbers, read by row group and in it some thousand rows at a time.
 
+mod pages;
+mod text;
+
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use half::f16;
-use parquet::basic::{Compression, ConvertedType, Encoding, LogicalType, TimeUnit, Type as Physical};
-use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::{DataType, DoubleType, Int96};
 use parquet::errors::ParquetError;
@@ -14,9 +16,13 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescPtr;
 
 use crate::columns::{Batch, Block, Stream, are_finite};
-use crate::csv_log::{is_time_name, split_unit, time_column, time_unit};
+use crate::csv_log::split_unit;
+use crate::row_order::RowOrder;
 use crate::samples::Quality;
+use crate::stamp::Midnight;
+use crate::time_column::{is_time_name, time_column, time_unit};
 use crate::{Channel, LogError, TimeColumn, error};
+use pages::CheckedPages;
 use trace::Unit;
 
 /// Rows that are decoded at once: their columns stay in the second cache. Of many columns fewer, but so many, are.
@@ -32,6 +38,8 @@ pub(crate) struct ParquetLog {
     /// Column and size in s of the time.
     time: (usize, f64),
     time_form: Form,
+    /// Whether the time is that of the day.
+    is_of_day: bool,
     /// Column of each channel, and how its numbers are stored.
     columns: Vec<(usize, Form)>,
     notes: Vec<String>,
@@ -69,10 +77,12 @@ impl ParquetLog {
             ));
         };
         let size_s = time_unit(path, &names[time], wanted, &mut notes)?;
+        let is_of_day = matches!(leaves[time].logical_type_ref(), Some(LogicalType::Time(_)));
         let others = || (0..leaves.len()).filter(|&i| i != time);
-        let columns: Vec<(usize, Form)> = others().filter_map(|i| Some((i, Form::of(&leaves[i])?))).collect();
+        let form = |i: usize| Form::of(&leaves[i]).or_else(|| text::holds_numbers(&reader, i).then_some(Form::Text));
+        let columns: Vec<(usize, Form)> = others().filter_map(|i| Some((i, form(i)?))).collect();
         let left_out: Vec<String> = others()
-            .filter(|&i| Form::of(&leaves[i]).is_none())
+            .filter(|i| columns.binary_search_by_key(i, |column| column.0).is_err())
             .map(|i| format!("{} ({})", error::shown(&titles[i]), kind(&leaves[i])))
             .collect();
         if !left_out.is_empty() {
@@ -89,13 +99,26 @@ impl ParquetLog {
         });
         let channels = channels.collect();
         let time = (time, size_s);
-        Ok((Self { path: path.to_owned(), reader, time, time_form, columns, notes }, channels))
+        Ok((Self { path: path.to_owned(), reader, time, time_form, is_of_day, columns, notes }, channels))
+    }
+
+    /// Adds a note.
+    pub(crate) fn note(&mut self, note: &str) {
+        self.notes.push(note.to_owned());
     }
 
     pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
         let channels: Vec<usize> = (0..self.columns.len()).filter(|&channel| wanted[channel]).collect();
         self.check_compression(channels.iter().map(|&channel| self.columns[channel].0).chain([self.time.0]))?;
-        Ok(Box::new(Groups { channels, log: self, group: 0, open: None, without_time: 0 }))
+        Ok(Box::new(Groups {
+            channels,
+            log: self,
+            group: 0,
+            open: None,
+            midnight: Midnight::default(),
+            order: RowOrder::default(),
+            without_time: 0,
+        }))
     }
 
     /// Checks that these columns can be unpacked.
@@ -211,6 +234,8 @@ enum Form {
     Half,
     /// Days and nanoseconds in 96 bits: ns since 1970.
     Stamp96,
+    /// Text of numbers.
+    Text,
 }
 
 impl Form {
@@ -243,77 +268,6 @@ impl Form {
     }
 }
 
-/// The pages of a column. What their heads say is checked, because the decoder takes it on trust: that a dictionary stands
-/// before the pages that need it and has as many values as it says, and that levels lie within their page.
-struct CheckedPages {
-    pages: Box<dyn PageReader>,
-    column: ColumnDescPtr,
-    dictionary: bool,
-}
-
-impl CheckedPages {
-    fn check(&mut self, page: &Page) -> Result<(), &'static str> {
-        let length = page.buffer().len();
-        if let Page::DictionaryPage { num_values, .. } = page {
-            let size = match self.column.physical_type() {
-                Physical::INT32 | Physical::FLOAT => 4,
-                Physical::INT96 => 12,
-                Physical::FIXED_LEN_BYTE_ARRAY => usize::try_from(self.column.type_length()).unwrap_or(1).max(1),
-                _ => 8,
-            };
-            self.dictionary = true;
-            return if *num_values as usize <= length / size {
-                Ok(())
-            } else {
-                Err("a dictionary is shorter than it says")
-            };
-        }
-        if matches!(page.encoding(), Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) && !self.dictionary {
-            return Err("a page needs a dictionary, and there is none");
-        }
-        let levels = match page {
-            // Run lengths begin with their size, which the decoder checks; the older form has none. One bit is enough for the
-            // levels of a table.
-            Page::DataPage { num_values, def_level_encoding, .. }
-                if *def_level_encoding != Encoding::RLE && self.column.max_def_level() > 0 =>
-            {
-                (*num_values as usize).div_ceil(8) * usize::from(self.column.max_def_level().unsigned_abs())
-            }
-            Page::DataPageV2 { def_levels_byte_len, rep_levels_byte_len, .. } => {
-                *def_levels_byte_len as usize + *rep_levels_byte_len as usize
-            }
-            _ => 0,
-        };
-        if levels > length { Err("the levels of a page are longer than the page") } else { Ok(()) }
-    }
-}
-
-impl PageReader for CheckedPages {
-    fn get_next_page(&mut self) -> Result<Option<Page>, ParquetError> {
-        let page = self.pages.get_next_page()?;
-        if let Some(page) = &page {
-            self.check(page).map_err(|message| ParquetError::General(message.to_owned()))?;
-        }
-        Ok(page)
-    }
-
-    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>, ParquetError> {
-        self.pages.peek_next_page()
-    }
-
-    fn skip_next_page(&mut self) -> Result<(), ParquetError> {
-        self.pages.skip_next_page()
-    }
-}
-
-impl Iterator for CheckedPages {
-    type Item = Result<Page, ParquetError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        self.get_next_page().transpose()
-    }
-}
-
 /// The open columns of a row group.
 struct OpenGroup {
     time: ColumnReader,
@@ -327,6 +281,8 @@ struct Groups<'a> {
     channels: Vec<usize>,
     group: usize,
     open: Option<OpenGroup>,
+    midnight: Midnight,
+    order: RowOrder,
     without_time: u64,
 }
 
@@ -337,7 +293,7 @@ impl Groups<'_> {
         let reader = |column: usize| {
             let descriptor = group.metadata().schema_descr().column(column);
             let pages = group.get_column_page_reader(column)?;
-            let pages = CheckedPages { pages, column: descriptor.clone(), dictionary: false };
+            let pages = CheckedPages::new(pages, descriptor.clone());
             Ok::<_, ParquetError>(get_column_reader(descriptor, Box::new(pages)))
         };
         let of = |channel: &usize| reader(self.log.columns[*channel].0);
@@ -351,7 +307,13 @@ impl Groups<'_> {
         let first = block.times_s.len();
         let end = first + rows;
         numbers(&mut open.time, self.log.time_form, rows, &mut block.times_s)?;
-        block.times_s[first..].iter_mut().for_each(|time_s| *time_s *= self.log.time.1);
+        for time_s in &mut block.times_s[first..] {
+            *time_s *= self.log.time.1;
+            if self.log.is_of_day && time_s.is_finite() {
+                *time_s = self.midnight.unwrap(*time_s);
+            }
+            self.order.push(*time_s);
+        }
         for (reader, column) in open.columns.iter_mut().zip(&mut block.columns) {
             numbers(reader, self.log.columns[column.channel].1, rows, &mut column.values)?;
             if are_finite(&column.values[first..]) {
@@ -411,7 +373,7 @@ impl Groups<'_> {
             None if self.group < self.log.reader.num_row_groups() => {
                 self.open().map_err(|error| damaged(&self.log.path, &place, &error))?
             }
-            None => return Ok(false),
+            None => return self.order.check(&self.log.path).map(|()| false),
         };
         self.decode(&mut open, block).map_err(|error| damaged(&self.log.path, &place, &error))?;
         if open.rows_left == 0 {
@@ -502,6 +464,9 @@ fn numbers(column: &mut ColumnReader, form: Form, rows: usize, numbers: &mut Vec
         (ColumnReader::Int96ColumnReader(column), _) => read(column, rows, numbers, stamp96_ns),
         (ColumnReader::FloatColumnReader(column), _) => read(column, rows, numbers, |value| f64::from(*value)),
         (ColumnReader::DoubleColumnReader(column), _) => doubles(column, rows, numbers),
+        (ColumnReader::ByteArrayColumnReader(column), Form::Text) => {
+            read(column, rows, numbers, |value| text::number_of(value.data()))
+        }
         (ColumnReader::FixedLenByteArrayColumnReader(column), Form::Half) => {
             read(column, rows, numbers, |value| match value.data() {
                 &[low, high] => f16::from_le_bytes([low, high]).to_f64(),

@@ -2,17 +2,42 @@
 
 use chrono::{DateTime, NaiveDateTime, NaiveTime, Timelike};
 
-/// Forms with a date and a time.
-const DATES: [&str; 4] =
-    ["%Y-%m-%d %H:%M:%S%.f", "%Y-%m-%dT%H:%M:%S%.f", "%Y/%m/%d %H:%M:%S%.f", "%d.%m.%Y %H:%M:%S%.f"];
+/// Forms with a date and a time. A year of two digits is tried first: one of four is more than its form takes.
+const DATES: &[&str] = &[
+    "%Y-%m-%d %H:%M:%S%.f",
+    "%Y-%m-%dT%H:%M:%S%.f",
+    "%Y/%m/%d %H:%M:%S%.f",
+    "%Y-%m-%d %I:%M:%S%.f %p",
+    "%Y/%m/%d %I:%M:%S%.f %p",
+    "%d.%m.%y %H:%M:%S%.f",
+    "%d.%m.%Y %H:%M:%S%.f",
+    "%d-%b-%y %H:%M:%S%.f",
+    "%d-%b-%Y %H:%M:%S%.f",
+    "%d-%b-%Y %I:%M:%S%.f %p",
+    "%d %b %Y %H:%M:%S%.f",
+    "%d %b %Y %I:%M:%S%.f %p",
+];
+/// Forms in which the month may stand before the day or behind it.
+const MONTH_OR_DAY_FIRST: &[[&str; 2]] = &[
+    ["%m/%d/%y %H:%M:%S%.f", "%d/%m/%y %H:%M:%S%.f"],
+    ["%m/%d/%y %I:%M:%S%.f %p", "%d/%m/%y %I:%M:%S%.f %p"],
+    ["%m/%d/%Y %H:%M:%S%.f", "%d/%m/%Y %H:%M:%S%.f"],
+    ["%m/%d/%Y %I:%M:%S%.f %p", "%d/%m/%Y %I:%M:%S%.f %p"],
+    ["%m-%d-%Y %H:%M:%S%.f", "%d-%m-%Y %H:%M:%S%.f"],
+    ["%m-%d-%Y %I:%M:%S%.f %p", "%d-%m-%Y %I:%M:%S%.f %p"],
+];
 /// Forms with the time of a day.
-const CLOCKS: [&str; 2] = ["%H:%M:%S%.f", "%I:%M:%S%.f %p"];
+const CLOCKS: &[&str] = &["%H:%M:%S%.f", "%I:%M:%S%.f %p"];
 
 /// How a time is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StampForm {
     /// A time of the day.
     Clock(&'static str),
+    /// The same with milliseconds behind another colon: `12:00:01:250`.
+    ClockWithMs,
+    /// Minutes and seconds with a fraction, as spreadsheets show times: `59:59.9`.
+    Minutes,
     /// With a date; local, or without a zone.
     Date(&'static str),
     /// With a date and the difference from UTC: `2024-03-31T12:00:00+02:00`.
@@ -20,18 +45,22 @@ pub(crate) enum StampForm {
 }
 
 impl StampForm {
-    /// The form of a time, if it is written as one. Dates with the year at their end and `/` may begin with the day or with the month:
-    /// they have none.
+    /// The form of a time, if it is written as one. A date such as `3/4/2024`, whose month may be either number, has none.
     pub(crate) fn of(text: &str) -> Option<Self> {
-        let forms = CLOCKS.map(Self::Clock).into_iter().chain(DATES.map(Self::Date)).chain([Self::Zoned]);
-        // A number is no time, and most of what is not is told by its first letter.
+        // A number is no time, and most of what is not is known by its first letter.
         if !text.trim_start().starts_with(|c: char| c.is_ascii_digit()) || !text.contains(':') {
             return None;
         }
-        forms.into_iter().find(|form| form.seconds(text).is_some())
+        let is = |form: &Self| form.seconds(text).is_some();
+        let clocks = CLOCKS.iter().map(|form| Self::Clock(form)).chain([Self::ClockWithMs, Self::Minutes]);
+        let forms = clocks.chain(DATES.iter().map(|form| Self::Date(form))).chain([Self::Zoned]);
+        forms.into_iter().find(is).or_else(|| match orders(text)? {
+            [Some(one), None] | [None, Some(one)] => Some(one),
+            _ => None,
+        })
     }
 
-    /// The seconds since midnight, or since 1970; none where the text has another form.
+    /// The seconds since midnight, the hour or 1970; none where the text has another form.
     pub(crate) fn seconds(self, text: &str) -> Option<f64> {
         let text = text.trim().replace(',', ".");
         let of = |seconds: i64, nanoseconds: u32| {
@@ -40,33 +69,76 @@ impl StampForm {
             whole + 1e-9 * f64::from(nanoseconds)
         };
         let since_1970 = |time: NaiveDateTime| of(time.and_utc().timestamp(), time.nanosecond());
+        let of_day = |time: NaiveTime| of(i64::from(time.num_seconds_from_midnight()), time.nanosecond());
         match self {
-            Self::Clock(form) => {
-                let time = NaiveTime::parse_from_str(&text, form).ok()?;
-                Some(of(i64::from(time.num_seconds_from_midnight()), time.nanosecond()))
+            Self::Clock(form) => NaiveTime::parse_from_str(&text, form).ok().map(of_day),
+            Self::ClockWithMs => {
+                let (clock, ms) = text.rsplit_once(':').filter(|(_, ms)| ms.len() == 3)?;
+                let ms: u16 = ms.bytes().all(|byte| byte.is_ascii_digit()).then(|| ms.parse().ok()).flatten()?;
+                NaiveTime::parse_from_str(clock, "%H:%M:%S").ok().map(|time| of_day(time) + 1e-3 * f64::from(ms))
+            }
+            Self::Minutes => {
+                let (minutes, seconds) = text.split_once(':')?;
+                let (whole, decimals) = seconds.split_once('.')?;
+                let are_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+                let is_form = whole.len() == 2 && [minutes, whole, decimals].into_iter().all(are_digits);
+                let (minutes, seconds): (u16, f64) = (minutes.parse().ok()?, seconds.parse().ok()?);
+                (is_form && seconds < 60.0).then(|| 60.0 * f64::from(minutes) + seconds)
             }
             Self::Date(form) => NaiveDateTime::parse_from_str(&text, form).ok().map(since_1970),
             Self::Zoned => DateTime::parse_from_rfc3339(&text).ok().map(|time| since_1970(time.naive_utc())),
         }
     }
+
+    /// How its times go on: those without a date begin anew.
+    pub(crate) fn turns(self) -> Midnight {
+        match self {
+            Self::Minutes => Midnight { turn_s: 3600.0, ..Midnight::default() },
+            _ => Midnight::default(),
+        }
+    }
+
+    /// Whether its times begin anew after a day or an hour.
+    pub(crate) fn has_turns(self) -> bool {
+        matches!(self, Self::Clock(_) | Self::ClockWithMs | Self::Minutes)
+    }
 }
 
-/// Times of a day that go on after midnight.
-#[derive(Debug, Default)]
+/// The forms of a date that begins with the month and with the day; none where it is no such date.
+fn orders(text: &str) -> Option<[Option<StampForm>; 2]> {
+    let orders = MONTH_OR_DAY_FIRST
+        .iter()
+        .map(|pair| pair.map(|form| Some(StampForm::Date(form)).filter(|form| form.seconds(text).is_some())));
+    orders.into_iter().find(|orders| orders.iter().any(Option::is_some))
+}
+
+/// Whether nothing in a date tells its day from its month: `3/4/2024 12:00:00`.
+pub(crate) fn is_ambiguous(text: &str) -> bool {
+    matches!(orders(text), Some([Some(_), Some(_)]))
+}
+
+/// Times of a day, or of an hour, that go on after its end.
+#[derive(Debug)]
 pub(crate) struct Midnight {
     newest_s: Option<f64>,
-    days: f64,
+    turn_s: f64,
+    turns: f64,
+}
+
+impl Default for Midnight {
+    fn default() -> Self {
+        Self { newest_s: None, turn_s: 86_400.0, turns: 0.0 }
+    }
 }
 
 impl Midnight {
-    /// The time of a clock, s since the midnight before the first one. A step of more than half a day is one over midnight.
-    pub(crate) fn unwrap(&mut self, of_day_s: f64) -> f64 {
-        const DAY_S: f64 = 86_400.0;
-        let step_s = of_day_s - self.newest_s.replace(of_day_s).unwrap_or(of_day_s);
-        if 2.0 * step_s.abs() > DAY_S {
-            self.days -= step_s.signum();
+    /// The time of a clock, s since the midnight (the full hour) before the first one. A step of more than half a turn is one over its end.
+    pub(crate) fn unwrap(&mut self, of_turn_s: f64) -> f64 {
+        let step_s = of_turn_s - self.newest_s.replace(of_turn_s).unwrap_or(of_turn_s);
+        if 2.0 * step_s.abs() > self.turn_s {
+            self.turns -= step_s.signum();
         }
-        of_day_s + DAY_S * self.days
+        of_turn_s + self.turn_s * self.turns
     }
 }
 
@@ -89,15 +161,53 @@ mod tests {
             ("2024-03-31T14:00:00+02:00", noon_s),
             ("2024/03/31 12:00:00.5", noon_s + 0.5),
             ("31.03.2024 12:00:00", noon_s),
+            ("31.03.24 12:00:00", noon_s),
+            ("31-Mar-2024 12:00:00.500", noon_s + 0.5),
+            ("2024-03-31 12:00:00.5 PM", noon_s + 0.5),
+            ("3/31/2024 12:00:00.5 PM", noon_s + 0.5),
+            ("3/31/24 12:00:00", noon_s),
+            ("31/3/2024 12:00:00", noon_s),
+            ("31-03-2024 12:00:00", noon_s),
+            ("12:00:01:250", 43_201.25),
+            ("00:01.5", 1.5),
+            ("59:59,9", 3599.9),
+            ("75:00.0", 4500.0),
         ] {
             let form = StampForm::of(text).unwrap_or_else(|| panic!("{text}"));
             assert_eq!(form.seconds(text), Some(seconds), "{text}");
         }
-        for text in
-            ["", "12", "12.5", "12:00", "3/31/2024 12:00:00", "2024-03-31", "25:00:00", "a:b:c", "1e300", "\u{e9}:"]
-        {
+        for text in [
+            "",
+            "12",
+            "12.5",
+            "12:00",
+            "3/4/2024 12:00:00",
+            "2024-03-31",
+            "25:00:00",
+            "a:b:c",
+            "1e300",
+            "\u{e9}:",
+            "1:2.5",
+            "00:61.5",
+            "12:00:01:25",
+            "12:00:01:+25",
+            "31/31/2024 12:00:00",
+            "00:+1.5",
+        ] {
             assert_eq!(StampForm::of(text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn only_a_date_that_has_two_meanings_is_ambiguous() {
+        assert!(is_ambiguous("3/4/2024 12:00:00") && is_ambiguous("03-04-2024 12:00:00 PM"));
+        assert!(!is_ambiguous("3/31/2024 12:00:00") && !is_ambiguous("2024/03/04 12:00:00") && !is_ambiguous("x"));
+    }
+
+    #[test]
+    fn minutes_go_on_after_the_hour() {
+        let mut turns = StampForm::Minutes.turns();
+        assert_eq!([3599.5, 0.5, 1.0].map(|s| turns.unwrap(s)), [3599.5, 3600.5, 3601.0]);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Folder, channel, data, read, with_dbc};
-use logs::OpenOptions;
+use logs::{OpenOptions, Quality};
 
 /// Values of the signals of a log with one message, by name.
 fn values(folder: &Folder, log: &str, dbc: &str, name: &str) -> Vec<f64> {
@@ -78,5 +78,170 @@ fn times_of_blf_are_those_that_their_digits_say() {
             let digits = format!("{:.9}", sample.time_s);
             assert_eq!(sample.time_s.to_bits(), digits.parse::<f64>().unwrap().to_bits(), "{file} {digits}");
         }
+    }
+}
+
+const HEAD: &str = "VERSION \"\"\nNS_ :\nBS_:\nBU_: A\n";
+
+#[test]
+fn values_that_a_dbc_names_as_none_are_missing_and_states_stay() {
+    let folder = Folder::new("named-values");
+    let dbc = HEAD.to_owned()
+        + "BO_ 290 M: 8 A\n SG_ N_Turb : 0|16@1+ (0.25,0) [0|16383] \"rpm\" A\n \
+           SG_ Acc : 24|11@1+ (0.005,-7.22) [-7.22|3.005] \"m/s2\" A\n SG_ Gear : 40|4@1+ (1,0) [0|15] \"\" A\n\
+           VAL_ 290 N_Turb 65533 \"Init\" 65534 \"Error\" 65535 \"SNA\" ;\nVAL_ 290 Acc 2046 \"Neutralwert\" 2047 \"Fehler\" ;\n\
+           VAL_ 290 Gear 0 \"N\" 13 \"R\" 14 \"P\" 15 \"SNA\" ;\n";
+    let frames = ["401F00A405030000", "FEFF00FE070F0000", "FDFF00FF070D0000", "FFFF00A4050E0000", "441F00A405030000"];
+    let log: String = frames.iter().enumerate().map(|(i, data)| format!("(1.0{i}0000) can0 122#{data}\n")).collect();
+    let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc)), time: None };
+    let (log, samples, _) = read(&folder.write("own.log", log), &options).unwrap();
+    let of = |name: &str| {
+        let found = channel(&log, &samples, name);
+        found
+            .into_iter()
+            .map(|(_, value, quality)| (quality == Quality::Good).then_some(value).ok_or(quality))
+            .collect::<Vec<_>>()
+    };
+    let none = Err(Quality::Missing);
+    assert_eq!(of("N_Turb"), [Ok(2000.0), none, none, none, Ok(2001.0)]);
+    // 0x5a4 is 1444, and 1444 x 0.005 - 7.22 is zero.
+    assert!(of("Acc").iter().map(Result::is_ok).eq([true, false, false, true, true]), "{:?}", of("Acc"));
+    assert_eq!(of("Gear"), [Ok(3.0), none, Ok(13.0), Ok(14.0), Ok(3.0)]);
+}
+
+#[test]
+fn all_bits_of_an_obd_percentage_are_a_hundred_per_cent() {
+    let folder = Folder::new("obd");
+    let dbc = |range: &str| {
+        format!(
+            "{HEAD}BO_ 290 M: 8 A\n SG_ Throttle : 0|8@1+ (0.39215686,0) {range} \"%\" A\n SG_ N : 8|16@1+ (0.25,0) [0|16383.75] \"rpm\" A\n"
+        )
+    };
+    let frame = "(1.0) can0 122#FFFFFF0000000000\n";
+    let quality = |range: &str, name: &str| {
+        let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc(range))), time: None };
+        let (log, samples, _) = read(&folder.write("own.log", frame), &options).unwrap();
+        channel(&log, &samples, name)[0]
+    };
+    let (_, value, good) = quality("[0|100]", "Throttle");
+    // Half of the last digit of the factor.
+    assert!((value - 100.0).abs() < 255.0 * 0.5e-8 && good == Quality::Good, "{value} {good:?}");
+    // Without a range, or for a speed, it may as well mean that there is no value.
+    assert_eq!(quality("[0|0]", "Throttle").2, Quality::Saturated);
+    assert_eq!(quality("[0|100]", "N").2, Quality::Saturated);
+}
+
+#[test]
+fn messages_with_the_same_identifier_are_both_read_and_named() {
+    let folder = Folder::new("same-identifier");
+    let dbc = HEAD.to_owned()
+        + "BO_ 256 Std: 8 A\n SG_ Std_Sig : 0|8@1+ (1,0) [0|0] \"\" A\nBO_ 2147483904 Ext: 8 A\n SG_ Ext_Sig : 0|8@1+ (2,0) [0|0] \"\" A\n\
+           BO_ 257 Twice: 8 A\n SG_ First : 0|8@1+ (1,0) [0|0] \"\" A\nBO_ 257 TwiceB: 8 A\n SG_ Second : 8|8@1+ (1,0) [0|0] \"\" A\n";
+    let log =
+        "(1.0) can0 100#0506000000000000\n(1.1) can0 00000100#0709000000000000\n(1.2) can0 101#0B0C000000000000\n";
+    let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc)), time: None };
+    let (log, samples, notes) = read(&folder.write("own.log", log), &options).unwrap();
+    let of = |name: &str| channel(&log, &samples, name).into_iter().map(|(_, value, _)| value).collect::<Vec<_>>();
+    assert_eq!([of("Std_Sig"), of("Ext_Sig"), of("First"), of("Second")], [[5.0], [14.0], [11.0], [12.0]]);
+    assert_eq!(
+        notes,
+        [
+            "the messages `Twice`, `TwiceB` have the same identifier 0x101 in the DBC: each of its frames is read as all of them\nhint: delete those that are \
+          not on this bus"
+        ]
+    );
+}
+
+#[test]
+fn a_length_code_above_eight_is_eight_bytes() {
+    let folder = Folder::new("length-codes");
+    let count = |text: &str| {
+        let (log, samples, notes) = read(&folder.write("bus.log", text), &with_dbc()).unwrap();
+        assert_eq!(notes, Vec::<String>::new());
+        channel(&log, &samples, "N_Eng").len()
+    };
+    let asc =
+        |s: u32, code: &str| format!("{s}.0 1 100 Rx d {code} 40 0C 00 00 00 00 00 00  Length = 2 BitCount = 3\n");
+    let head = "date Sun Mar 31 12:00:00 2024\nbase hex  timestamps absolute\n";
+    assert_eq!(count(&format!("{head}{}", [asc(0, "8"), asc(1, "9"), asc(2, "a"), asc(3, "F")].concat())), 4);
+    let (_, _, notes) =
+        read(&folder.write("bus.log", format!("{head}{}{}", asc(0, "8"), asc(1, "16"))), &with_dbc()).unwrap();
+    assert!(notes[0].starts_with("1 lines are no frames"), "{notes:?}");
+    assert_eq!(
+        count("(1.0)  can0  100   {F}  40 0C 00 00 00 00 00 00\n(1.1)  can0  100   [8]  40 0C 00 00 00 00 00 00\n"),
+        2
+    );
+}
+
+#[test]
+fn frames_before_the_start_of_a_recording_have_negative_times() {
+    let folder = Folder::new("negative-times");
+    // The stamps of a BLF with one container that is not packed: 64 bits from the 24th byte of each object on.
+    let object = |ns: i64, frame: [u8; 8]| {
+        let head = [
+            b"LOBJ".as_slice(),
+            &32_u16.to_le_bytes(),
+            &1_u16.to_le_bytes(),
+            &48_u32.to_le_bytes(),
+            &1_u32.to_le_bytes(),
+        ]
+        .concat();
+        let stamp = [2_u32.to_le_bytes().as_slice(), &[0; 4], &ns.to_le_bytes()].concat();
+        let body = [1_u16.to_le_bytes().as_slice(), &[0, 8], &0x100_u32.to_le_bytes(), &frame].concat();
+        [head, stamp, body].concat()
+    };
+    let frames: Vec<u8> =
+        (0..500_i64).flat_map(|i| object(-1_000_000_000 + 10_000_000 * i, [0x40, 0x0c, 0, 0, 0, 0, 0, 0])).collect();
+    let head = [b"LOGG".as_slice(), &144_u32.to_le_bytes(), &[0; 136]].concat();
+    let asc: String =
+        (0..500).map(|i| format!("{:.6} 1 100 Rx d 8 40 0C 00 00 00 00 00 00\n", -1.0 + 0.01 * f64::from(i))).collect();
+    let candump: String =
+        (0..500).map(|i| format!("({:.6}) can0 100#400C000000000000\n", -1.0 + 0.01 * f64::from(i))).collect();
+    for (name, bytes) in [
+        ("blf", [head, frames].concat()),
+        ("asc", format!("date Sun Mar 31 12:00:00 2024\nbase hex  timestamps absolute\n{asc}").into_bytes()),
+        ("candump", candump.into_bytes()),
+    ] {
+        let (log, samples, notes) = read(&folder.write("bus.log", bytes), &with_dbc()).unwrap();
+        let found = channel(&log, &samples, "N_Eng");
+        assert_eq!((found.len(), notes), (500, vec![]), "{name}");
+        for (i, (time_s, _, quality)) in (0_u32..).zip(found) {
+            assert!(
+                (time_s + 1.0 - 0.01 * f64::from(i)).abs() < 1e-9 && quality == Quality::Good,
+                "{name} {time_s} {quality:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_text_in_any_encoding_is_the_same_bus_log() {
+    type Encode<'e> = &'e dyn Fn(&str) -> Vec<u8>;
+    let folder = Folder::new("encodings");
+    let wide = |text: &str, mark: bool, order: fn(u16) -> [u8; 2]| {
+        let mark = mark.then_some(0xfeff);
+        mark.into_iter().chain(text.encode_utf16()).flat_map(order).collect::<Vec<u8>>()
+    };
+    let dbc = std::fs::read_to_string(data("bus.dbc")).unwrap();
+    let candump: String = (0..4).map(|i| format!("({i}.0) can0 100#400C000000000000\n")).collect();
+    let asc = "date Sun Mar 31 12:00:00 2024\nbase hex  timestamps absolute\n".to_owned()
+        + &(0..4).map(|i| format!("{i}.0 1 100 Rx d 8 40 0C 00 00 00 00 00 00\n")).collect::<String>();
+    let encodings: [Encode<'_>; 5] = [
+        &|text| [&[0xef, 0xbb, 0xbf], text.as_bytes()].concat(),
+        &|text| wide(text, true, u16::to_le_bytes),
+        &|text| wide(text, true, u16::to_be_bytes),
+        &|text| wide(text, false, u16::to_le_bytes),
+        &|text| wide(text, false, u16::to_be_bytes),
+    ];
+    for (i, encoded) in encodings.iter().enumerate() {
+        for text in [&candump, &asc] {
+            let options = OpenOptions { dbc: Some(folder.write("own.dbc", encoded(&dbc))), time: None };
+            let (log, samples, notes) =
+                read(&folder.write("bus.log", encoded(text)), &options).unwrap_or_else(|error| panic!("{i} {error}"));
+            assert_eq!((channel(&log, &samples, "N_Eng").len(), notes), (4, vec![]), "{i}");
+        }
+        let map = folder.write("map.toml", encoded("[channel.engine_speed]\r\nname = \"Größe\"\r\n"));
+        let map = logs::ChannelMap::read(&map).unwrap_or_else(|error| panic!("{i} {error}"));
+        assert_eq!(map.channels[0].names, ["Größe"]);
     }
 }

@@ -176,8 +176,28 @@ fn what_holds_nothing_is_named() {
     let message =
         |name: &str, bytes: &[u8]| read(&folder.write(name, bytes), &OpenOptions::default()).err().unwrap().to_string();
     assert!(message("zeros", &[0; 4096]).contains("this is no format that is known"));
-    assert!(message("empty", &[]).ends_with("the file is empty"));
+    for mark in [&[][..], &[0xef, 0xbb, 0xbf], &[0xff, 0xfe]] {
+        assert!(message("empty", mark).ends_with("the file is empty"), "{mark:?}");
+    }
     assert!(message("names", b"time_s,a\n").ends_with("there are no rows"));
+    for (bytes, said) in [
+        (&b"\x1f\x8b\x08\0"[..], "the file is packed with gzip\nhint: unpack it"),
+        (
+            b"PK\x03\x04\x14\0",
+            "this is a ZIP archive, or a workbook of a spreadsheet\nhint: unpack it; save a workbook as CSV",
+        ),
+        (b"\xfd7zXZ\0\0\x04", "the file is packed with xz\nhint: "),
+        (b"MATLAB 5.0 MAT-file, Platform", "this is a MAT-file\nhint: save its channels"),
+        (b"\x89HDF\r\n\x1a\n", "this is HDF5, or a MAT-file of version 7.3\nhint: "),
+        (b"MDF     3.30    ", "this is MDF of version 2 or 3\nhint: convert it"),
+        (b"  vcan0  122   [2]  40 1F\n  vcan0  122   [2]  44 1F\n", "without time stamps\nhint: log with `candump -L`"),
+    ] {
+        let error = message("packed", bytes);
+        assert!(error.contains(said), "{error}");
+        // A log without a map is refused for the same reason.
+        let native = logs::needs_map(&folder.write("packed", bytes)).unwrap_err().to_string();
+        assert_eq!(native, error);
+    }
     let no_rows = std::fs::read(data("no_rows.parquet")).unwrap();
     assert!(message("no_rows", &no_rows).ends_with("there are no rows"));
     let brotli = message("brotli", &std::fs::read(data("brotli.parquet")).unwrap());

@@ -51,6 +51,26 @@ fn blocks_of_every_compression_give_the_same_samples() {
     }
 }
 
+#[test]
+fn frames_of_a_bus_without_a_dbc_and_a_dbc_without_frames_are_reported() {
+    let dbc = OpenOptions { dbc: Some(data("bus.dbc")), time: None };
+    let (log, _, notes) = read(&data("bus.mf4"), &OpenOptions::default()).unwrap();
+    let said = "there are frames of a CAN bus, whose signals are not read\nhint: a DBC defines the signals in them: give it with --dbc";
+    assert!(notes.iter().any(|note| note == said), "{notes:?}");
+    let error = log.find("N_Eng", None).unwrap_err().to_string();
+    assert!(
+        error.ends_with("hint: the signals of its CAN frames are known only with a DBC: give it with --dbc"),
+        "{error}"
+    );
+    let without_effect = "the DBC has no effect: there are no frames of a CAN bus in this log";
+    let has_effect = |file: &str| !read(&data(file), &dbc).unwrap().2.iter().any(|note| note == without_effect);
+    assert!(has_effect("bus.mf4") && has_effect("bus.log"));
+    assert!(!has_effect("plain_410.mf4") && !has_effect("zstd.parquet"));
+    let folder = Folder::new("dbc-for-a-table");
+    let (_, _, notes) = read(&folder.write("log.csv", "time_s,N [rpm]\n0,1\n1,2\n"), &dbc).unwrap();
+    assert_eq!(notes, [without_effect]);
+}
+
 /// How a block is stored.
 #[derive(Debug, Clone, Copy)]
 enum Packing {

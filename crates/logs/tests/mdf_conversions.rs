@@ -8,7 +8,7 @@ use common::mdf::{HEAD, append, block, places, set};
 use common::{Folder, channel, read};
 use falcon_mdf::write::WriteCodec;
 use falcon_mdf::{Mf4Writer, SignalValues};
-use logs::{OpenOptions, Quality};
+use logs::{OpenOptions, Quality, TimeColumn};
 
 const LINEAR: u8 = 1;
 const FORMULA: u8 = 3;
@@ -116,5 +116,72 @@ fn a_conversion_that_cannot_be_read_leaves_out_its_channel_alone() {
         let (log, _, notes) = read(&folder.write("time.mf4", &bytes), &OpenOptions::default()).unwrap();
         assert!(log.channels().is_empty());
         assert!(notes[0].contains("its time has a conversion that cannot be read"), "{notes:?}");
+    }
+}
+
+#[test]
+fn the_unit_of_a_time_counts_wherever_the_file_says_it() {
+    const UNIT_LINK: usize = 6;
+    let folder = Folder::new("time-units");
+    let numbers: Vec<u16> = (0..20).collect();
+    let last_s = |bytes: &[u8], time: Option<(&str, &str)>| {
+        let time = time.map(|(name, unit)| TimeColumn { name: name.to_owned(), unit: Some(unit.to_owned()) });
+        let options = OpenOptions { dbc: None, time };
+        let (log, samples, notes) =
+            read(&folder.write("log.mf4", bytes), &options).map_err(|error| error.to_string())?;
+        Ok::<_, String>((channel(&log, &samples, "N").last().unwrap().0, notes))
+    };
+    // Blocks that the crate decodes, and such that the library does.
+    for codec in [None, Some(WriteCodec::TransposedDeflate), Some(WriteCodec::Zstd)] {
+        let plain = file(codec, &numbers, &["N"]);
+        let time = places(&plain, b"##CN\0\0\0\0")[0];
+        let with_unit = |unit: &str| {
+            let mut bytes = plain.clone();
+            let unit = if unit.is_empty() { 0 } else { text(&mut bytes, unit) };
+            set(&mut bytes, time + HEAD + 8 * UNIT_LINK, unit);
+            bytes
+        };
+        for (unit, size_s) in [
+            ("s", 1.0),
+            ("", 1.0),
+            ("ms", 1e-3),
+            ("us", 1e-6),
+            ("µs", 1e-6),
+            ("ns", 1e-9),
+            ("min", 60.0),
+            ("h", 3600.0),
+            (" ms ", 1e-3),
+        ] {
+            let (found_s, notes) = last_s(&with_unit(unit), None).unwrap();
+            assert!((found_s - 19.0 * size_s).abs() < 1e-12 * size_s, "{unit} {found_s}");
+            assert_eq!(notes, Vec::<String>::new(), "{unit}");
+        }
+        let (found_s, notes) = last_s(&with_unit("fortnight"), None).unwrap();
+        assert_eq!((found_s, notes.len()), (19.0, 1));
+        assert!(notes[0].ends_with("has the unit `fortnight`, which is not known: taken as s"), "{notes:?}");
+        // That of its conversion, where the channel has none.
+        let mut bytes = with_unit("");
+        let scale = conversion(&mut bytes, LINEAR, &[0.0, 2.0], &[]);
+        let unit = text(&mut bytes, "ms");
+        set(&mut bytes, scale + HEAD + 8, unit);
+        convert(&mut bytes, 0, scale);
+        assert!((last_s(&bytes, None).unwrap().0 - 0.038).abs() < 1e-12);
+        // That of a channel map, for the times with its name.
+        let name = {
+            let bytes = folder.write("log.mf4", with_unit("s"));
+            falcon_mdf::Mf4File::open(&bytes).unwrap().data_groups()[0].channel_groups[0].channels[0].name.clone()
+        };
+        assert!((last_s(&with_unit("s"), Some((&name, "ms"))).unwrap().0 - 0.019).abs() < 1e-12);
+        let error = last_s(&with_unit("s"), Some((&name, "rpm"))).unwrap_err();
+        assert!(
+            error.contains("has the unit `rpm` in the channel map\nhint: it can be s, ms, us, ns, min or h"),
+            "{error}"
+        );
+        let (found_s, notes) = last_s(&with_unit("s"), Some(("other", "ms"))).unwrap();
+        assert_eq!(found_s, 19.0);
+        assert_eq!(
+            notes,
+            [format!("[time] of the channel map names `other` and has no effect: the times of this log are `{name}`")]
+        );
     }
 }

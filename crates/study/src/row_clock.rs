@@ -65,11 +65,12 @@ impl RowClock {
         ];
         let notes: Vec<String> = notes.into_iter().flatten().collect();
         if 2 * unused > self.rows {
-            return Err(rows.refused(format!(
-                "{}\nhint: the time has too few digits, or is not in `{}`",
-                notes.join(", "),
-                signal::TIME
-            )));
+            let hint = if self.backward > self.repeated {
+                "the rows are not in order of time: sort them by it".to_owned()
+            } else {
+                format!("the time has too few digits, or is not in `{}`", signal::TIME)
+            };
+            return Err(rows.refused(format!("{}\nhint: {hint}", notes.join(", "))));
         }
         Ok(notes.into_iter().chain(self.clock.notes()).chain(rows.cut().map(str::to_owned)).collect())
     }

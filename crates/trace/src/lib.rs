@@ -21,6 +21,7 @@ pub mod signal;
 #[cfg(test)]
 mod slow;
 pub mod table;
+pub mod text;
 pub mod text_file;
 pub mod units;
 

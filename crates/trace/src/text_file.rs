@@ -7,6 +7,8 @@ use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
+use crate::text::unicode_of;
+
 /// Largest text in TOML or JSON, bytes \[chosen\]: a hundred times the longest file that a person writes.
 pub const LARGEST_TEXT: u64 = 4 << 20;
 /// Largest text of one entry in each line, such as a speed cycle or a DBC, bytes \[chosen\].
@@ -15,7 +17,7 @@ pub const LARGEST_LIST: u64 = 32 << 20;
 /// Reads a text file of at most [`LARGEST_TEXT`].
 ///
 /// # Errors
-/// See [`read_small`]; the file is not UTF-8 (`InvalidData`).
+/// See [`read_small`]; the file is neither UTF-8 nor UTF-16 (`InvalidData`).
 pub fn read_text(path: &Path) -> io::Result<String> {
     read_text_of(path, LARGEST_TEXT)
 }
@@ -23,10 +25,10 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 /// Reads a text file of at most this size.
 ///
 /// # Errors
-/// See [`read_small`]; the file is not UTF-8 (`InvalidData`).
+/// See [`read_small`]; the file is neither UTF-8 nor UTF-16 (`InvalidData`).
 pub fn read_text_of(path: &Path, largest_bytes: u64) -> io::Result<String> {
     let bytes = read_small(path, largest_bytes)?;
-    String::from_utf8(bytes).map_err(|_| io::Error::new(ErrorKind::InvalidData, "the file is not UTF-8 text"))
+    unicode_of(&bytes).ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "the file is not text in UTF-8 or UTF-16"))
 }
 
 /// Reads a regular file of at most this size.

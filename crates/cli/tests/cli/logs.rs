@@ -43,6 +43,14 @@ fn a_log_that_is_wrong_is_refused_by_line_and_nothing_is_written() {
             format!("{NAMES}\n0,{row}\n0,{row}\n0,{row}\n"),
             ": 2 of 3 rows have the time of the row before and are not used\nhint: the time has too few digits",
         ),
+        (
+            format!("{NAMES}\n3,{row}\n2,{row}\n1,{row}\n"),
+            ": 2 of 3 rows have a time before that of the row before and are not used\nhint: the rows are not in order of time: sort them",
+        ),
+        (
+            "1.5,".repeat(9 << 20),
+            ": line 1: the row that begins here is longer than 32 MiB\nhint: the file has no line breaks",
+        ),
         (format!("{NAMES}\n0,{row}\ninf,{row}\n"), ":3: the time is inf"),
         (format!("{NAMES}\n0,{row}\n1,{row},\n"), ":3: the row has 6 cells, but the first line names 5 columns"),
         (

@@ -173,9 +173,10 @@ impl Blf {
     fn frame(&self, start: usize, object: &Object) -> Option<Frame> {
         let bytes = self.inner.get(start..start + object.size)?;
         let body = bytes.get(object.header..)?;
-        // Head of version 1 or 2: flags, then the time in units of 10 us or 1 ns.
+        // Head of version 1 or 2: flags, then the time in units of 10 us or 1 ns. It counts from the start of the recording: frames of before,
+        // which a trigger keeps, have negative times.
         let (per_s, stamp) =
-            (if u32_at(bytes, BASE) == 1 { 1e5 } else { 1e9 }, u64::from_le_bytes(bytes_at(bytes, 24)));
+            (if u32_at(bytes, BASE) == 1 { 1e5 } else { 1e9 }, i64::from_le_bytes(bytes_at(bytes, 24)));
         #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
         let time_s = stamp as f64 / per_s;
         let (id, payload, remote) = match object.kind {

@@ -1,24 +1,32 @@
 //! Messages and signals of a bus, from a DBC.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use can_dbc::{
-    ByteOrder, Dbc, DbcError, ExtendedMultiplex, MessageId, MultiplexIndicator, SignalExtendedValueType, ValueType,
+    ByteOrder, Dbc, DbcError, ExtendedMultiplex, MessageId, MultiplexIndicator, NumericValue, SignalExtendedValueType,
+    ValDescription, ValueDescription, ValueType,
 };
 use trace::text_file::LARGEST_LIST;
 
 use super::Frame;
+use super::names::Named;
 use crate::error::shown;
 use crate::samples::{Quality, Sample};
-use crate::{Channel, LogError};
+use crate::{Channel, LogError, error};
 
 /// The messages of a bus and the signals in them.
 #[derive(Debug, Clone)]
 pub struct Database {
-    messages: HashMap<(bool, u32), Vec<Signal>>,
+    /// The signals of the messages with one identifier, of which a sound DBC has one.
+    messages: HashMap<Key, Vec<Vec<Signal>>>,
     channels: Vec<Channel>,
+    /// Names of messages whose identifier an earlier one has, behind the name of that one.
+    same_identifier: BTreeMap<Key, Vec<String>>,
 }
+
+/// An identifier, and whether it is an extended one.
+type Key = (bool, u32);
 
 #[derive(Debug, Clone)]
 struct Signal {
@@ -27,6 +35,10 @@ struct Signal {
     number: Number,
     factor: f64,
     offset: f64,
+    /// Raw values that the DBC names as none, in their order.
+    missing: Vec<u64>,
+    /// Whether a value with every bit set is none.
+    can_saturate: bool,
     /// In force only while a multiplexor has one of these values.
     multiplexed: Option<Multiplexed>,
 }
@@ -46,11 +58,28 @@ struct Bits {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Number {
+pub(super) enum Number {
     Unsigned,
     Signed,
     Float,
     Double,
+}
+
+impl Number {
+    /// The number in so many bits.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "a double keeps 53 bits; a float has 32"
+    )]
+    pub(super) fn of(self, raw: u64, size: usize) -> f64 {
+        match self {
+            Self::Unsigned => raw as f64,
+            Self::Signed => ((raw << (64 - size)).cast_signed() >> (64 - size)) as f64,
+            Self::Float => f64::from(f32::from_bits(raw as u32)),
+            Self::Double => f64::from_bits(raw),
+        }
+    }
 }
 
 impl Bits {
@@ -78,21 +107,20 @@ impl Bits {
 }
 
 impl Database {
-    /// Reads a DBC. Text that is not UTF-8 is read as Latin-1.
+    /// Reads a DBC. Text that is neither UTF-8 nor UTF-16 is read as Latin-1.
     ///
     /// # Errors
     /// The file cannot be read, is no DBC, or has a signal of an impossible size.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let bytes = trace::read_small(path, LARGEST_LIST).map_err(LogError::io(path))?;
-        let text = String::from_utf8(bytes)
-            .unwrap_or_else(|error| error.as_bytes().iter().map(|&byte| char::from(byte)).collect());
-        Self::parse(path, &text)
+        Self::parse(path, &trace::text::text_of(&bytes))
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, LogError> {
         let dbc = Dbc::try_from(text).map_err(|error| no_dbc(path, &error))?;
         let entries = Entries::of(&dbc);
-        let mut database = Self { messages: HashMap::new(), channels: Vec::new() };
+        let mut database = Self { messages: HashMap::new(), channels: Vec::new(), same_identifier: BTreeMap::new() };
+        let mut first_names: HashMap<Key, &str> = HashMap::new();
         for message in &dbc.messages {
             let key = match message.id {
                 MessageId::Standard(id) => (false, u32::from(id)),
@@ -101,48 +129,22 @@ impl Database {
             let multiplexors = Multiplexors::of(&entries, message);
             let mut signals = Vec::with_capacity(message.signals.len());
             for signal in &message.signals {
-                let whole = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
-                let (start, size) = (whole(signal.start_bit), whole(signal.size));
-                if size == 0 || size > 64 || start >= 8 * super::PAYLOAD {
-                    return Err(LogError::file(
-                        path,
-                        format!(
-                            "signal `{}` of message `{}` has {size} bits from bit {start}, expected 1 to 64 within 64 bytes",
-                            signal.name, message.name
-                        ),
-                    ));
-                }
-                let float = entries.floats.get(&(message.id, signal.name.as_str())).copied();
-                let number = match (float, signal.value_type, size) {
-                    (Some(SignalExtendedValueType::IEEEfloat32Bit), _, 32) => Number::Float,
-                    (Some(SignalExtendedValueType::IEEEdouble64bit), _, 64) => Number::Double,
-                    (Some(SignalExtendedValueType::IEEEfloat32Bit | SignalExtendedValueType::IEEEdouble64bit), ..) => {
-                        return Err(LogError::file(
-                            path,
-                            format!(
-                                "signal `{}` of message `{}` is a float of {size} bits, expected 32 or 64",
-                                signal.name, message.name
-                            ),
-                        ));
-                    }
-                    (_, ValueType::Signed, _) => Number::Signed,
-                    (_, ValueType::Unsigned, _) => Number::Unsigned,
-                };
-                signals.push(Signal {
-                    channel: database.channels.len(),
-                    bits: Bits { start, size, big_endian: signal.byte_order == ByteOrder::BigEndian },
-                    number,
-                    factor: signal.factor,
-                    offset: signal.offset,
-                    multiplexed: multiplexors.multiplexed(signal),
-                });
+                let channel = database.channels.len();
+                let read = Signal::of(&multiplexors, message, signal, channel);
+                signals.push(read.map_err(|what| LogError::file(path, what))?);
                 database.channels.push(Channel {
                     name: signal.name.clone(),
                     unit: signal.unit.clone(),
                     group: message.name.clone(),
                 });
             }
-            database.messages.insert(key, signals);
+            let first = *first_names.entry(key).or_insert(&message.name);
+            let same = database.messages.entry(key).or_default();
+            if !same.is_empty() {
+                let names = database.same_identifier.entry(key).or_insert_with(|| vec![first.to_owned()]);
+                names.push(message.name.clone());
+            }
+            same.push(signals);
         }
         Ok(database)
     }
@@ -152,45 +154,104 @@ impl Database {
         &self.channels
     }
 
+    /// The messages that have one identifier, in sentences.
+    pub(super) fn notes(&self) -> impl Iterator<Item = String> {
+        self.same_identifier.iter().map(|(key, names)| {
+            let names: Vec<String> = names.iter().map(|name| format!("`{}`", error::shown(name))).collect();
+            format!(
+                "the messages {} have the same identifier {} in the DBC: each of its frames is read as all of them\n\
+                 hint: delete those that are not on this bus",
+                error::some(&names),
+                super::shown(*key)
+            )
+        })
+    }
+
     /// Appends the wanted signals of a frame; false if its message is not known.
     pub(crate) fn decode(&self, frame: &Frame, wanted: &[bool], batch: &mut Vec<Sample>) -> bool {
-        let Some(signals) = self.messages.get(&(frame.extended, frame.id)) else { return false };
-        for signal in signals.iter().filter(|signal| wanted.get(signal.channel) == Some(&true)) {
-            if !in_force(signals, signal, frame.data(), 0) {
-                continue;
+        let Some(messages) = self.messages.get(&(frame.extended, frame.id)) else { return false };
+        for signals in messages {
+            for signal in signals.iter().filter(|signal| wanted.get(signal.channel) == Some(&true)) {
+                if !in_force(signals, signal, frame.data(), 0) {
+                    continue;
+                }
+                let (value, quality) = match signal.bits.of(frame.data()) {
+                    None => (f64::NAN, Quality::Missing),
+                    Some(raw) => signal.value(raw),
+                };
+                batch.push(Sample { channel: signal.channel, time_s: frame.time_s, value, quality });
             }
-            let (value, quality) = match signal.bits.of(frame.data()) {
-                None => (f64::NAN, Quality::Missing),
-                Some(raw) => signal.value(raw),
-            };
-            batch.push(Sample { channel: signal.channel, time_s: frame.time_s, value, quality });
         }
         true
     }
 }
 
 impl Signal {
-    fn value(&self, raw: u64) -> (f64, Quality) {
-        let size = self.bits.size;
-        #[expect(
-            clippy::cast_precision_loss,
-            clippy::cast_possible_wrap,
-            clippy::cast_possible_truncation,
-            reason = "bit patterns; a double keeps 53 bits"
-        )]
-        let number = match self.number {
-            Number::Unsigned => raw as f64,
-            Number::Signed => ((raw << (64 - size)) as i64 >> (64 - size)) as f64,
-            Number::Float => f64::from(f32::from_bits(raw as u32)),
-            Number::Double => f64::from_bits(raw),
+    /// That of a DBC, whose values are those of this channel; the error is what is wrong with it.
+    fn of(
+        multiplexors: &Multiplexors<'_>,
+        message: &can_dbc::Message,
+        signal: &can_dbc::Signal,
+        channel: usize,
+    ) -> Result<Self, String> {
+        let whole = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
+        let (start, size) = (whole(signal.start_bit), whole(signal.size));
+        if size == 0 || size > 64 || start >= 8 * super::PAYLOAD {
+            return Err(format!(
+                "signal `{}` of message `{}` has {size} bits from bit {start}, expected 1 to 64 within 64 bytes",
+                signal.name, message.name
+            ));
+        }
+        let (entries, place) = (multiplexors.entries, (message.id, signal.name.as_str()));
+        let number = match (entries.floats.get(&place), signal.value_type, size) {
+            (Some(SignalExtendedValueType::IEEEfloat32Bit), _, 32) => Number::Float,
+            (Some(SignalExtendedValueType::IEEEdouble64bit), _, 64) => Number::Double,
+            (Some(SignalExtendedValueType::IEEEfloat32Bit | SignalExtendedValueType::IEEEdouble64bit), ..) => {
+                return Err(format!(
+                    "signal `{}` of message `{}` is a float of {size} bits, expected 32 or 64",
+                    signal.name, message.name
+                ));
+            }
+            (_, ValueType::Signed, _) => Number::Signed,
+            (_, ValueType::Unsigned, _) => Number::Unsigned,
         };
-        let value = number * self.factor + self.offset;
+        let (factor, offset) = (signal.factor, signal.offset);
+        let range = [bound(signal.min), bound(signal.max)];
+        let named = Named { size, number, factor, offset, unit: &signal.unit, range };
+        let names = entries.names.get(&place).copied().unwrap_or_default();
+        Ok(Self {
+            channel,
+            bits: Bits { start, size, big_endian: signal.byte_order == ByteOrder::BigEndian },
+            number,
+            factor,
+            offset,
+            missing: named.missing(names),
+            can_saturate: number == Number::Unsigned && size >= 8 && !named.ends_at_all_bits(),
+            multiplexed: multiplexors.multiplexed(signal),
+        })
+    }
+
+    fn value(&self, raw: u64) -> (f64, Quality) {
+        if self.missing.binary_search(&raw).is_ok() {
+            return (f64::NAN, Quality::Missing);
+        }
+        let value = self.number.of(raw, self.bits.size) * self.factor + self.offset;
         let quality = match () {
             () if !value.is_finite() => Quality::Missing,
-            () if self.number == Number::Unsigned && size >= 8 && self.bits.all_set(raw) => Quality::Saturated,
+            () if self.can_saturate && self.bits.all_set(raw) => Quality::Saturated,
             () => Quality::Good,
         };
         (value, quality)
+    }
+}
+
+/// A bound of the range that the DBC states.
+#[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
+fn bound(value: NumericValue) -> f64 {
+    match value {
+        NumericValue::Uint(value) => value as f64,
+        NumericValue::Int(value) => value as f64,
+        NumericValue::Double(value) => value,
     }
 }
 
@@ -213,18 +274,24 @@ fn in_force(signals: &[Signal], signal: &Signal, data: &[u8], depth: u32) -> boo
 struct Entries<'d> {
     floats: HashMap<(MessageId, &'d str), SignalExtendedValueType>,
     ranges: HashMap<(MessageId, &'d str), &'d ExtendedMultiplex>,
+    names: HashMap<(MessageId, &'d str), &'d [ValDescription]>,
 }
 
 impl<'d> Entries<'d> {
     fn of(dbc: &'d Dbc) -> Self {
-        let (mut floats, mut ranges) = (HashMap::new(), HashMap::new());
+        let (mut floats, mut ranges, mut names) = (HashMap::new(), HashMap::new(), HashMap::new());
         for entry in &dbc.signal_extended_value_type_list {
             floats.entry((entry.message_id, &*entry.signal_name)).or_insert(entry.signal_extended_value_type);
         }
         for entry in &dbc.extended_multiplex {
             ranges.entry((entry.message_id, &*entry.signal_name)).or_insert(entry);
         }
-        Self { floats, ranges }
+        for entry in &dbc.value_descriptions {
+            if let ValueDescription::Signal { message_id, name, value_descriptions } = entry {
+                names.entry((*message_id, &**name)).or_insert(&**value_descriptions);
+            }
+        }
+        Self { floats, ranges, names }
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod blf;
 mod database;
+mod names;
 mod text;
 
 use std::collections::{BTreeMap, HashMap};
@@ -178,14 +179,13 @@ impl<'a> Decoder<'a> {
 
     pub(crate) fn notes(&self) -> Vec<String> {
         const SHOWN: usize = 8;
-        let shown = |(extended, id): (bool, u32)| if extended { format!("0x{id:08X}") } else { format!("0x{id:03X}") };
         let mixed = |key| {
             format!(
                 "message {} comes on two buses, whose values are mixed\nhint: write the frames of one bus to a file of their own",
                 shown(key)
             )
         };
-        let mut notes: Vec<String> = self.on_two_buses.map(mixed).into_iter().collect();
+        let mut notes: Vec<String> = self.database.notes().chain(self.on_two_buses.map(mixed)).collect();
         if self.unknown_frames == 0 {
             return notes;
         }
@@ -202,4 +202,9 @@ impl<'a> Decoder<'a> {
         ));
         notes
     }
+}
+
+/// An identifier as messages show it, and whether it is an extended one.
+fn shown((extended, id): (bool, u32)) -> String {
+    if extended { format!("0x{id:08X}") } else { format!("0x{id:03X}") }
 }

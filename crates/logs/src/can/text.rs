@@ -114,11 +114,15 @@ impl Lines {
                 // Direction and flags (-x) stand before the identifier.
                 let length = loop {
                     match words.next()? {
-                        length if length.starts_with('[') => break length,
+                        length if length.starts_with(['[', '{']) => break length,
                         word => id = word,
                     }
                 };
-                let length: usize = length.strip_prefix('[')?.strip_suffix(']')?.parse().ok()?;
+                // A code of the length above eight (-8) stands in other brackets.
+                let length: usize = match length.strip_prefix('{') {
+                    Some(code) => classic_length(code.strip_suffix('}')?)?,
+                    None => length.strip_prefix('[')?.strip_suffix(']')?.parse().ok()?,
+                };
                 // Behind the data may stand its letters (-a).
                 (id, words.take(length).collect())
             }
@@ -194,7 +198,7 @@ impl Lines {
     /// `CHANNEL ID Rx d LENGTH DATA...`
     fn asc_classic(&self, words: &[&str]) -> Option<Frame> {
         let (id, extended) = self.asc_id(words.get(1)?)?;
-        let length = usize::from_str_radix(words.get(4)?, 16).ok().filter(|length| *length <= 8)?;
+        let length = classic_length(words.get(4)?)?;
         let frame = self.asc_data(id, extended, words.get(5..5 + length)?)?;
         Some(frame.on(words.first()?.parse().ok()?))
     }
@@ -224,6 +228,11 @@ impl Lines {
         }
         Some(Frame::new(self.time_s, id, extended, data.get(..words.len())?))
     }
+}
+
+/// Bytes of a classic frame by its length code, a digit of base 16: codes above eight are eight bytes too.
+fn classic_length(code: &str) -> Option<usize> {
+    usize::from_str_radix(code, 16).ok().filter(|code| *code <= 0xf).map(|code| code.min(8))
 }
 
 impl Frames for Lines {

@@ -10,6 +10,8 @@ use crate::columns::{Batch, Stream};
 /// The frames of a bus that an MDF file holds.
 pub(super) struct Bus<'a> {
     frames: CanFrames,
+    /// The size of the unit of its times, s.
+    unit_s: f64,
     at: usize,
     decoder: Decoder<'a>,
     /// Channels before those of the database.
@@ -17,8 +19,8 @@ pub(super) struct Bus<'a> {
 }
 
 impl<'a> Bus<'a> {
-    pub(super) fn new(frames: CanFrames, decoder: Decoder<'a>, own: usize) -> Self {
-        Self { frames, at: 0, decoder, own }
+    pub(super) fn new(frames: CanFrames, unit_s: f64, decoder: Decoder<'a>, own: usize) -> Self {
+        Self { frames, unit_s, at: 0, decoder, own }
     }
 }
 
@@ -33,7 +35,7 @@ impl Stream for Bus<'_> {
         for i in self.at..end {
             let Some(frame) = self.frames.get(i).filter(|frame| frame.timestamp.is_finite()) else { continue };
             let extended = frame.extended.unwrap_or(frame.id > 0x7ff);
-            let own = Frame::new(frame.timestamp, frame.id, extended, frame.data);
+            let own = Frame::new(frame.timestamp * self.unit_s, frame.id, extended, frame.data);
             self.decoder.decode(&own.on(u32::from(frame.bus_channel)), batch);
         }
         self.at = end;

@@ -25,6 +25,8 @@ pub(super) struct Group<'a> {
     decoder: Decoding<'a>,
     /// The channels in the order of the decoder, by their places in the log.
     channels: Vec<usize>,
+    /// The size of the unit of the time, s.
+    unit_s: f64,
     read: u64,
     declared: u64,
     without_time: u64,
@@ -57,7 +59,16 @@ impl<'a> Part<'a> {
 impl<'a> Group<'a> {
     pub(super) fn new(log: &'a MdfLog, time: GroupAt, decoder: Decoding<'a>, channels: Vec<usize>) -> Self {
         let declared = log.group(time).1.sample_count;
-        Self { path: &log.path, place: log.place_of(time), decoder, channels, read: 0, declared, without_time: 0 }
+        Self {
+            path: &log.path,
+            place: log.place_of(time),
+            decoder,
+            channels,
+            unit_s: log.time_units.size_s(time),
+            read: 0,
+            declared,
+            without_time: 0,
+        }
     }
 }
 
@@ -187,6 +198,9 @@ impl Stream for Group<'_> {
             }
             Ok(false) => Ok(false),
             Ok(true) => {
+                if self.unit_s != 1.0 {
+                    block.times_s[first..].iter_mut().for_each(|time_s| *time_s *= self.unit_s);
+                }
                 self.read += (block.times_s.len() - first) as u64;
                 self.without_time += block.leave_out_without_time(first);
                 Ok(true)

@@ -11,6 +11,7 @@ mod field;
 mod group;
 mod records;
 mod times;
+mod units;
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
@@ -22,7 +23,7 @@ use falcon_mdf::{Channel as MdfChannel, ChannelGroup, DataGroup, Mf4Error, Mf4Fi
 use crate::ahead::Crew;
 use crate::can::{Database, Decoder};
 use crate::columns::{Batch, Stream};
-use crate::{Channel, LogError, error};
+use crate::{Channel, LogError, TimeColumn, error};
 use blocks::Blocks;
 use bus::Bus;
 use conversion::unreadable;
@@ -30,6 +31,7 @@ use field::{Field, Tile};
 use group::{Decoding, Group, Part};
 use records::Records;
 use times::{Times, time_channel};
+use units::{TimeUnits, unit_of};
 
 /// Records that are given at once: their columns stay in the second cache.
 const BATCH: usize = 8192;
@@ -54,6 +56,8 @@ pub(crate) struct MdfLog {
     places: Vec<Place>,
     /// Signals on a logged bus, behind the channels of the file.
     database: Option<Database>,
+    /// The units of the times.
+    time_units: TimeUnits,
     notes: Vec<String>,
     /// The first place of a file that is cut, and what it lacks.
     cut: Option<(String, String)>,
@@ -68,7 +72,12 @@ struct Place {
 }
 
 impl MdfLog {
-    pub(crate) fn open(path: &Path, database: Option<Database>) -> Result<(Self, Vec<Channel>), LogError> {
+    /// Opens a file. A unit in `time` replaces that of the times with this name.
+    pub(crate) fn open(
+        path: &Path,
+        database: Option<Database>,
+        time: Option<&TimeColumn>,
+    ) -> Result<(Self, Vec<Channel>), LogError> {
         let options = OpenOptions {
             build_channels_db: false,
             parallel_parsing: false,
@@ -88,16 +97,39 @@ impl MdfLog {
         let blocks = Arc::new(Blocks::new(File::open(path).map_err(LogError::io(path))?));
         let mut names = HashMap::new();
         groups(&file).for_each(|(_, group)| *names.entry(group.acquisition_name.clone()).or_default() += 1);
-        let (path, places, notes) = (path.to_owned(), Vec::new(), Vec::new());
-        let mut log = Self { path, file, blocks, crew: Crew::of(1), names, places, database, notes, cut };
+        let masters = groups(&file).filter_map(|(at, group)| Some((at, time_channel(group)?)));
+        let (time_units, notes) = TimeUnits::of(path, &file, masters, time)?;
+        let (path, places) = (path.to_owned(), Vec::new());
+        let mut log = Self { path, file, blocks, crew: Crew::of(1), names, places, database, time_units, notes, cut };
         let mut channels = log.find_channels();
         if log.file.unfinalized().is_some() {
             log.notes.push("the file was not finished by its recorder: what stands in it is read".to_owned());
         }
-        if let Some(database) = log.database.as_ref().filter(|_| !log.file.can_frame_groups().is_empty()) {
+        if log.lacks_dbc() {
+            log.notes.push(
+                "there are frames of a CAN bus, whose signals are not read\nhint: a DBC defines the signals in them: give it with --dbc"
+                    .to_owned(),
+            );
+        }
+        if let Some(database) = log.database.as_ref().filter(|_| log.has_frames()) {
             channels.extend_from_slice(database.channels());
         }
         Ok((log, channels))
+    }
+
+    /// Whether there are frames of a CAN bus in it.
+    pub(crate) fn has_frames(&self) -> bool {
+        !self.file.can_frame_groups().is_empty()
+    }
+
+    /// Whether there are frames of a CAN bus, and no DBC.
+    pub(crate) fn lacks_dbc(&self) -> bool {
+        self.database.is_none() && self.has_frames()
+    }
+
+    /// Adds a note.
+    pub(crate) fn note(&mut self, note: &str) {
+        self.notes.push(note.to_owned());
     }
 
     /// Finds the channels that hold numbers over time, and notes which do not.
@@ -131,7 +163,8 @@ impl MdfLog {
                     continue;
                 }
                 places.push(Place { group, channel, time });
-                channels.push(Channel { name: own.name.clone(), unit: own.unit.clone(), group: name.clone() });
+                let unit = unit_of(&self.file, own);
+                channels.push(Channel { name: own.name.clone(), unit, group: name.clone() });
             }
         }
         self.notes.extend(left_out.notes());
@@ -169,7 +202,9 @@ impl MdfLog {
                     .file
                     .can_frames(group)
                     .map_err(|error| damaged(&self.path, "the frames of its bus", &error))?;
-                streams.push(Box::new(Bus::new(frames, Decoder::new(database, &wanted[own..]), own)));
+                let at = (group.data_group_index, group.index);
+                let decoder = Decoder::new(database, &wanted[own..]);
+                streams.push(Box::new(Bus::new(frames, self.time_units.size_s(at), decoder, own)));
             }
         }
         Ok(streams)

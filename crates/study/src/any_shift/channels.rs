@@ -298,8 +298,11 @@ fn gear_of(car: &Car, number: f64) -> Option<usize> {
     }
 }
 
-/// The map of a log whose channels have the names of the program, as it writes them itself; `None` if some are missing.
-pub fn own_map(log: &Log, car: &Car) -> Option<ChannelMap> {
+/// The map of a log whose channels have the names of the program, as it writes them itself.
+///
+/// # Errors
+/// Names of channels that every estimate needs, and that are missing or hold no numbers.
+pub fn own_map(log: &Log, car: &Car) -> Result<ChannelMap, Vec<&'static str>> {
     use trace::{Unit, signal, units};
     let named = [
         (Role::EngineSpeed, signal::ENGINE_SPEED),
@@ -342,12 +345,17 @@ pub fn own_map(log: &Log, car: &Car) -> Option<ChannelMap> {
         map.channels.extend(of(role, Some(element.to_owned()), &name));
     }
     for (at, name) in element_commands(car) {
-        let (role, element) = Role::of_element(&key_of(&name)).map(|(role, element)| (role, element.to_owned()))?;
+        let key = key_of(&name);
+        let Some((role, element)) = Role::of_element(&key).map(|(role, element)| (role, element.to_owned())) else {
+            continue;
+        };
         let command = of(role, Some(element.clone()), &name);
         let pressure = || {
             of(Role::ElementPressureCommand, Some(element), &pressure_command_column(&car.gearbox.elements[at].name))
         };
         map.channels.extend(command.or_else(pressure));
     }
-    [Role::TurbineSpeed, Role::Gear].into_iter().all(|role| map.has(role)).then_some(map)
+    let needed = [(Role::TurbineSpeed, signal::TURBINE_SPEED), (Role::Gear, signal::GEAR)];
+    let missing: Vec<&str> = needed.into_iter().filter(|(role, _)| !map.has(*role)).map(|(_, name)| name).collect();
+    if missing.is_empty() { Ok(map) } else { Err(missing) }
 }

@@ -7,11 +7,12 @@ use std::io::{self, ErrorKind, Read};
 
 use csv_core::ReadRecordResult;
 
+use crate::text::BYTE_ORDER_MARK;
+
 /// Longest record that is read, bytes: a million columns fit in. A text without an end of line does not fill the memory.
 pub const LONGEST_ROW: usize = 32 << 20;
 /// Bytes that are read at once.
 pub(super) const READ_AT_ONCE: usize = 64 << 10;
-const BYTE_ORDER_MARK: &[u8] = &[0xef, 0xbb, 0xbf];
 
 /// Why there is no next record.
 #[derive(Debug)]

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use super::decimal;
 use super::records::{LONGEST_ROW, RecordError, Records};
 use crate::error::TIME_BY_MAP;
-use crate::{TraceError, signal, units};
+use crate::{TraceError, signal, text, units};
 
 /// A comma-separated file that is read row by row. The first row names the columns; `time_s` (or `time_ms`) must be among
 /// them and rise. An empty cell, or `nan`, is a reading that did not come, and becomes NaN. A column without a name is passed over.
@@ -46,6 +46,7 @@ impl CsvRows {
     }
 
     fn of(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
+        let input = text::as_utf8(input).map_err(|source| TraceError::Io { path: path.to_owned(), source })?;
         let records = Records::new(input, b',');
         let (path, columns) = (path.to_owned(), Vec::new());
         let mut rows = Self { path, records, columns, time_at: 0, time_s: None, may_be_cut: false, cut: None };
@@ -243,8 +244,8 @@ impl CsvRows {
                 path: self.path.clone(),
                 line: self.records.line(),
                 message: format!(
-                    "the row that begins here is longer than {} MiB\nhint: the file is not comma-separated, or a quotation \
-                     mark is not closed",
+                    "the row that begins here is longer than {} MiB\nhint: the file has no line breaks, or a quotation mark is not \
+                     closed",
                     LONGEST_ROW >> 20
                 ),
             },

@@ -34,6 +34,26 @@ fn numbers_survive_a_round_trip_to_the_last_bit() {
 }
 
 #[test]
+fn a_table_in_utf_16_or_with_a_mark_is_the_same_table() {
+    let text = "time_s,a_pa\r\n0,1.5\r\n0.1,2.5\r\n";
+    let wide = |mark: Option<u16>, order: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        mark.into_iter().chain(text.encode_utf16()).flat_map(order).collect()
+    };
+    let path = file("encodings", "");
+    for bytes in [
+        text.as_bytes().to_vec(),
+        [&[0xef, 0xbb, 0xbf], text.as_bytes()].concat(),
+        wide(Some(0xfeff), u16::to_le_bytes),
+        wide(Some(0xfeff), u16::to_be_bytes),
+        wide(None, u16::to_le_bytes),
+    ] {
+        std::fs::write(&path, &bytes).unwrap();
+        assert_eq!(read_csv(&path).unwrap().get("a_pa"), Some([1.5, 2.5].as_slice()), "{:?}", &bytes[..4]);
+    }
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
 fn numbers_are_as_short_as_those_of_display_and_read_back_the_same() {
     let written = |number: f64| {
         let mut row = Vec::new();

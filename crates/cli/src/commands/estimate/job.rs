@@ -14,7 +14,7 @@ use study::shift_estimates::no_estimate;
 use trace::ShownPath as _;
 
 use super::findings::Findings;
-use super::measured::{Measured, Step, WITHOUT_SENSORS, check_span, old_commands, slow_log};
+use super::measured::{Measured, Step, WITHOUT_SENSORS, check_span, old_commands, slow_log, warn_of_dbc};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
@@ -98,6 +98,7 @@ fn open<'a>(setup: &Setup<'_>, path: &Path, opened: &'a mut Option<Log>) -> Resu
     let Setup { options, vehicle, map, .. } = setup;
     let stop = options.follow.then(|| Arc::clone(&setup.stop));
     if map.channels.is_empty() {
+        warn_of_dbc(map);
         return Measured::rows(path, vehicle, stop);
     }
     let is_followed = stop.is_some();

@@ -333,6 +333,13 @@ pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
     ))
 }
 
+/// Warns of a DBC that is given for a table with the names of the program.
+pub(super) fn warn_of_dbc(map: &ChannelMap) {
+    if map.open.dbc.is_some() {
+        output::note(&format!("warning: {}", logs::log::NO_FRAMES));
+    }
+}
+
 /// Refuses a log with so much time between its rows that it has no shifts: the time is in another unit by all appearances.
 pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<(), Failure> {
     const LONGEST_S: f64 = 1.0;

@@ -14,7 +14,7 @@ use study::any_shift::channels::{CarChannels, own_map};
 use trace::{CsvRows, Following, ShownPath as _};
 
 use super::super::Messages;
-use super::super::measured::{other_delimiter, report_readings};
+use super::super::measured::{other_delimiter, report_readings, warn_of_dbc};
 use super::checks::Columns;
 use crate::failure::Failure;
 
@@ -47,6 +47,7 @@ impl<'a> CarSource<'a> {
         let stop = stop.map(Arc::clone);
         let is_pipe = path == Path::new("-");
         if map.channels.is_empty() && (is_pipe || !logs::needs_map(path)?) {
+            warn_of_dbc(map);
             let opening = |source| LogError::Io { path: path.to_owned(), source };
             let input: Box<dyn Read> = match stop {
                 Some(stop) => Box::new(Following::open(path, stop).map_err(opening)?),
@@ -62,11 +63,13 @@ impl<'a> CarSource<'a> {
         };
         let own;
         let map = if map.channels.is_empty() {
-            own = own_map(&log, car).ok_or_else(|| {
+            own = own_map(&log, car).map_err(|missing| {
                 Failure::Input(format!(
-                    "{}: this log needs a channel map, because its channels have other names than those of `wetclutch simulate`\n\
-                     hint: `wetclutch inspect` with --suggest writes a first one, for --map",
-                    path.shown()
+                    "{}: this log needs a channel map, because its channels have other names than those of `wetclutch simulate`: none with \
+                     numbers is `{}`\n\
+                     hint: `wetclutch inspect` names the channels that hold none; with --suggest it writes a first map, for --map",
+                    path.shown(),
+                    missing.join("` or `")
                 ))
             })?;
             &own
