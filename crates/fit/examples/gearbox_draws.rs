@@ -112,7 +112,7 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let quantities = &fit.quantities;
     // The sensor's scale is none of the car, and a gain that is not measured is not fitted.
     let is_known = |quantity: Quantity| match quantity {
-        Quantity::PressureScale | Quantity::InputDelay | Quantity::EngineDelay => false,
+        Quantity::PressureScale | Quantity::PressureOffset(_) | Quantity::InputDelay | Quantity::EngineDelay => false,
         Quantity::Gain(place) => quantities.measured[place],
         // Drawn delays are constant, those of the file depend on the command.
         Quantity::Delay(_) => case != Case::WithTiming,

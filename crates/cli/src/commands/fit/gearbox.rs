@@ -110,6 +110,7 @@ fn record_one(
         recorder.push_reported(step.reported_n_m);
         recorder.push(step.time_s, &step.input);
         recorder.push_pressure(step.time_s, step.shift_pressures(tables));
+        recorder.push_element_pressures(step.time_s, &step.pressures);
         count += 1;
         if count.is_multiple_of(STEPS) {
             bar.set_message(format!("reading {}, {:.0} s", log.display(), step.time_s));
