@@ -4,6 +4,7 @@
 //! no further checks. An error names file, line, key, value and allowed range, and gives a hint for a
 //! likely mistake.
 
+mod all_errors;
 mod car_study;
 pub mod check;
 pub mod drive;
@@ -17,6 +18,7 @@ pub mod study;
 mod tree;
 pub mod vehicle;
 
+pub use all_errors::all_errors;
 pub use car_study::{CarStudy, CarStudyRuns, DrawnErrors};
 pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};
 pub use error::ConfigError;
@@ -25,7 +27,7 @@ pub use experiment::{
     ReadingErrors, SAMPLE_TIMES_S, Scenario, Sensors, ShiftCalibration, SpeedSensor,
 };
 pub use gearbox::GearboxFile;
-pub use learnt::{read_learnt, write_learnt};
+pub use learnt::{check_learnt, read_learnt, write_learnt};
 pub use source::{Kind, Source, toml_number, toml_string};
 pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};

@@ -31,6 +31,10 @@ pub enum Kind {
     Sensors,
     /// A gearbox.
     Gearbox,
+    /// What the filter for any shift has learnt of a car.
+    Learnt,
+    /// Which channels of a log are which signals.
+    ChannelMap,
 }
 
 impl Kind {
@@ -46,6 +50,8 @@ impl Kind {
             Self::Overlay => "a file with a part of a vehicle file, such as bounds",
             Self::Sensors => "a sensors file",
             Self::Gearbox => "a gearbox file",
+            Self::Learnt => "a file of what was learnt of a car",
+            Self::ChannelMap => "a channel map",
         }
     }
 
@@ -59,6 +65,8 @@ impl Kind {
             Self::Study | Self::CarStudy => "`wetclutch study` takes it",
             Self::Overlay => "`wetclutch design VEHICLE` takes it after --bounds",
             Self::Sensors => "`wetclutch estimate` takes it after --sensors",
+            Self::Learnt => "`wetclutch estimate` takes it after --learnt",
+            Self::ChannelMap => "`wetclutch estimate` and `inspect` take it after --map",
             Self::Gearbox => "a vehicle file names it as `gearbox`; `wetclutch check` describes it",
         }
     }
@@ -149,6 +157,7 @@ impl Source {
         let of_a_vehicle = |(key, value): (&String, &toml::Value)| value.is_table() && VEHICLE_TABLES.contains(&&**key);
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
+            (false, false, false) if has("mean") && has("covariance") => Ok(Kind::Learnt),
             (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
             (false, false, false) if has("runs") && has("vehicle") => Ok(Kind::CarStudy),
             (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
@@ -157,12 +166,7 @@ impl Source {
             (false, false, false) if has("gear") => Ok(Kind::Gearbox),
             (false, false, false) if has("sensors") => Ok(Kind::Sensors),
             (false, false, false) if !tables.is_empty() && tables.iter().all(of_a_vehicle) => Ok(Kind::Overlay),
-            _ if has("channel") => Err(ConfigError::Syntax {
-                path: self.path.clone(),
-                line: 1,
-                message: "this looks like a channel map\nhint: `wetclutch estimate` and `inspect` take it after --map"
-                    .to_owned(),
-            }),
+            _ if has("channel") => Ok(Kind::ChannelMap),
             _ => Err(ConfigError::Syntax {
                 path: self.path.clone(),
                 line: 1,

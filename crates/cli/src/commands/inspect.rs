@@ -12,7 +12,7 @@ use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
 use crate::commands::written::{is_page, replaces_only};
-use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, write_text};
+use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, warn_of_mapping, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -20,6 +20,7 @@ use crate::output;
 const LONGEST_NAME: usize = 40;
 
 pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
+    warn_of_mapping(&options.mapping, std::slice::from_ref(&options.log));
     let mut map = channel_map(&options.mapping)?;
     if !options.ratios.is_empty() {
         map.gearbox.ratios.clone_from(&options.ratios);

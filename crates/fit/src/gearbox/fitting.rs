@@ -278,12 +278,18 @@ impl GearboxFit {
     }
 
     /// By how much all commands of the logs are late, s, where it is so much that the fit has moved them: with the mean of the delays that it has found besides.
-    pub fn commands_late_s(&self) -> Option<f64> {
+    pub fn commands_late_s(&self) -> Option<Known> {
         let seen = (0..self.elements_seen.len()).filter(|at| self.elements_seen[*at]).map(Quantity::Delay);
-        let weights = seen.map(|delay| (DELAY_UNIT_S * self.unknown(delay), self.sd(delay).powi(-2)));
-        let (sum, weight) =
-            weights.fold((0.0, 0.0), |(sum, all), (late_s, weight)| (sum + weight * late_s, all + weight));
-        self.commands_moved_s.map(|moved_s| moved_s + sum / weight)
+        let places: Vec<usize> = seen.filter_map(|delay| self.quantities.place(delay)).collect();
+        let mut along = DVector::zeros(self.unknowns.len());
+        places.iter().for_each(|place| along[*place] = self.stated[(*place, *place)].recip());
+        let sum = along.sum();
+        along /= sum;
+        let mean: f64 = places.iter().map(|place| along[*place] * self.unknowns[*place]).sum();
+        let sd = |covariance: &DMatrix<f64>| DELAY_UNIT_S * along.dot(&(covariance * &along)).max(0.0).sqrt();
+        let moved_s = self.commands_moved_s.filter(|_| sum > 0.0)?;
+        let value = moved_s + DELAY_UNIT_S * mean;
+        Some(Known { value, sd: sd(&self.stated), before: sd(&self.quantities.before) })
     }
 
     /// By how much the engine speed is late against the turbine speed in front of a converter, s.

@@ -231,7 +231,9 @@ impl GearboxFit {
 
     /// What is said of inertias that stay those of the file.
     fn said_of_kept(&self) -> Option<String> {
-        let name = |(pair, x): &(usize, f64)| format!("{} (x {:.2})", self.quantities.pair_names[*pair], x.exp());
+        let name = |(pair, x): &(usize, f64)| {
+            format!("{} (x {:.2}, not identifiable)", self.quantities.pair_names[*pair], x.exp())
+        };
         let kept: Vec<String> = self.drawn_off.iter().map(name).collect();
         (!kept.is_empty()).then(|| {
             format!(
