@@ -96,7 +96,14 @@ impl CarStudy {
     /// # Errors
     /// A file cannot be read, or something in it is wrong.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let source = Source::read(path)?;
+        Self::from_source(Source::read(path)?)
+    }
+
+    /// Checks the text of a study file; the files that it names are in its folder.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let raw: RawCarStudy = source.parse_as(Kind::CarStudy)?;
         let beside = |name: &str| source.path.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
         let of_file = |key: &str, word: &Word| (beside(word.get_ref()), key.to_owned(), word.span().start);

@@ -71,6 +71,22 @@ impl ConfigError {
         }
     }
 
+    /// The line, counted from 1; none for a file that cannot be read.
+    pub fn line(&self) -> Option<usize> {
+        match self {
+            Self::Read { .. } => None,
+            Self::Syntax { line, .. } | Self::Range { line, .. } | Self::Meaning { line, .. } => Some(*line),
+        }
+    }
+
+    /// The same error at another line.
+    pub(crate) fn with_line(mut self, at: usize) -> Self {
+        if let Self::Syntax { line, .. } | Self::Range { line, .. } | Self::Meaning { line, .. } = &mut self {
+            *line = at;
+        }
+        self
+    }
+
     /// The error of a file that another file names at this place. If the file cannot be read, the error is at that place.
     pub(crate) fn named_by(self, by: &Source, key: &str, offset: usize) -> Self {
         match self {

@@ -49,6 +49,14 @@ pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     )
 }
 
+/// Checks a file of what was learnt, of whatever car.
+///
+/// # Errors
+/// The text is no such file.
+pub fn check_learnt(source: &Source) -> Result<(), ConfigError> {
+    source.parse::<RawLearnt>().map(drop)
+}
+
 /// What was learnt of a car with this gearbox.
 ///
 /// # Errors

@@ -6,6 +6,7 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod all_errors;
 mod car_study;
 pub mod check;
 pub mod drive;
@@ -19,6 +20,7 @@ pub mod study;
 mod tree;
 pub mod vehicle;
 
+pub use all_errors::all_errors;
 pub use car_study::{CarStudy, CarStudyRuns, SampledErrors};
 pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};
 pub use error::ConfigError;
@@ -27,7 +29,7 @@ pub use experiment::{
     ReadingErrors, SAMPLE_TIMES_S, Scenario, Sensors, ShiftCalibration, SpeedSensor,
 };
 pub use gearbox::GearboxFile;
-pub use learnt::{read_learnt, write_learnt};
+pub use learnt::{check_learnt, read_learnt, write_learnt};
 pub use source::{Kind, Source, toml_number};
 pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};

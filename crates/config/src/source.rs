@@ -36,6 +36,8 @@ pub enum Kind {
     Gearbox,
     /// What the filter for any shift has learnt of a car.
     Learnt,
+    /// Which channels of a log are which signals.
+    ChannelMap,
 }
 
 impl Kind {
@@ -52,6 +54,7 @@ impl Kind {
             Self::Sensors => "a sensors file",
             Self::Gearbox => "a gearbox file",
             Self::Learnt => "a file of what was learnt of a car",
+            Self::ChannelMap => "a channel map",
         }
     }
 
@@ -65,8 +68,9 @@ impl Kind {
             Self::Study | Self::CarStudy => "`wetclutch study` takes it",
             Self::Overlay => "`wetclutch design VEHICLE` takes it after --bounds",
             Self::Sensors => "`wetclutch estimate` takes it after --sensors",
-            Self::Gearbox => "a vehicle file names it as `gearbox`; `wetclutch check` describes it",
             Self::Learnt => "`wetclutch estimate` takes it after --learnt",
+            Self::ChannelMap => "`wetclutch estimate` and `inspect` take it after --map",
+            Self::Gearbox => "a vehicle file names it as `gearbox`; `wetclutch check` describes it",
         }
     }
 }
@@ -167,8 +171,8 @@ impl Source {
         let of_a_vehicle = |(key, value): (&String, &toml::Value)| value.is_table() && VEHICLE_TABLES.contains(&&**key);
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
+            (false, false, false) if has("mean") && has("covariance") => Ok(Kind::Learnt),
             (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
-            (false, false, false) if has("gearbox") && has("elements") && has("covariance") => Ok(Kind::Learnt),
             (false, false, false) if has("runs") && has("vehicle") => Ok(Kind::CarStudy),
             (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
             (false, true, false) => Ok(Kind::Experiment),
@@ -176,12 +180,7 @@ impl Source {
             (false, false, false) if has("gear") => Ok(Kind::Gearbox),
             (false, false, false) if has("sensors") => Ok(Kind::Sensors),
             (false, false, false) if !tables.is_empty() && tables.iter().all(of_a_vehicle) => Ok(Kind::Overlay),
-            _ if has("channel") => Err(ConfigError::Syntax {
-                path: self.path.clone(),
-                line: 1,
-                message: "this looks like a channel map\nhint: `wetclutch estimate` and `inspect` take it after --map"
-                    .to_owned(),
-            }),
+            _ if has("channel") => Ok(Kind::ChannelMap),
             _ => Err(ConfigError::Syntax {
                 path: self.path.clone(),
                 line: 1,

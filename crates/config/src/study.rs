@@ -187,7 +187,14 @@ impl Study {
     /// # Errors
     /// A file cannot be read, is no study file, or holds a value that cannot be right.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let source = Source::read(path)?;
+        Self::from_source(Source::read(path)?)
+    }
+
+    /// Checks the text of a study file; the files that it names are in its folder.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let raw: RawStudy = source.parse_as(Kind::Study)?;
         let beside = |name: &str| source.path.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
         let experiment = Experiment::read(&beside(raw.experiment.get_ref()))

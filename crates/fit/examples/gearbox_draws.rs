@@ -112,7 +112,7 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let quantities = &fit.quantities;
     // The sensor's scale is none of the car, and a gain that is not measured is not fitted.
     let is_known = |quantity: Quantity| match quantity {
-        Quantity::PressureScale | Quantity::InputDelay | Quantity::EngineDelay => false,
+        Quantity::PressureScale | Quantity::PressureOffset(_) | Quantity::InputDelay | Quantity::EngineDelay => false,
         Quantity::Gain(place) => quantities.measured[place],
         // Drawn delays are constant, those of the file depend on the command.
         Quantity::Delay(_) => case != Case::WithTiming,
@@ -153,7 +153,8 @@ fn of_channels(drawn: &Drawn, fit: &GearboxFit) -> Vec<Told> {
     let stiffness = |car: &Car| car.driveline.shaft_stiffness_n_m_rad;
     let mut all = Vec::new();
     if let Some(late_s) = fit.commands_late_s() {
-        println!("commands are {:+.0} ms late, true {:+.0} ms", 1e3 * late_s, 1e3 * channels.commands_s);
+        let [late_ms, half_ms] = [late_s.value, 2.0 * late_s.sd].map(|time_s| 1e3 * time_s);
+        println!("commands are {late_ms:+.0} +- {half_ms:.0} ms late, true {:+.0} ms", 1e3 * channels.commands_s);
     }
     match &fit.wheel {
         Ok(found) => all.extend([

@@ -61,6 +61,7 @@ pub(crate) struct Car {
     pub(crate) engine_torque_scale: f64,
     pub(crate) engine_torque_delay_s: f64,
     pub(crate) pressure_scale: f64,
+    pub(crate) pressure_offset_pa: f64,
     pub(crate) pressure_delay_s: f64,
     pub(crate) ages: ReadingAges,
     pub(crate) knots: Knots,
@@ -94,6 +95,7 @@ impl Car {
             engine_torque_scale: 1.0,
             engine_torque_delay_s: 0.0,
             pressure_scale: 1.0,
+            pressure_offset_pa: 0.0,
             pressure_delay_s: 0.0,
             ages,
             knots: Knots::of(vehicle),
@@ -156,6 +158,7 @@ impl Car {
             Parameter::EngineTorqueScale => self.engine_torque_scale = value,
             Parameter::EngineTorqueDelay => self.engine_torque_delay_s = value,
             Parameter::PressureScale => self.pressure_scale = value,
+            Parameter::PressureOffset => self.pressure_offset_pa = value,
             Parameter::PressureDelay => self.pressure_delay_s = value,
             Parameter::Hysteresis => self.hydraulics.hysteresis_pa = value,
             Parameter::Shape(map @ Map::Friction, i) => {

@@ -65,6 +65,7 @@ pub(crate) struct Filling {
     pub(crate) kiss_pa: f64,
     pub(crate) late_s: f64,
     pub(crate) sensor_scale: f64,
+    pub(crate) sensor_offset_pa: f64,
     pub(crate) sensor_late_s: f64,
 }
 
@@ -186,7 +187,8 @@ impl FillLog<'_> {
         let grid = Grid { begin_s, step_s: STEP_S, points };
         let computed = pressures(&of, filling.late_s, self.commands, grid);
         let (count, sum) = self.readings().fold((0.0, 0.0), |(count, sum), (time_s, measured)| {
-            let error = measured - filling.sensor_scale * grid.at(&computed, time_s - filling.sensor_late_s);
+            let computed_pa = grid.at(&computed, time_s - filling.sensor_late_s);
+            let error = measured - filling.sensor_offset_pa - filling.sensor_scale * computed_pa;
             (count + 1.0, sum + error.abs())
         });
         sum / count

@@ -10,7 +10,7 @@ use crate::fill::{FillFit, FillLog, Filling};
 use crate::freeing::Misfit;
 use crate::intervals::{self, Precision};
 use crate::least_squares::Iterations;
-use crate::parameters::{self, Available, DELAY_UNIT_S, Prior, Shaft};
+use crate::parameters::{self, Available, DELAY_UNIT_S, OFFSET_UNIT_PA, Prior, Shaft};
 use crate::pressure::Hydraulics;
 use crate::record::OutputClock;
 use crate::shape::Map;
@@ -243,6 +243,7 @@ fn fill_of(
         kiss_pa: car.clutch.kiss_pressure(),
         late_s: car.command_delay_s,
         sensor_scale: car.pressure_scale,
+        sensor_offset_pa: car.pressure_offset_pa,
         sensor_late_s: car.pressure_delay_s,
     };
     let known = |parameter: Parameter| sd(parameter).unwrap_or(0.0);
@@ -253,6 +254,10 @@ fn fill_of(
         Filling { hydraulics: filling.hydraulics.with_valve(0.0, gain), ..filling },
         Filling { hydraulics: filling.hydraulics.with_valve(lag, 0.0), ..filling },
         Filling { late_s: filling.late_s + late_s, ..filling },
+        Filling {
+            sensor_offset_pa: filling.sensor_offset_pa + OFFSET_UNIT_PA * known(Parameter::PressureOffset),
+            ..filling
+        },
     ];
     Some(FillFit::of(&logs, &filling, &moved, budget))
 }

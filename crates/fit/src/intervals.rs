@@ -9,10 +9,13 @@ use nalgebra::{DMatrix, DVector};
 use crate::Parameter;
 use crate::driving::WIND;
 use crate::fitting::Held;
-use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, Prior};
+use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, OFFSET_UNIT_PA, Prior};
 use crate::shape::Map;
 use crate::solver::Normal;
 use crate::weights::FACTOR;
+
+/// Least standard deviation of the zero offset of a pressure sensor, Pa \[chosen: what a valve at rest may leave in an open clutch\].
+pub(crate) const OFFSET_FLOOR_PA: f64 = 500.0;
 
 /// What is known of the parameters after a fit.
 #[derive(Debug, Clone)]
@@ -67,6 +70,7 @@ pub(crate) fn floor(parameter: Parameter) -> f64 {
         Parameter::Air => WIND,
         Parameter::WheelScale => 1e-4,
         Parameter::PressureScale => 1e-3,
+        Parameter::PressureOffset => OFFSET_FLOOR_PA / OFFSET_UNIT_PA,
         _ if parameter.is_delay() => 0.3e-3 / DELAY_UNIT_S,
         _ => 0.005,
     }

@@ -10,6 +10,10 @@ use crate::{FitError, intervals, vehicle_text};
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
 /// The hysteresis is fitted in units of this, Pa.
 pub(crate) const HYSTERESIS_UNIT_PA: f64 = 1e4;
+/// The zero offset of a pressure sensor is fitted in units of this, Pa.
+pub(crate) const OFFSET_UNIT_PA: f64 = 1e4;
+/// Bound of that zero offset, Pa \[chosen: 1 % of a sensor for 3 MPa\].
+pub(crate) const OFFSET_PA: f64 = 30e3;
 /// The slip at which the shape of the friction changes nothing, rad/s.
 pub(crate) const SHAPE_MIDDLE_RAD_S: f64 = 100.0;
 /// The friction slope is the change over this slip above it, rad/s.
@@ -68,6 +72,8 @@ pub enum Parameter {
     EngineTorqueDelay,
     /// Factor on the reading of the pressure sensor.
     PressureScale,
+    /// Zero offset of the pressure sensor: its reading without a pressure, Pa.
+    PressureOffset,
     /// Delay of the reading of the pressure against the turbine speed, s.
     PressureDelay,
     /// Half-width of the hysteresis of the oncoming clutch's valve, Pa.
@@ -82,7 +88,7 @@ impl Parameter {
         matches!(self, Self::FrictionAtRest | Self::FrictionSlope | Self::Shape(..))
     }
 
-    /// Whether it is a delay; all others but shapes and the hysteresis are factors.
+    /// Whether it is a delay; all others but shapes, hysteresis and zero offset are factors.
     pub fn is_delay(self) -> bool {
         matches!(
             self,
@@ -118,30 +124,32 @@ impl Parameter {
                 | Self::EngineTorqueScale
                 | Self::EngineTorqueDelay
                 | Self::PressureScale
+                | Self::PressureOffset
                 | Self::PressureDelay
         )
     }
 
     /// Whether it acts on readings alone, or between shifts: the motion of the car in a shift stays as it is.
     pub(crate) fn leaves_motion(self) -> bool {
-        let is_of_pressure = matches!(self, Self::PressureScale | Self::PressureDelay);
+        let is_of_pressure = matches!(self, Self::PressureScale | Self::PressureOffset | Self::PressureDelay);
         let is_of_road = matches!(self, Self::Rolling | Self::Air);
         is_of_pressure || is_of_road || matches!(self, Self::OutputDelay | Self::WheelDelay | Self::WheelScale)
     }
 
-    /// The value in its own unit of the unknown `x`: a factor, s, or a relative change.
-    pub(crate) fn value(self, x: f64) -> f64 {
+    /// The value in its own unit of the unknown `x`: a factor, s, Pa, or a relative change.
+    pub fn value(self, x: f64) -> f64 {
         match self {
             _ if self.is_delay() => DELAY_UNIT_S * x,
             _ if self.is_shape() => x,
             Self::Hysteresis => HYSTERESIS_UNIT_PA * x.max(0.0),
+            Self::PressureOffset => OFFSET_UNIT_PA * x,
             _ => x.exp(),
         }
     }
 }
 
 /// A parameter with what is known of it before the fit: mean and standard deviation of its unknown, which is the logarithm
-/// of a factor, a delay in units of 10 ms, a half-width in units of 10 kPa, or a relative change.
+/// of a factor, a delay in units of 10 ms, a half-width or an offset in units of 10 kPa, or a relative change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// What it is.
@@ -269,6 +277,7 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
     }
     if has.pressure {
         more.push((P::PressureScale, "pressure sensor, scale", 0.0, 0.005));
+        more.push((P::PressureOffset, "pressure sensor, zero offset", 0.0, uniform(OFFSET_PA / OFFSET_UNIT_PA)));
         more.push((P::PressureDelay, "pressure sensor, delay", 0.0, delay(uniform(budget.channel_skew_s))));
     }
     let road = [(P::Rolling, "rolling resistance", 0.0, uniform(ROLLING)), (P::Air, "air drag", 0.0, uniform(AIR))];

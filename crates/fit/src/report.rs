@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
-use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA};
-use crate::{BacklashFit, Channel, Fit, Parameter, Verdict, correlated};
+use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, OFFSET_UNIT_PA};
+use crate::{BacklashFit, Channel, Fit, Known, Parameter, Verdict, correlated};
 
 /// A row of the table of parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +48,8 @@ impl Fit {
             let kind = match prior.parameter {
                 p if p.is_delay() => Kind::Delay,
                 p if p.is_shape() => Kind::Share,
-                Parameter::Hysteresis => Kind::Pressure,
+                Parameter::Hysteresis => Kind::HalfWidth,
+                Parameter::PressureOffset => Kind::Offset,
                 _ => Kind::Factor,
             };
             row(&prior.name, self.unknowns[i], sd, prior.sd, self.verdict(prior.parameter), kind)
@@ -181,31 +182,39 @@ impl Fit {
             .collect()
     }
 
-    /// Delays and scale of channels, which belong into a channel map.
+    /// Delays, scale and zero offset of channels, which belong into a channel map, each with its interval.
     fn channel_map(&self) -> Vec<String> {
-        let of = |parameter: Parameter, role: &str| {
-            let value = self.value(parameter)?;
-            let sd = DELAY_UNIT_S * self.sd(parameter)?;
-            (value.abs() > SIDES * sd).then(|| {
+        let delays = [
+            (Parameter::OutputDelay, "output_speed"),
+            (Parameter::EngineDelay, "engine_speed"),
+            (Parameter::WheelDelay, "wheel_speed"),
+            (Parameter::PressureDelay, "oncoming_pressure"),
+        ];
+        let delay = |(parameter, role): (Parameter, &str)| {
+            let [low, late_ms, high] = self.interval(parameter)?.map(|late_s| 1e3 * late_s);
+            (low * high > 0.0).then(|| {
                 format!(
-                    "{role} is {:+.1} ms against the turbine speed: `delay_s` of its channel in the channel map",
-                    1e3 * value
+                    "{role} is {late_ms:+.1} ms (95 % {low:+.1} to {high:+.1} ms) against the turbine speed: `delay_s` of its channel in the \
+                     channel map"
                 )
             })
         };
-        let scale = self.value(Parameter::WheelScale).filter(|scale| (scale - 1.0).abs() > 1e-3);
-        [
-            of(Parameter::OutputDelay, "output_speed"),
-            of(Parameter::EngineDelay, "engine_speed"),
-            of(Parameter::WheelDelay, "wheel_speed"),
-            of(Parameter::PressureDelay, "oncoming_pressure"),
-            scale.map(|scale| {
-                format!("wheel_speed reads x {scale:.4}: `scale = {:.4}` in the channel map", scale.recip())
-            }),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        let scale = self.interval(Parameter::WheelScale).filter(|[_, scale, _]| (scale - 1.0).abs() > 1e-3);
+        let scale = scale.map(|[low, scale, high]| {
+            format!(
+                "wheel_speed reads x {scale:.4} (95 % {low:.4} to {high:.4}): `scale = {:.4}` in the channel map",
+                scale.recip()
+            )
+        });
+        let offset =
+            self.interval(Parameter::PressureOffset).and_then(|offset| said_of_offset("oncoming_pressure", offset));
+        delays.into_iter().filter_map(delay).chain(scale).chain(offset).collect()
+    }
+
+    /// A value in its own unit between the ends of its interval of 95 %.
+    fn interval(&self, parameter: Parameter) -> Option<[f64; 3]> {
+        let (x, half) = (self.unknowns[self.place(parameter)?], SIDES * self.sd(parameter)?);
+        Some([x - half, x, x + half].map(|x| parameter.value(x)))
     }
 
     /// Which measurement or drive would tell what these logs do not.
@@ -253,7 +262,26 @@ enum Kind {
     Factor,
     Delay,
     Share,
-    Pressure,
+    HalfWidth,
+    Offset,
+}
+
+/// The row of a zero offset, Pa.
+pub(crate) fn offset_row(name: String, offset: Known) -> ReportRow {
+    let [value, sd, before] = [offset.value, offset.sd, offset.before].map(|pa| pa / OFFSET_UNIT_PA);
+    row(&name, value, sd, before, offset.verdict(), Kind::Offset)
+}
+
+/// What a fit says of the zero offset of the channel of a pressure, Pa, between the ends of its interval, where that is not about zero.
+pub(crate) fn said_of_offset(channel: &str, offset_pa: [f64; 3]) -> Option<String> {
+    let [low, offset, high] = offset_pa.map(|pa| 1e-3 * pa);
+    (low * high > 0.0).then(|| {
+        format!(
+            "{channel} reads {offset:+.1} kPa (95 % {low:+.1} to {high:+.1} kPa) without a pressure: add {:+.1} kPa to `offset` of its channel in the \
+             channel map, in the unit of the channel. The fit has counted with it",
+            -offset
+        )
+    })
 }
 
 /// The row of a fill volume.
@@ -269,7 +297,11 @@ fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -
             let ms = |x: f64| 1e3 * DELAY_UNIT_S * x;
             (format!("{:+.1} ms", ms(x)), format!("{:+.1} to {:+.1} ms", ms(x - half), ms(x + half)))
         }
-        Kind::Pressure => {
+        Kind::Offset => {
+            let kpa = |x: f64| 1e-3 * OFFSET_UNIT_PA * x;
+            (format!("{:+.1} kPa", kpa(x)), format!("{:+.1} to {:+.1} kPa", kpa(x - half), kpa(x + half)))
+        }
+        Kind::HalfWidth => {
             let kpa = |x: f64| 1e-3 * HYSTERESIS_UNIT_PA * x;
             (format!("{:.1} kPa", kpa(x)), format!("{:.1} to {:.1} kPa", kpa((x - half).max(0.0)), kpa(x + half)))
         }

@@ -143,12 +143,12 @@ impl ShiftModel {
             directions: directions(&record, car),
             record,
         };
-        model.lay_out_rows(&segments, car.cylinder.is_some());
+        model.lay_out_rows(&segments, car);
         model.lay_out_unknowns(&segments, car);
         model
     }
 
-    fn lay_out_rows(&mut self, segments: &[Segment], has_stroke: bool) {
+    fn lay_out_rows(&mut self, segments: &[Segment], car: &Car) {
         let mut blocks = Vec::new();
         for (i, segment) in segments.iter().enumerate() {
             let [from_s, to_s] = segment.span_s;
@@ -163,18 +163,26 @@ impl ShiftModel {
                 block(Channel::Engine, &self.record.engine, FIRST_READING_S);
             }
         }
-        let until_s = self.half_steps.time_s(self.half_steps.points - 1);
-        // Of a piston that moves, the pressure is not the valve's.
-        let slipping = segments.iter().find(|segment| has_stroke && segment.kind == SegmentKind::Slipping);
-        let from_s = slipping.map_or(self.half_steps.begin_s, |segment| segment.span_s[0]);
-        let readings = self.record.pressure.between([from_s, until_s]).collect();
-        blocks.push(Block { channel: Channel::Pressure, segment: None, rows: 0..0, readings });
+        for span_s in self.valve_alone_s(segments, car) {
+            let readings = self.record.pressure.between(span_s).collect();
+            blocks.push(Block { channel: Channel::Pressure, segment: None, rows: 0..0, readings });
+        }
         blocks.retain(|block| !block.readings.is_empty());
         for block in &mut blocks {
             block.rows = self.rows..self.rows + block.readings.len();
             self.rows = block.rows.end;
         }
         self.blocks = blocks;
+    }
+
+    /// When the pressure is that of the valve alone, s: of a piston with a stroke not while it may move.
+    fn valve_alone_s(&self, segments: &[Segment], car: &Car) -> Vec<[f64; 2]> {
+        let [begin_s, end_s] = [self.half_steps.begin_s, self.half_steps.time_s(self.half_steps.points - 1)];
+        let slipping = segments.iter().find(|segment| segment.kind == SegmentKind::Slipping);
+        let (Some(cylinder), Some(slipping)) = (car.cylinder, slipping) else { return vec![[begin_s, end_s]] };
+        // Before its fill it rests: the readings show the zero offset of the sensor.
+        let fill_s = fill_begin_s(&car.hydraulics, &cylinder, &self.record.oncoming).unwrap_or(begin_s);
+        [[begin_s, fill_s], [slipping.span_s[0], end_s]].into_iter().filter(|span_s| span_s[0] < span_s[1]).collect()
     }
 
     fn lay_out_unknowns(&mut self, segments: &[Segment], car: &Car) {
@@ -307,7 +315,8 @@ impl ShiftModel {
         for block in self.blocks.iter().filter(|block| block.segment.is_none()) {
             for (row, (time_s, reading)) in block.rows.clone().zip(&block.readings) {
                 let seen_s = time_s - car.pressure_delay_s;
-                rows[row] = reading - car.pressure_scale * self.on_grid(&inputs.oncoming_pa, seen_s);
+                let pressure_pa = self.on_grid(&inputs.oncoming_pa, seen_s);
+                rows[row] = reading - car.pressure_offset_pa - car.pressure_scale * pressure_pa;
             }
         }
     }

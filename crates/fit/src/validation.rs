@@ -19,7 +19,7 @@ pub struct HeldOut {
     /// RMS of the one-step errors of the turbine speed, rad/s, with the given file and with the fitted one. Loads and starts are found
     /// anew with either; the delays of the channels are those of the fit.
     pub turbine_rad_s: [f64; 2],
-    /// RMS error of the open loop's pressure where it was measured, Pa.
+    /// RMS error of the open loop's pressure where it was measured, Pa, with the zero offset of the sensor by the fit.
     pub pressure_pa: Option<[f64; 2]>,
 }
 
@@ -46,13 +46,15 @@ impl Fit {
         }
         // Either car is what is written in its file; what is of the signals is that of the fit.
         let turbine_rad_s = [self.turbine_error(given, held_out, ages)?, self.turbine_error(fitted, held_out, ages)?];
+        // Either file is compared with what the sensor reads less its zero offset.
+        let offset_pa = self.value(Parameter::PressureOffset).unwrap_or(0.0);
         let pressure = |vehicle: &Vehicle| {
             let errors = held_out.iter().flat_map(|record| {
                 let [from_s, to_s] = [record.pressure.time_s.first(), record.pressure.time_s.last()]
                     .map(|time_s| time_s.copied().unwrap_or(f64::NAN));
                 let points = open_loop(vehicle, record).into_iter();
                 let measured = points.filter(move |point| (from_s..=to_s).contains(&point.time_s));
-                measured.map(|point| point.pressure_pa - record.pressure.at(point.time_s))
+                measured.map(move |point| point.pressure_pa - (record.pressure.at(point.time_s) - offset_pa))
             });
             rms(errors)
         };

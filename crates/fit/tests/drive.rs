@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
+use fit::Verdict;
 use fit::drive::{ConverterFit, DriveRecord, Moment, fit_converter};
 use logs::{Direction, Load, Reading, Role, Shift, ShiftQuality};
 use rand_distr::{Distribution, Normal};
@@ -53,7 +54,8 @@ fn fitted(record: &DriveRecord) -> (ConverterFit, Vec<Moment>) {
 fn the_converter_of_a_clean_drive_is_found() {
     let (fit, _) = fitted(&drive(1, 0.0));
     assert!((fit.inertia_kg_m2 - INERTIA_KG_M2).abs() < 0.01, "{}", fit.inertia_kg_m2);
-    assert!((fit.delay_s - DELAY_S).abs() < 0.011, "{}", fit.delay_s);
+    assert!((fit.delay_s - DELAY_S).abs() < 0.011 && fit.delay_sd_s < 0.01, "{} {}", fit.delay_s, fit.delay_sd_s);
+    assert_eq!([fit.inertia_verdict(), fit.delay_verdict()], [Verdict::Measured; 2]);
     for knot in &fit.knots {
         assert!((knot.capacity_n_m_s2 - capacity(knot.speed_ratio)).abs() < 0.1e-3, "{knot:?}");
     }
@@ -69,12 +71,31 @@ fn intervals_of_the_converter_hold() {
             all += 1;
             inside += u32::from(error.abs() <= 2.0 * sd);
         };
+        count(fit.delay_s - DELAY_S, fit.delay_sd_s);
         count(fit.inertia_kg_m2 - INERTIA_KG_M2, fit.inertia_sd_kg_m2);
         for knot in fit.knots.iter().filter(|knot| knot.speed_ratio < 1.0) {
             count(knot.capacity_n_m_s2 - capacity(knot.speed_ratio), knot.sd_n_m_s2);
         }
     }
     assert!(f64::from(inside) >= 0.9 * f64::from(all), "{inside} of {all}");
+}
+
+/// With a constant speed and torque the engine's inertia and the delay of its signal change nothing.
+#[test]
+fn a_drive_without_changes_of_speed_tells_neither_inertia_nor_delay() {
+    let mut record = DriveRecord::default();
+    for i in 0..6000_u32 {
+        let time_s = 0.01 * f64::from(i);
+        let speed_ratio = 0.58 + 0.37 * (0.01 * time_s).sin();
+        let torque = capacity(speed_ratio) * 160.0 * 160.0 + 8.0 * f64::from(i * 7919 % 11) - 40.0;
+        for (role, value) in
+            [(Role::EngineSpeed, 160.0), (Role::TurbineSpeed, 160.0 * speed_ratio), (Role::EngineTorque, torque)]
+        {
+            record.push(&Reading { role, time_s, stamp_s: time_s, value });
+        }
+    }
+    let (fit, _) = fitted(&record);
+    assert_eq!([fit.inertia_verdict(), fit.delay_verdict()], [Verdict::NotTold; 2], "{fit:?}");
 }
 
 #[test]

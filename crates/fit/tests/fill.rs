@@ -5,7 +5,7 @@ mod common;
 
 use common::{Logs, TestCar, fitted};
 use config::{Source, Vehicle};
-use fit::{Series, ShiftRecord, Verdict};
+use fit::{Parameter, Series, ShiftRecord, Verdict};
 
 fn shifts(car: &mut TestCar, count: u64) -> Vec<ShiftRecord> {
     (0..count).map(|number| car.shift(number, Logs::TorqueAndOnePressure).record).collect()
@@ -143,4 +143,26 @@ fn a_wrong_pressure_channel_is_not_believed() {
         Series { time_s, value }
     });
     assert_eq!(fitted(&car, &late, &[]).fill.unwrap().verdict(), Verdict::NotTold);
+}
+
+#[test]
+fn the_zero_offset_of_a_pressure_sensor_changes_no_fill_volume() {
+    let fit_with = |offset_pa: f64| {
+        let mut car = TestCar::with_stroke(5);
+        let mut shifts = shifts(&mut car, 3);
+        shifts.iter_mut().flat_map(|record| &mut record.pressure.value).for_each(|pa| *pa += offset_pa);
+        fitted(&car, &shifts, &[])
+    };
+    let right = fit_with(0.0);
+    let [gain, offset] = [Parameter::Gain, Parameter::PressureOffset];
+    for offset_pa in [-20e3, 30e3] {
+        let fit = fit_with(offset_pa);
+        let (fill, of_right) = (fit.fill.unwrap(), right.fill.unwrap());
+        // The preload is searched in steps of 5 %, and the volume goes with it.
+        assert!((fill.log_volume - of_right.log_volume).abs() < 0.25 * fill.sd[0], "{fill:?} {of_right:?}");
+        assert_eq!(fill.is_misfit, of_right.is_misfit);
+        let moved = |p, more: f64| (fit.value(p).unwrap() - right.value(p).unwrap() - more) / fit.sd(p).unwrap();
+        // The offset is in Pa, its deviation in 10 kPa.
+        assert!(moved(gain, 0.0).abs() < 0.05 && moved(offset, offset_pa).abs() < 0.05 * 1e4, "{offset_pa}");
+    }
 }

@@ -149,17 +149,27 @@ impl ChannelMap {
     /// # Errors
     /// The file cannot be read, or something in it is wrong; the message has the line.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let text = trace::read_text(path).map_err(LogError::io(path))?;
-        let wrong = |message: String| LogError::map(format!("{}: {message}", path.shown()));
-        let raw: RawMap = toml::from_str(&text).map_err(|error| {
-            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
-            let line = 1 + before.matches('\n').count();
-            LogError::map(format!("{}:{line}: {}", path.shown(), trace::printable(error.message())))
+        Self::of_text(path, &trace::read_text(path).map_err(LogError::io(path))?)
+    }
+
+    /// The same of the text of a file.
+    ///
+    /// # Errors
+    /// Something in it is wrong; the message begins with file and line.
+    pub fn of_text(path: &Path, text: &str) -> Result<Self, LogError> {
+        let at = |line: usize, message: &str| LogError::map(format!("{}:{line}: {message}", path.shown()));
+        let raw: RawMap = toml::from_str(text).map_err(|error| {
+            let begin = error.span().map_or(0, |span| span.start);
+            let line = 1 + text.bytes().take(begin).filter(|byte| *byte == b'\n').count();
+            at(line, &trace::printable(error.message()).to_string())
         })?;
-        let channels =
-            raw.channel.into_iter().map(|(role, raw)| mapped(&role, raw).map_err(&wrong)).collect::<Result<_, _>>()?;
+        let of_role = |(role, raw): (String, RawChannel)| {
+            mapped(&role, raw).map_err(|message| at(line_of(text, &format!("channel.{role}"), &message), &message))
+        };
+        let channels = raw.channel.into_iter().map(of_role).collect::<Result<_, _>>()?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let gearbox = raw.gearbox.map_or(Ok(Gearbox::default()), gearbox).map_err(&wrong)?;
+        let gearbox = raw.gearbox.map_or(Ok(Gearbox::default()), gearbox);
+        let gearbox = gearbox.map_err(|message| at(line_of(text, "gearbox", &message), &message))?;
         Ok(Self {
             channels,
             open: OpenOptions {
@@ -208,6 +218,16 @@ impl ChannelMap {
         one_shaft_each(&resolved, log)?;
         Ok(resolved)
     }
+}
+
+/// The line of the key that a message about a table names first, or that of the table, from 1.
+fn line_of(text: &str, table: &str, message: &str) -> usize {
+    let header = format!("[{table}]");
+    let Some(first) = text.lines().position(|line| line.trim_start().starts_with(&header)) else { return 1 };
+    let key = message.split('`').nth(1).and_then(|key| key.strip_prefix(table)?.strip_prefix('.'));
+    let own = || text.lines().skip(first + 1).take_while(|line| !line.trim_start().starts_with('['));
+    let is_of_key = |line: &str| key.is_some_and(|key| line.split('=').next().is_some_and(|name| name.trim() == key));
+    first + 1 + own().position(is_of_key).map_or(0, |at| at + 1)
 }
 
 /// The role of a name in a map, and the element of the gearbox that it is about.

@@ -139,6 +139,11 @@ fn speeds_alone_give_every_shift_and_its_inertia_phase() {
             // 5 and 95 % of the way; with noise the smallest step (8 % at 1 % noise) is told to some samples.
             let expected = [begin_s + 0.05 * INERTIA_S, begin_s + 0.95 * INERTIA_S];
             let tolerance_s = if noise_rad_s == 0.0 { 0.011 } else { 0.05 };
+            let half_s = shift.quality.inertia_half_s.unwrap();
+            // Twelve times and more are all within twice their interval.
+            for (found_s, expected_s) in [from_s, to_s].into_iter().zip(expected) {
+                assert!((found_s - expected_s).abs() < 2.0 * half_s && half_s < 0.1, "{half_s} {shift:?}");
+            }
             assert!((from_s - expected[0]).abs() < tolerance_s, "{shift:?}");
             assert!((to_s - expected[1]).abs() < tolerance_s, "{shift:?}");
             assert_eq!(shift.direction, if shift.to > shift.from { Direction::Up } else { Direction::Down });
@@ -347,6 +352,8 @@ fn flare_is_the_turbine_above_the_old_gear() {
     let shifts = found(&gearbox, &SPEEDS, &readings);
     assert_eq!(gears(&shifts), [(2, 3)]);
     let flare = shifts[0].quality.flare_rad_s.unwrap();
+    let [half, half_s] = [shifts[0].quality.flare_half_rad_s, shifts[0].quality.inertia_half_s].map(Option::unwrap);
+    assert!((0.0..5.0).contains(&half) && (0.0..0.05).contains(&half_s) && half_s > 0.0, "{half} {half_s}");
     // Of five points in 40 ms the middle one counts: the peak is cut by at most 12 (1 - cos(pi 0.02 / 0.2)).
     assert!((flare - 12.0).abs() < 0.6, "{flare}");
     let without = drive.found(&SPEEDS)[0].quality.flare_rad_s.unwrap();

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use config::{Source, TURBINE_SIDE_INERTIA_KG_M2};
-use fit::Series as Readings;
 use fit::drive::{ConverterFit, DriveRecord, Moment, ShiftTorque};
+use fit::{Series as Readings, Verdict};
 use logs::Shift;
 use minijinja::{Value, context};
 use trace::ShownPath as _;
@@ -43,6 +43,23 @@ pub struct SpeedsPage<'a> {
     pub has_command: bool,
     /// What was met in the log, in sentences.
     pub faults: &'a [String],
+}
+
+/// Inertia of the engine and delay of its torque, each with its interval of 95 %.
+fn inertia_and_delay(fit: &ConverterFit) -> String {
+    let inertia = match fit.inertia_verdict() {
+        Verdict::NotTold => {
+            "not identifiable: the engine hardly changes its speed with the converter slipping".to_owned()
+        }
+        _ => format!("{:.3} ± {:.3} kg m²", fit.inertia_kg_m2, 2.0 * fit.inertia_sd_kg_m2),
+    };
+    let [late_ms, half_ms] = [fit.delay_s, 2.0 * fit.delay_sd_s].map(|time_s| 1e3 * time_s);
+    let delay = match fit.delay_verdict() {
+        Verdict::NotTold => "The delay of the engine's torque against its signal is not identifiable".to_owned(),
+        _ if late_ms < 0.0 => format!("The engine's torque comes {:.0} ± {half_ms:.0} ms before its signal", -late_ms),
+        _ => format!("The engine's torque comes {late_ms:.0} ± {half_ms:.0} ms after its signal"),
+    };
+    format!("Inertia of engine and pump (95 %): {inertia}. {delay} (95 %).")
 }
 
 impl SpeedsPage<'_> {
@@ -112,16 +129,12 @@ impl SpeedsPage<'_> {
                     fit.fitted_s, fit.scale_n_m
                 ));
                 let capacities = fit.knots.iter().filter(|knot| knot.speed_ratio < 1.0);
-                let capacities =
-                    capacities.map(|knot| format!("{:.2} at {}", 1e3 * knot.capacity_n_m_s2, knot.speed_ratio));
-                said.push(format!("Capacity, 10⁻³ N m s²: {}.", capacities.collect::<Vec<_>>().join(", ")));
-                said.push(format!(
-                    "Inertia of engine and pump: {:.2} ± {:.2} kg m². The engine's torque comes {:.0} ms {} its signal.",
-                    fit.inertia_kg_m2,
-                    2.0 * fit.inertia_sd_kg_m2,
-                    1e3 * fit.delay_s.abs(),
-                    if fit.delay_s < 0.0 { "before" } else { "after" },
-                ));
+                let capacities = capacities.map(|knot| {
+                    let [capacity, half] = [knot.capacity_n_m_s2, 2.0 * knot.sd_n_m_s2].map(|value| 1e3 * value);
+                    format!("{capacity:.2} ± {half:.2} at {}", knot.speed_ratio)
+                });
+                said.push(format!("Capacity, 10⁻³ N m s² (95 %): {}.", capacities.collect::<Vec<_>>().join(", ")));
+                said.push(inertia_and_delay(fit));
             }
         }
         let spans: Vec<String> = self.no_slip().iter().map(|span| self.no_slip_text(*span)).collect();

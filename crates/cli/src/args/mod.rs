@@ -249,11 +249,12 @@ pub(crate) enum Command {
     /// in which of them the speeds show nothing of the clutch torque, so that the valve model serves.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
-    /// Check a vehicle, gearbox, experiment, drive or study file
+    /// Check vehicle, gearbox, experiment, drive and study files
     ///
-    /// Checks a vehicle, gearbox, experiment, drive or study file, and the files that it names, and prints a summary. Also checks a
-    /// bounds file for `design --bounds` and a sensors file for `estimate --sensors`. Warns of given gains that are
-    /// unstable at a vertex.
+    /// Checks vehicle, gearbox, experiment, drive and study files, and the files that they name, and prints a summary. Also checks
+    /// bounds files for `design --bounds`, sensors files for `estimate --sensors` and channel maps for --map. Names all unknown
+    /// and missing keys and all values outside their ranges. All files are checked; the exit code is that of the worst.
+    /// Warns of given gains that are unstable at a vertex.
     ///
     /// Of a vehicle file it lists what the file leaves to defaults, and which of them matter most: the RMS change of the estimated
     /// pressure and clutch torque in the torque and inertia phase of a simulated upshift, where each default is off by as much as the
@@ -303,8 +304,9 @@ pub(crate) struct Simulate {
 
 #[derive(Debug, Args)]
 pub(crate) struct Check {
-    /// Vehicle, gearbox, experiment, drive, study, bounds or sensors file
-    pub(crate) file: PathBuf,
+    /// Vehicle, gearbox, experiment, drive, study, bounds or sensors files, or channel maps
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
     /// File whose table `sensors` describes how the speeds of a car with a gearbox are read; default: those of
     /// experiments/bench.toml
     #[arg(long, value_name = "SENSORS.toml")]

@@ -113,6 +113,11 @@ pub(crate) fn available_threads() -> usize {
 }
 
 impl Threads {
+    /// Whether a number was given.
+    pub(crate) fn is_given(&self) -> bool {
+        self.threads.is_some()
+    }
+
     /// The number of threads.
     pub(crate) fn count(&self) -> usize {
         self.threads.map_or_else(available_threads, usize::from)

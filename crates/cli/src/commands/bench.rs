@@ -8,7 +8,7 @@ use study::bench::{BenchConsistency, BenchRow, open_loop};
 use trace::{ShownPath as _, units};
 
 use crate::args;
-use crate::commands::{progress, writable, write_text};
+use crate::commands::{progress, warn_without_effect, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -23,6 +23,12 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
         }
         None => (Vehicle::built_in()?, Experiment::bench()?),
     };
+    if options.threads.is_given() {
+        warn_without_effect(
+            "--threads",
+            "the scenarios of an experiment are run one after the other, as their steps are timed",
+        );
+    }
     experiment.check_size()?;
     open_loop(&experiment)?;
     options.output.as_deref().map(|folder| writable(folder, &["bench.html"])).transpose()?;

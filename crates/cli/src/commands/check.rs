@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
-use config::{Car, Drive, Experiment, GainMethod, GearboxFile, Kind, Sensors, Source, Study, Values, Vehicle};
+use config::{
+    Car, CarStudy, ConfigError, Drive, Experiment, GainMethod, GearboxFile, Kind, Sensors, Source, Study, Values,
+    Vehicle, all_errors, check_learnt,
+};
 use design::{longest_step_of, unstable_corners};
-use trace::ShownPath as _;
-
+use logs::ChannelMap;
 use report::tables::phase_name;
+use trace::ShownPath as _;
 
 use super::car::{describe_car, describe_gearbox};
 use super::check_defaults::{describe_car_values, describe_defaults};
@@ -17,33 +20,112 @@ use crate::args::Check;
 use crate::failure::Failure;
 use crate::output;
 
+/// Checks the files one after the other: one with errors does not stop the others.
 pub(crate) fn check(options: &Check) -> Result<(), Failure> {
-    let source = Source::read(&options.file)?;
+    let [file] = options.files.as_slice() else { return several(options) };
+    check_file(options, file)
+}
+
+fn several(options: &Check) -> Result<(), Failure> {
+    if options.output.is_some() {
+        let message = "-o takes the diagrams of one gearbox\nhint: check the files of gearboxes one by one";
+        return Err(Failure::Input(message.to_owned()));
+    }
+    let mut failed: Vec<(&Path, Failure)> = Vec::new();
+    for file in &options.files {
+        output::line(&format!("{}:", file.shown()))?;
+        if let Err(failure) = check_file(options, file) {
+            // Nobody reads on.
+            if matches!(failure, Failure::BrokenPipe) {
+                return Err(failure);
+            }
+            output::error(&failure.to_string());
+            failed.push((file, failure));
+        }
+        output::line("")?;
+    }
+    if failed.is_empty() {
+        return Ok(());
+    }
+    let names: Vec<String> = failed.iter().map(|(file, _)| file.shown().to_string()).collect();
+    let message = format!("{} of {} files have errors: {}", failed.len(), options.files.len(), names.join(", "));
+    Err(match failed.iter().any(|(_, failure)| matches!(failure, Failure::Input(_))) {
+        true => Failure::Input(message),
+        false => Failure::Work(message),
+    })
+}
+
+fn check_file(options: &Check, file: &Path) -> Result<(), Failure> {
+    let source = Source::read(file)?;
     let kind = source.kind()?;
     if options.output.is_some() && !matches!(kind, Kind::Gearbox | Kind::Car) {
         let what = "only a gearbox is drawn, of a gearbox file or of a vehicle file that names one";
-        let message = format!("{}: {what}\nhint: leave -o out", options.file.shown());
+        let message = format!("{}: {what}\nhint: leave -o out", file.shown());
         return Err(Failure::Input(message));
     }
     if options.sensors.is_some() && kind != Kind::Car {
         return Err(super::sensors_without_effect());
     }
+    if options.all && !matches!(kind, Kind::Car | Kind::Vehicle) {
+        super::warn_without_effect(
+            "--all",
+            &format!("{} is {}, which has no defaults to show", file.shown(), kind.words()),
+        );
+    }
+    let errors = all_errors(&source, &|source| read(kind, source));
+    if !errors.is_empty() {
+        let messages = errors.iter().map(ToString::to_string);
+        return Err(Failure::Input(messages.collect::<Vec<_>>().join("\nerror: ")));
+    }
+    describe_file(options, file, (source, kind))
+}
+
+/// Reads a file of a kind, and the files that it names.
+fn read(kind: Kind, source: Source) -> Result<(), ConfigError> {
+    match kind {
+        Kind::Gearbox => GearboxFile::from_source(source).map(drop),
+        Kind::Car => Car::from_source(source).map(drop),
+        Kind::CarStudy => CarStudy::from_source(source).map(drop),
+        Kind::Drive => Drive::from_source(source).map(drop),
+        Kind::Vehicle => Vehicle::from_source(source).map(drop),
+        Kind::Experiment => Experiment::from_source(source)?.read_vehicle().map(drop),
+        Kind::Overlay => Vehicle::check_overlay(&source),
+        Kind::Sensors => Sensors::from_source(&source).map(drop),
+        Kind::Study => Study::from_source(source).map(drop),
+        Kind::Learnt => check_learnt(&source),
+        Kind::ChannelMap => read_map(&source),
+    }
+}
+
+/// Reads a channel map; its errors have the form of those of the other files.
+fn read_map(source: &Source) -> Result<(), ConfigError> {
+    let Err(error) = ChannelMap::of_text(&source.path, &source.text) else { return Ok(()) };
+    let (path, text) = (source.path.clone(), error.to_string());
+    let placed = text.strip_prefix(&format!("{}:", path.shown())).and_then(|rest| rest.split_once(": "));
+    let (line, message) = placed.and_then(|(line, message)| Some((line.parse().ok()?, message))).unwrap_or((1, &text));
+    let range = || -> Option<ConfigError> {
+        let (key, rest) = message.strip_prefix('`')?.split_once("` is ")?;
+        let (value, allowed) = rest.split_once(", expected ")?;
+        let value = value.parse().ok().filter(|_| allowed.contains(" to "))?;
+        Some(ConfigError::Range {
+            path: path.clone(),
+            line,
+            key: key.to_owned(),
+            value,
+            allowed: allowed.to_owned(),
+            hint: None,
+        })
+    };
+    Err(range().unwrap_or_else(|| ConfigError::Syntax { path: path.clone(), line, message: message.to_owned() }))
+}
+
+/// Says what a file without errors describes.
+fn describe_file(options: &Check, file: &Path, (source, kind): (Source, Kind)) -> Result<(), Failure> {
     match kind {
         Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
-        Kind::Car => {
-            let car = Car::read(&options.file)?;
-            let sensors = sensors_or_bench(options.sensors.as_deref())?;
-            describe_car(&car)?;
-            describe_gearbox(&car)?;
-            if let Some(folder) = &options.output {
-                gearbox::draw(&car.gearbox, folder)?;
-            }
-            warn(&car.implausible());
-            warn(car.why_not_driven().as_slice());
-            describe_car_values(&car, &sensors, options.all)
-        }
-        Kind::CarStudy => super::study::describe_cars(&options.file),
-        Kind::Drive => describe_drive(&Drive::from_source(source)?, &options.file),
+        Kind::Car => describe_whole_car(options, &Car::from_source(source)?),
+        Kind::CarStudy => super::study::describe_cars(file),
+        Kind::Drive => describe_drive(&Drive::from_source(source)?, file),
         Kind::Vehicle => {
             let vehicle = Vehicle::from_source(source)?;
             describe(&vehicle)?;
@@ -60,27 +142,45 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
             Ok(())
         }
         Kind::Overlay => {
-            Vehicle::check_overlay(&source)?;
             let what = "values for a vehicle file, such as the output of `wetclutch error-bound`; all keys are valid in a vehicle file";
-            describe_use(what, "wetclutch design VEHICLE --bounds", &options.file)
+            describe_use(what, "wetclutch design VEHICLE --bounds", file)
         }
         Kind::Sensors => {
-            Sensors::read(&options.file)?;
             let command = "wetclutch estimate LOG --vehicle VEHICLE --observer kalman --sensors";
-            describe_use("sensors of a car", command, &options.file)
+            describe_use("sensors of a car", command, file)
         }
-        Kind::Learnt => describe_use(
-            "what the filter for any shift has learnt of a car",
-            "wetclutch estimate LOG --vehicle CAR --learnt",
-            &options.file,
-        ),
         Kind::Study => {
-            let study = Study::read(&options.file)?;
+            let study = Study::from_source(source)?;
             describe_study(&study)?;
             describe_experiment(&study.experiment)?;
             describe(&study.vehicle)
         }
+        Kind::Learnt => {
+            let what = "what the filter for any shift has learnt of a car; whether it is of this car is known with its vehicle file";
+            describe_use(what, "wetclutch estimate LOG --vehicle VEHICLE --learnt", file)
+        }
+        Kind::ChannelMap => {
+            let what = "a channel map; whether a log has its channels is known with the log";
+            describe_use(what, "wetclutch inspect LOG --map", file)
+        }
     }
+}
+
+fn describe_whole_car(options: &Check, car: &Car) -> Result<(), Failure> {
+    let sensors = sensors_or_bench(options.sensors.as_deref())?;
+    describe_car(car)?;
+    describe_gearbox(car)?;
+    if let Some(folder) = &options.output {
+        gearbox::draw(&car.gearbox, folder)?;
+    }
+    warn(&car.implausible());
+    warn(car.why_not_driven().as_slice());
+    if options.sensors.is_some() && (car.gearbox.has_ratios_alone() || (car.defaults_taken.is_empty() && !options.all))
+    {
+        let why = "no value of this file is varied in a simulated drive";
+        super::warn_without_effect("--sensors", why);
+    }
+    describe_car_values(car, &sensors, options.all)
 }
 
 /// Says what a file holds that belongs to a command.

@@ -13,7 +13,7 @@ use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
 use crate::commands::written::{is_page, replaces_only};
-use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, write_text};
+use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, warn_of_mapping, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -21,6 +21,7 @@ use crate::output;
 const LONGEST_NAME: usize = 40;
 
 pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
+    warn_of_mapping(&options.mapping, std::slice::from_ref(&options.log));
     let mut map = channel_map(&options.mapping)?;
     if !options.ratios.is_empty() {
         map.gearbox.ratios.clone_from(&options.ratios);
@@ -247,8 +248,8 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
             "phases, s each",
             "command s",
             "gear signal s",
-            "inertia phase s",
-            "flare rpm",
+            "inertia phase s, 95 %",
+            "flare rpm, 95 %",
             "jerk m/s^3",
         ];
         let mut rows = vec![titles.map(str::to_owned).to_vec()];
@@ -324,6 +325,15 @@ fn notes(readings: &Readings<'_>) -> Vec<String> {
     faulty.map(of).chain(readings.notes().iter().cloned()).collect()
 }
 
+/// Half of an interval of 95 % behind its value, rounded up; that there is none where readings do not show it.
+fn with_half(half: Option<f64>, digits: i32) -> String {
+    let unit = 10.0_f64.powi(digits);
+    let digits = usize::try_from(digits).unwrap_or(0);
+    half.map_or(" (interval not identifiable)".to_owned(), |half| {
+        format!(" +- {:.digits$}", (unit * half).ceil() / unit)
+    })
+}
+
 fn row(shift: &Shift) -> Vec<String> {
     let time = |time_s: Option<f64>| time_s.map_or(String::new(), |time_s| format!("{time_s:.2}"));
     let number =
@@ -336,8 +346,12 @@ fn row(shift: &Shift) -> Vec<String> {
         phases.join(", "),
         time(shift.command_s),
         time(shift.gear_s),
-        shift.inertia_s.map_or(String::new(), |[from_s, to_s]| format!("{from_s:.2} to {to_s:.2}")),
-        number(shift.quality.flare_rad_s.map(rpm), 0),
+        shift.inertia_s.map_or(String::new(), |[from_s, to_s]| {
+            format!("{from_s:.2} to {to_s:.2}{}", with_half(shift.quality.inertia_half_s, 2))
+        }),
+        shift.quality.flare_rad_s.map_or(String::new(), |flare| {
+            format!("{:.0}{}", rpm(flare), with_half(shift.quality.flare_half_rad_s.map(rpm), 0))
+        }),
         number(shift.quality.jerk_m_s3, 1),
     ]
 }

@@ -43,14 +43,15 @@ pub(crate) use worst_case::worst_case;
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use config::Source;
+use config::{Kind, Source};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use logs::ChannelMap;
+use logs::{ChannelMap, Log, OpenOptions};
 use serde::{Serialize, Serializer};
 use trace::{Cell, CsvWriter, ShownPath as _, Trace, WholeFile};
 
 use crate::args::Mapping;
 use crate::failure::Failure;
+use crate::output;
 
 /// Writes a trace as a comma-separated file, whole or not at all.
 fn write_trace(path: &Path, trace: &Trace) -> Result<(), Failure> {
@@ -60,6 +61,23 @@ fn write_trace(path: &Path, trace: &Trace) -> Result<(), Failure> {
 /// Writes a text file, whole or not at all.
 fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     trace::write_whole(path, |writer| writer.write_all(text.as_bytes())).map_err(|error| Failure::writing(path, &error))
+}
+
+/// Warns of an option that changes nothing here, and says why.
+fn warn_without_effect(option: &str, why: &str) {
+    output::note(&format!("warning: {option} has no effect: {why}\nhint: leave it out"));
+}
+
+/// Warns of files of a channel map that change nothing for these logs.
+fn warn_of_mapping(mapping: &Mapping, logs: &[PathBuf]) {
+    // A log that cannot be opened says so where it is read.
+    let has_no_frames = |log: &PathBuf| match Log::open(log, &OpenOptions::default()) {
+        Ok(log) => ["CSV", "Parquet"].iter().any(|format| log.format().starts_with(format)),
+        Err(_) => false,
+    };
+    if mapping.dbc.is_some() && !logs.is_empty() && logs.iter().all(|log| log.is_file() && has_no_frames(log)) {
+        warn_without_effect("--dbc", "a log in CSV or Parquet has no frames of a CAN bus");
+    }
 }
 
 /// `--sensors` where nothing is read by sensors.
@@ -160,12 +178,12 @@ fn channel_map_of_car(options: &Mapping, wheel_radius_m: f64) -> Result<ChannelM
 fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
     let mut map = match options.map.as_deref() {
         Some(path) => ChannelMap::read(path).map_err(|error| match Source::read(path).and_then(|source| source.kind()) {
-            Ok(kind) => Failure::Input(format!(
+            Ok(kind) if kind != Kind::ChannelMap => Failure::Input(format!(
                 "{}: this looks like {}, expected a channel map\nhint: `wetclutch inspect LOG --suggest` writes a first one",
                 path.shown(),
                 kind.words()
             )),
-            Err(_) => error.into(),
+            _ => error.into(),
         })?,
         None => ChannelMap::default(),
     };

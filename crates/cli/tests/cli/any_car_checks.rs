@@ -377,9 +377,9 @@ fn times_of_a_clock_since_1970_are_shown_from_the_first_one_on() {
     };
     let begins_s = |name: &str, column: &str| numbers(&folder.read(name), column);
     // Of the car with a gearbox.
-    let near = said(&estimate(&folder, "sim/short_measured.csv", &["-o", &folder.path("near.csv")]));
+    let near = crate::support::shown(&estimate(&folder, "sim/short_measured.csv", &["-o", &folder.path("near.csv")]));
     folder.write("log.csv", later(&text));
-    let far = said(&estimate(&folder, "log.csv", &["-o", &folder.path("far.csv")]));
+    let far = crate::support::shown(&estimate(&folder, "log.csv", &["-o", &folder.path("far.csv")]));
     let sentence = "times from 1700000000 s of the log's clock on; the tables in files keep that clock";
     assert!(far.matches(sentence).count() == 1 && !near.contains("times from"), "{far}");
     let shifts = lines(&near, "-on upshift");
@@ -397,7 +397,8 @@ fn times_of_a_clock_since_1970_are_shown_from_the_first_one_on() {
     said(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("drive")]));
     folder.write("log.csv", later(&folder.read("drive/e1_measured.csv")));
     let out = folder.path("two.csv");
-    let far = said(&wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", VEHICLE, "-o", &out]));
+    let far =
+        crate::support::shown(&wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", VEHICLE, "-o", &out]));
     assert!(far.matches(sentence).count() == 1 && far.contains("from 0.000 to 9.500 s"), "{far}");
     assert!(!far.replace(sentence, "").contains("17000000"), "{far}");
     assert!(begins_s("two_shifts.csv", "time_s")[0] > 1_700_000_000.0);

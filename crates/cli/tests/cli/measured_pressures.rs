@@ -51,7 +51,7 @@ fn with_columns(folder: &Folder, name: &str, titles: &str, cells: impl Fn(usize,
 
 fn shifts_of(folder: &Folder, log: &str, more: &[&str]) -> (Vec<BTreeMap<String, String>>, String) {
     let (car, log, out) = (format!("{ROOT}vehicles/eight_speed.toml"), folder.path(log), folder.path("out.csv"));
-    let words = said(&wetclutch(&[&["estimate", &log, "--vehicle", &car, "-o", &out], more].concat()));
+    let words = crate::support::shown(&wetclutch(&[&["estimate", &log, "--vehicle", &car, "-o", &out], more].concat()));
     (rows(&folder.read("out_shifts.csv")), words)
 }
 

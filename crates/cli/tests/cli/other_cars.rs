@@ -111,7 +111,8 @@ fn a_gearbox_by_its_ratios_alone_has_torques_at_the_turbine() {
         assert!(errors.len() > 40 && rms < most, "{car}: {rms} N m in {} rows", errors.len());
         assert!(cells(phase).zip(cells(health)).all(|(phase, health)| phase != "both_slip" || health == "good"));
     }
-    let said_of = said(&wetclutch(&["estimate", &log, "--vehicle", &alone, "-o", &folder.path("out.csv")]));
+    let said_of =
+        crate::support::shown(&wetclutch(&["estimate", &log, "--vehicle", &alone, "-o", &folder.path("out.csv")]));
     assert!(
         said_of.contains("2 of 2 shifts were completed") && said_of.contains(" turbine") && said_of.contains("(+-"),
         "{said_of}"

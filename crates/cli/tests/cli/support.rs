@@ -38,6 +38,11 @@ pub(crate) fn said(output: &Output) -> String {
     stderr(output)
 }
 
+/// What a command that must succeed has printed and said.
+pub(crate) fn shown(output: &Output) -> String {
+    said(output) + &stdout(output)
+}
+
 /// The standard error of a command whose input must be refused.
 pub(crate) fn refused(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(2), "{}{}", stdout(output), stderr(output));

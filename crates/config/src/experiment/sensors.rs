@@ -128,9 +128,16 @@ impl Sensors {
     /// # Errors
     /// The file cannot be read, or a value cannot be right.
     pub fn read(path: &Path) -> Result<Option<Self>, ConfigError> {
-        let source = Source::read(path)?;
+        Self::from_source(&Source::read(path)?)
+    }
+
+    /// The same of the text of a file.
+    ///
+    /// # Errors
+    /// A value cannot be right.
+    pub fn from_source(source: &Source) -> Result<Option<Self>, ConfigError> {
         let raw: RawSensorsFile = source.parse()?;
-        let sensors = raw.sensors.as_ref().map(|raw| sensors(&Check::of(&source), "sensors", raw, None)).transpose()?;
+        let sensors = raw.sensors.as_ref().map(|raw| sensors(&Check::of(source), "sensors", raw, None)).transpose()?;
         Ok(sensors.map(Self::without_errors))
     }
 

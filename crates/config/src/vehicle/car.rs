@@ -104,7 +104,14 @@ impl Car {
     /// # Errors
     /// A file cannot be read, is of another kind, or holds a value that cannot be right.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let source = Source::read(path)?;
+        Self::from_source(Source::read(path)?)
+    }
+
+    /// Checks the text of a vehicle file, and the gearbox file that it names from its folder.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let defaults = Source::built_in(DEFAULTS.0, DEFAULTS.1);
         let layers = Layers { source: &defaults, over: Some(&source) };
         let raw: RawCar = layers
@@ -116,7 +123,7 @@ impl Car {
             let check = Check::of(&source);
             return Err(check.meaning("gearbox", 0, "names no gearbox file".to_owned(), Some(hint)));
         }
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let folder = source.path.parent().unwrap_or(Path::new("")).to_owned();
         let named_at = raw.gearbox.span().start.saturating_sub(defaults.text.len());
         let gearbox = Source::read(&folder.join(raw.gearbox.get_ref()))
             .map_err(|error| error.named_by(&source, "gearbox", named_at))?;

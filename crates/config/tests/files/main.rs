@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
+mod all_errors;
 mod cylinders;
 mod experiments;
 mod sensors;

@@ -19,7 +19,11 @@ use crate::lmi::{Block, Problem};
 /// The gain is sought in multiples of this, so that the unknowns are of order 1.
 const GAIN_UNIT: f64 = 30.0;
 
-/// Unknowns: the entries of alpha, then `L` by rows.
+/// How much more than the required contraction is asked of the solver, as a relative margin, one after the other: the first is lost where the
+/// terms of `L G Psi` cancel, so that the solver's tolerance or the rounding of the gain to single precision is more than it.
+const MARGINS: [f64; 3] = [1e-6, 1e-5, 1e-4];
+
+/// The gain, of the smallest margin with which it is certified.
 pub(crate) fn smallest_gain(
     system: &ErrorSystem,
     kappa2_per_s: f64,
@@ -27,6 +31,25 @@ pub(crate) fn smallest_gain(
     round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
 ) -> Result<(Found, SolverRecord), DesignError> {
     let rho = (-kappa2_per_s * sample_time_s).exp();
+    let with_margin = |margin: f64| with_margin(system, (rho, margin), kappa2_per_s, &round);
+    let is_refused = |found: &Result<_, DesignError>| matches!(found, Err(DesignError::NotCertified));
+    let [first, others @ ..] = MARGINS;
+    let mut found = with_margin(first);
+    for margin in others {
+        if is_refused(&found) {
+            found = with_margin(margin);
+        }
+    }
+    found
+}
+
+/// Unknowns: the entries of alpha, then `L` by rows.
+fn with_margin(
+    system: &ErrorSystem,
+    (rho, margin): (f64, f64),
+    kappa2_per_s: f64,
+    round: &impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
+) -> Result<(Found, SolverRecord), DesignError> {
     let (states, outputs) = (system.states(), system.h.nrows());
     let unknowns = states + states * outputs;
     let gain = |x: &[f64]| DMatrix::from_row_slice(states, outputs, &x[states..]) * GAIN_UNIT;
@@ -35,7 +58,7 @@ pub(crate) fn smallest_gain(
         stacked(&(&identity * rho), &(&corner.phi - l * &corner.g_psi), &(&identity * rho))
     };
     let mut blocks: Vec<Block> = (system.corners.iter())
-        .map(|corner| block(unknowns, |x| contraction(&gain(x), corner, rho * (1.0 - 1e-6))))
+        .map(|corner| block(unknowns, |x| contraction(&gain(x), corner, rho * (1.0 - margin))))
         .collect();
     let causes = system.h.ncols();
     blocks.push(block(unknowns, |x| {

@@ -13,6 +13,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::record::{DriveRecord, Moment};
+use crate::Verdict;
 
 /// Speed ratios between which the capacity is a line \[chosen: closer together where it falls\].
 const KNOTS: [f64; 8] = [0.1, 0.3, 0.5, 0.7, 0.8, 0.85, 0.9, 0.95];
@@ -29,6 +30,8 @@ const COARSE: usize = 4;
 /// Errors beyond so many scales count less.
 const HUBER: f64 = 2.0;
 const ITERATIONS: u32 = 4;
+/// Standard deviation of the delay before the fit, s \[chosen\].
+const DELAY_SD_S: f64 = 0.1;
 /// Inertia that is expected, kg m^2, and its standard deviation \[chosen: passenger cars\]. It counts where the log has no change of speed.
 const INERTIA: [f64; 2] = [0.2, 0.15];
 
@@ -56,6 +59,8 @@ pub struct ConverterFit {
     pub inertia_sd_kg_m2: f64,
     /// The torque comes so much later than its signal, s.
     pub delay_s: f64,
+    /// Its standard deviation.
+    pub delay_sd_s: f64,
     /// Scale of the residuals, N m: 1.48 times their median size.
     pub scale_n_m: f64,
     /// Time with a slipping converter that was fitted, s.
@@ -87,7 +92,7 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     let fine = coarse.and_then(|(step, _)| best(&mut (step - 3..=step + 3)));
     let Some((step, solution)) = fine else { return Err("the speeds and torques do not fit together".to_owned()) };
     let delay_s = DELAY_STEP_S * f64::from(step);
-    let Some(sd) = solution.deviations(record, &some, &knots, delay_s) else {
+    let Some(sd) = solution.deviations(&some, &knots) else {
         return Err("the speeds and torques do not fit together".to_owned());
     };
     let bends = bends(&knots, solution.unknowns.as_slice());
@@ -108,6 +113,8 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
         inertia_kg_m2: solution.unknowns[knots.len()],
         inertia_sd_kg_m2: sd[knots.len()],
         delay_s,
+        // The delay is searched in steps.
+        delay_sd_s: sd[knots.len() + 1].hypot(DELAY_STEP_S / 12.0_f64.sqrt()),
         scale_n_m: solution.scale_n_m,
         fitted_s: 0.02 * slipping.len() as f64,
     })
@@ -130,6 +137,18 @@ fn drives_no_engine(knots: &[Knot]) -> Result<(), String> {
 }
 
 impl ConverterFit {
+    /// What the drive tells of the inertia.
+    pub fn inertia_verdict(&self) -> Verdict {
+        Verdict::of(self.inertia_sd_kg_m2, INERTIA[1])
+    }
+
+    /// What it tells of the delay: nothing where the best one is at an end of those that are tried.
+    pub fn delay_verdict(&self) -> Verdict {
+        let ends_s = [*DELAYS.start(), *DELAYS.end()].map(|step| DELAY_STEP_S * f64::from(step));
+        let is_inside = ends_s[0] + DELAY_STEP_S / 2.0 < self.delay_s && self.delay_s < ends_s[1] - DELAY_STEP_S / 2.0;
+        if is_inside { Verdict::of(self.delay_sd_s, DELAY_SD_S) } else { Verdict::NotTold }
+    }
+
     /// Capacity and its standard deviation at a speed ratio, N m s^2; none below the fitted ones.
     pub fn capacity(&self, speed_ratio: f64) -> Option<[f64; 2]> {
         let after = self.knots.iter().position(|knot| knot.speed_ratio >= speed_ratio)?;
@@ -243,19 +262,21 @@ impl Solution {
         Some(Self { unknowns, residuals, weights, scale_n_m, cost })
     }
 
-    /// Standard deviations of the unknowns, the delay being unknown too: the larger of those with the correlation of the residuals in time, and of
+    /// Standard deviations of the unknowns, then that of the delay, which is unknown too: the larger of those with the correlation of the residuals in time, and of
     /// those from the scatter of blocks of a second.
-    fn deviations(&self, record: &DriveRecord, moments: &[Moment], knots: &[f64], delay_s: f64) -> Option<Vec<f64>> {
+    fn deviations(&self, moments: &[Moment], knots: &[f64]) -> Option<Vec<f64>> {
         const BLOCK: usize = 50;
-        const AROUND_S: f64 = 0.02;
-        /// Of the delay, s \[chosen\].
-        const DELAY_SD_S: f64 = 0.1;
+        /// Moments further apart are not joined by a line, s.
+        const APART_S: f64 = 0.5;
         let count = knots.len() + 1;
-        let by_delay = |moment: &Moment| {
-            let at = |by_s: f64| record.engine_torque.at(moment.time_s - delay_s + by_s);
-            (at(AROUND_S) - at(-AROUND_S)) / (2.0 * AROUND_S)
+        // The rate of the fitted torque: that of the signal has the rate of its noise, which would make the delay seem better known.
+        let torque = |i: usize| (0..count).map(|j| row(knots, &moments[i], j) * self.unknowns[j]).sum::<f64>();
+        let by_delay = |i: usize| {
+            let (before, after) = (i.saturating_sub(1), (i + 1).min(moments.len() - 1));
+            let span_s = moments[after].time_s - moments[before].time_s;
+            if (f64::MIN_POSITIVE..APART_S).contains(&span_s) { (torque(after) - torque(before)) / span_s } else { 0.0 }
         };
-        let cell = |i: usize, j: usize| if j < count { row(knots, &moments[i], j) } else { by_delay(&moments[i]) };
+        let cell = |i: usize, j: usize| if j < count { row(knots, &moments[i], j) } else { by_delay(i) };
         let rows = DMatrix::from_fn(moments.len(), count + 1, cell);
         let by_weight = weighted(&rows, &self.weights);
         let mut matrix = rows.tr_mul(&by_weight);
@@ -270,7 +291,7 @@ impl Solution {
         }
         let clustered = &inverse * scatter * &inverse;
         let inflation = self.scale_n_m.powi(2) * correlation(&self.residuals);
-        Some((0..count).map(|j| (inflation * inverse[(j, j)]).max(clustered[(j, j)]).sqrt()).collect())
+        Some((0..=count).map(|j| (inflation * inverse[(j, j)]).max(clustered[(j, j)]).sqrt()).collect())
     }
 }
 

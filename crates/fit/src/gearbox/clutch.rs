@@ -15,13 +15,14 @@ use super::shift_log::ShiftLog;
 use crate::Series;
 use crate::driving::DELAY_STEP;
 use crate::fill::FILL_DROP_PA;
+use crate::parameters::OFFSET_UNIT_PA;
 use crate::pressure::{Grid, Hydraulics, pressures};
 
 /// Steps for the derivatives by the logarithms of lag and gain, and by a kiss point in its unit.
 const LAG_STEP: f64 = 0.02;
 const GAIN_STEP: f64 = 0.02;
 const KISS_STEP: f64 = 0.02;
-/// Standard deviations of what is known of a kiss point above which a reading is beyond it.
+/// Standard deviations of what is known of a kiss point, and of an unknown zero offset, above which a reading is beyond it.
 const SURELY: f64 = 3.0;
 /// Lags of a cylinder at the end of a fast fill after which the end is forgotten: 5 % are left.
 const LAGS: f64 = 3.0;
@@ -76,8 +77,10 @@ impl ClutchModel {
         let measured = log.pressure[which].part(log.slip_s);
         let measured = match &hydraulics.cylinder {
             Some(cylinder) => {
-                let sd = quantities.place(Quantity::Kiss(shift.element)).map_or(0.0, |at| quantities.sd_before(at));
-                filled_part(&measured, kiss_pa + SURELY * KISS_UNIT_PA * sd, cylinder)
+                let sd = |quantity| quantities.place(quantity).map_or(0.0, |at| quantities.sd_before(at));
+                let [kiss, offset] = [Quantity::Kiss(shift.element), Quantity::PressureOffset(shift.element)].map(sd);
+                let sd_pa = (KISS_UNIT_PA * kiss).hypot(OFFSET_UNIT_PA * offset);
+                filled_part(&measured, kiss_pa + SURELY * sd_pa, cylinder)
             }
             None => measured,
         };
@@ -178,7 +181,11 @@ impl ClutchModel {
                 column += predicted(change);
             }
         }
-        let residuals = DVector::from_column_slice(&self.measured.value) - all;
+        let mut residuals = DVector::from_column_slice(&self.measured.value) - all;
+        if let Some(offset) = quantities.place(Quantity::PressureOffset(self.place)) {
+            residuals.add_scalar_mut(-OFFSET_UNIT_PA * at[offset]);
+            by_parameter.column_mut(offset).fill(OFFSET_UNIT_PA);
+        }
         Some(MeasuredPressure { residuals, by_parameter })
     }
 }

@@ -15,9 +15,11 @@ use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
 use super::unfitted::Unfitted;
+use super::zero_offset::{without_offsets, zero_offsets};
 use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, InputTorque, WheelFit, fit_backlash, fit_wheel};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::fitted_file::SIDES;
+use crate::parameters::OFFSET_UNIT_PA;
 use crate::pressure::Hydraulics;
 use crate::{FitError, Known, Verdict};
 
@@ -63,6 +65,9 @@ pub struct GearboxFit {
     pub(crate) commands_moved_s: Option<f64>,
     /// Places of the elements whose measured pressures contradict their commands, and are not used.
     pub(crate) contradicted: Vec<usize>,
+    /// Zero offsets of the pressure sensors of the elements, Pa, by their places, where readings at rest show them; the others are quantities of
+    /// the fit.
+    pub zero_offsets: Vec<Option<Known>>,
     /// Channels of output and engine speed against the turbine speed.
     pub channels: ChannelFits,
     /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the fitted shifts.
@@ -91,6 +96,8 @@ pub fn fit(
     let commands_late_s = commands_late_s(car, tables, shifts)?;
     let moved = commands_late_s.map(|late_s| with_commands_earlier(shifts, late_s));
     let shifts = moved.as_ref().unwrap_or(shifts);
+    let zero_offsets = zero_offsets(car, tables, shifts);
+    let shifts = &without_offsets(shifts, tables, &zero_offsets);
     let contradicted = contradicted(car, tables, shifts);
     let without = (!contradicted.is_empty()).then(|| without_pressures(shifts, tables, &contradicted));
     let shifts = without.as_deref().unwrap_or(shifts);
@@ -100,6 +107,8 @@ pub fn fit(
         if !balances.leave_out(scales) {
             fit.channels = channels;
             fit.commands_moved_s = commands_late_s;
+            fit.zero_offsets = zero_offsets;
+            contradicted.iter().for_each(|place| fit.zero_offsets[*place] = None);
             fit.contradicted = contradicted;
             return Ok(fit);
         }
@@ -164,6 +173,7 @@ fn fit_with(
         wheel: Err(String::new()),
         commands_moved_s: None,
         contradicted: Vec::new(),
+        zero_offsets: Vec::new(),
         channels: ChannelFits { output: Err(String::new()), engine: None },
         balances: balances.clone(),
         quantities,
@@ -227,11 +237,14 @@ impl GearboxFit {
             .map(|quantity: fn(usize) -> Quantity| [self.unknown(quantity(place)), self.sd(quantity(place))]);
         let kiss_pa = |more: f64| (known.clutch.kiss_pressure() + KISS_UNIT_PA * (kiss[0] + more)) * gain[0].exp();
         let hydraulics = Hydraulics::of(known).with_valve(lag[0], gain[0]);
+        let offset = Quantity::PressureOffset(place);
+        let offset_sd = self.quantities.place(offset).map_or(0.0, |_| self.sd(offset));
         let filling = Filling {
             hydraulics,
             kiss_pa: kiss_pa(0.0),
             late_s: DELAY_UNIT_S * late[0],
             sensor_scale: self.unknown(Quantity::PressureScale).exp(),
+            sensor_offset_pa: OFFSET_UNIT_PA * self.unknown(offset),
             sensor_late_s: 0.0,
         };
         let moved = [
@@ -239,8 +252,19 @@ impl GearboxFit {
             Filling { hydraulics: hydraulics.with_valve(lag[1], 0.0), ..filling },
             Filling { hydraulics: hydraulics.with_valve(0.0, gain[1]), ..filling },
             Filling { late_s: filling.late_s + DELAY_UNIT_S * late[1], ..filling },
+            Filling { sensor_offset_pa: filling.sensor_offset_pa + OFFSET_UNIT_PA * offset_sd, ..filling },
         ];
         Some(FillFit::of(&logs, &filling, &moved, &budget))
+    }
+
+    /// Zero offset of the pressure sensor of an element, Pa; none where its pressure is not measured or contradicts its commands.
+    pub fn zero_offset_pa(&self, place: usize) -> Option<Known> {
+        let offset = Quantity::PressureOffset(place);
+        let by_fit = self.quantities.place(offset).map(|at| {
+            let pa = [self.unknowns[at], self.sd(offset), self.quantities.sd_before(at)].map(|x| OFFSET_UNIT_PA * x);
+            Known { value: pa[0], sd: pa[1], before: pa[2] }
+        });
+        by_fit.or(self.zero_offsets.get(place).copied().flatten().filter(|_| self.quantities.measured[place]))
     }
 
     /// The unknown of a quantity; zero, the file's value, for one that the car does not have.
@@ -254,12 +278,18 @@ impl GearboxFit {
     }
 
     /// By how much all commands of the logs are late, s, where it is so much that the fit has moved them: with the mean of the delays that it has found besides.
-    pub fn commands_late_s(&self) -> Option<f64> {
+    pub fn commands_late_s(&self) -> Option<Known> {
         let seen = (0..self.elements_seen.len()).filter(|at| self.elements_seen[*at]).map(Quantity::Delay);
-        let weights = seen.map(|delay| (DELAY_UNIT_S * self.unknown(delay), self.sd(delay).powi(-2)));
-        let (sum, weight) =
-            weights.fold((0.0, 0.0), |(sum, all), (late_s, weight)| (sum + weight * late_s, all + weight));
-        self.commands_moved_s.map(|moved_s| moved_s + sum / weight)
+        let places: Vec<usize> = seen.filter_map(|delay| self.quantities.place(delay)).collect();
+        let mut along = DVector::zeros(self.unknowns.len());
+        places.iter().for_each(|place| along[*place] = self.stated[(*place, *place)].recip());
+        let sum = along.sum();
+        along /= sum;
+        let mean: f64 = places.iter().map(|place| along[*place] * self.unknowns[*place]).sum();
+        let sd = |covariance: &DMatrix<f64>| DELAY_UNIT_S * along.dot(&(covariance * &along)).max(0.0).sqrt();
+        let moved_s = self.commands_moved_s.filter(|_| sum > 0.0)?;
+        let value = moved_s + DELAY_UNIT_S * mean;
+        Some(Known { value, sd: sd(&self.stated), before: sd(&self.quantities.before) })
     }
 
     /// By how much the engine speed is late against the turbine speed in front of a converter, s.

@@ -27,6 +27,7 @@ mod shift_log;
 mod solver;
 mod unfitted;
 mod validation;
+mod zero_offset;
 
 pub use crate::driving::Driving;
 pub use channels::ChannelFits;

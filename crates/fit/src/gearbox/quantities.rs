@@ -6,7 +6,10 @@ use nalgebra::DMatrix;
 use observer::any_shift::AnyShiftFilter;
 
 use super::shift_log::{ShiftLog, named_pair};
+use super::zero_offset::{sd_before_pa, zero_offsets};
 use crate::driving::{AIR, DRAG_UNIT_N_M, ROLLING, Term, WIND, rolling_floor};
+use crate::intervals::OFFSET_FLOOR_PA;
+use crate::parameters::OFFSET_UNIT_PA;
 
 /// Unit of the unknown of a delay, s.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
@@ -57,6 +60,8 @@ pub enum Quantity {
     Inertia(usize),
     /// Scale of the pressure sensor.
     PressureScale,
+    /// Zero offset of the pressure sensor of an element, where no reading shows it alone.
+    PressureOffset(usize),
     /// Mass of the car.
     Mass,
     /// Rolling resistance.
@@ -73,7 +78,7 @@ pub enum Quantity {
 
 /// The quantities of a car, in the order of the unknowns.
 ///
-/// The unknown of a factor is its logarithm; that of a delay is in 10 ms, that of a kiss point in 10 kPa, both beside the file's.
+/// The unknown of a factor is its logarithm; that of a delay is in 10 ms, that of a kiss point and of a zero offset in 10 kPa, beside the file's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantities {
     /// All of them.
@@ -111,6 +116,9 @@ impl Quantities {
         if measured.contains(&true) {
             all.push(Quantity::PressureScale);
         }
+        let offsets = zero_offsets(car, tables, shifts);
+        let is_open = |at: &usize| measured[*at] && offsets[*at].is_none();
+        all.extend((0..measured.len()).filter(is_open).map(Quantity::PressureOffset));
         let of_balances = [
             [Quantity::Mass, Quantity::Rolling, Quantity::Air],
             [Quantity::ReportedScale, Quantity::ReportedDelay, Quantity::EngineInertia],
@@ -183,6 +191,7 @@ impl Quantities {
             Quantity::Torque(at) => format!("{}: friction x valve gain", element(at)),
             Quantity::Gain(at) => format!("{}: valve gain", element(at)),
             Quantity::PressureScale => "pressure sensor, scale".to_owned(),
+            Quantity::PressureOffset(at) => self.offset_name(at),
             Quantity::Mass => "mass".to_owned(),
             Quantity::Rolling => "rolling resistance".to_owned(),
             Quantity::Air => "air drag".to_owned(),
@@ -195,6 +204,11 @@ impl Quantities {
                 format!("M11 of {}", self.pair_names.get(at).map_or("?", String::as_str))
             }
         }
+    }
+
+    /// Words for the zero offset of the pressure sensor of an element.
+    pub(crate) fn offset_name(&self, at: usize) -> String {
+        format!("{}: pressure sensor, zero offset", self.elements.get(at).map_or("?", String::as_str))
     }
 
     /// Standard deviation of an unknown before the fit.
@@ -240,6 +254,7 @@ impl Known<'_> {
             Quantity::Kiss(at) => (known.kiss_point_pa / KISS_UNIT_PA).hypot(self.kiss_by_gain(at)),
             Quantity::Gain(_) => known.valve_gain,
             Quantity::PressureScale => PRESSURE_SCALE,
+            Quantity::PressureOffset(_) => sd_before_pa() / OFFSET_UNIT_PA,
             Quantity::Lag(_) => known.valve_lag_share,
             Quantity::Inertia(_) => known.inertia_share,
             Quantity::Mass => deviation_of(self.mass_share),
@@ -344,6 +359,7 @@ impl Quantity {
             Self::EngineInertia => 0.03,
             Self::Air => WIND,
             Self::PressureScale => 1e-3,
+            Self::PressureOffset(_) => OFFSET_FLOOR_PA / OFFSET_UNIT_PA,
             _ => 0.005,
         }
     }

@@ -73,6 +73,8 @@ pub struct Recorder<'a> {
     commands: [Series; MAX_ELEMENTS],
     /// Of the shift that is open.
     pressure: [Series; 2],
+    /// Of each element, whatever it does.
+    pressures: [Series; MAX_ELEMENTS],
     driving: DrivingRecorder,
     /// Longest time in which a piston of the car goes back, s; zero where none has a stroke.
     emptied_s: f64,
@@ -97,6 +99,7 @@ impl<'a> Recorder<'a> {
             engine_torque: none(),
             commands: std::array::from_fn(|_| none()),
             pressure: [none(), none()],
+            pressures: std::array::from_fn(|_| none()),
             driving: DrivingRecorder::new(DrivenCar::with_gearbox(car, tables, &|_, _| None)),
             emptied_s: emptied_s(car),
             reported: None,
@@ -145,6 +148,16 @@ impl<'a> Recorder<'a> {
                 if reading.value.is_finite() {
                     series.push(time_s - reading.age_s, reading.value);
                 }
+            }
+        }
+    }
+
+    /// Takes measured pressures of the elements by their places in the tables, Pa, where there are any: with those from before and after a shift,
+    /// in which a valve rests, the zero offset of the sensor is found.
+    pub fn push_element_pressures(&mut self, time_s: f64, pressures_pa: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
+        for (series, reading) in self.pressures.iter_mut().zip(pressures_pa) {
+            if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
+                series.push(time_s - reading.age_s, reading.value);
             }
         }
     }
@@ -209,7 +222,7 @@ impl<'a> Recorder<'a> {
         }
         let before_s = self.before_s();
         let speeds = [&mut self.engine, &mut self.turbine, &mut self.output, &mut self.engine_torque];
-        for series in speeds.into_iter().chain(&mut self.commands) {
+        for series in speeds.into_iter().chain(&mut self.commands).chain(&mut self.pressures) {
             *series = series.part([time_s - before_s, f64::INFINITY]);
         }
     }
@@ -271,6 +284,10 @@ impl<'a> Recorder<'a> {
             let all = self.commands.get(clutch.element);
             all.map(|all| all.part([open.begun_s - self.before_s(), span[1]])).unwrap_or_default()
         });
+        let pressure = [0, 1].map(|which| {
+            let all = self.pressures.get(row.clutches[which].element);
+            with_rest(&self.pressure[which], all, [open.begun_s - AFTER_S, span[1]])
+        });
         Ok(ShiftLog {
             name: name.to_owned(),
             gears: open.gears,
@@ -280,11 +297,21 @@ impl<'a> Recorder<'a> {
             output: self.output.part(span),
             engine_torque: self.engine_torque.part(span),
             commands,
-            pressure: self.pressure.clone(),
+            pressure,
             slip_s: [f64::NAN; 2],
             lock_up: open.lock_up,
         })
     }
+}
+
+/// The pressure of a clutch in a shift, with the readings of its element around it where they are of the same sensor.
+fn with_rest(in_shift: &Series, element: Option<&Series>, span_s: [f64; 2]) -> Series {
+    let around =
+        element.zip(in_shift.time_s.first().zip(in_shift.time_s.last())).and_then(|(element, (from_s, to_s))| {
+            let is_same = element.part([*from_s, *to_s]).value == in_shift.value;
+            is_same.then(|| element.part(span_s))
+        });
+    around.unwrap_or_else(|| in_shift.clone())
 }
 
 /// Longest time in which a piston of a car goes back to its stop under no pressure of its valve, s.

@@ -8,8 +8,8 @@ use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
 use crate::driving::{Balance, DRAG_UNIT_N_M, LEAST_DELAY_S, said_of_delay};
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
-use crate::report::{MEAN_GRADE, cautions, fill_row};
-use crate::{BacklashFit, ReportRow, Verdict, WheelFit, correlated};
+use crate::report::{MEAN_GRADE, cautions, fill_row, offset_row, said_of_offset};
+use crate::{BacklashFit, Known, ReportRow, Verdict, WheelFit, correlated};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
@@ -24,8 +24,10 @@ impl GearboxFit {
     /// The table: each quantity of which a fitted shift can tell something.
     pub fn report(&self) -> Vec<ReportRow> {
         let all = self.quantities.all.iter().enumerate();
-        all.filter(|(_, quantity)| self.is_seen(**quantity))
+        // Zero offsets have rows of their own, wherever they come from.
+        all.filter(|(_, quantity)| self.is_seen(**quantity) && !matches!(quantity, Quantity::PressureOffset(_)))
             .map(|(place, quantity)| self.row(place, *quantity))
+            .chain(self.offset_rows())
             .chain(self.seen_fills().map(|(name, fill)| fill_row(&format!("{name}: fill volume"), fill)))
             .collect()
     }
@@ -34,6 +36,15 @@ impl GearboxFit {
     fn seen_fills(&self) -> impl Iterator<Item = (&str, &FillFit)> {
         let all = self.quantities.elements.iter().zip(&self.fills).zip(&self.elements_seen);
         all.filter(|(_, seen)| **seen).filter_map(|((name, fill), _)| Some((name.as_str(), fill.as_ref()?)))
+    }
+
+    /// The zero offsets of the pressure sensors, with their places.
+    fn offsets(&self) -> impl Iterator<Item = (usize, Known)> + '_ {
+        (0..self.quantities.elements.len()).filter_map(|at| Some((at, self.zero_offset_pa(at)?)))
+    }
+
+    fn offset_rows(&self) -> impl Iterator<Item = ReportRow> + '_ {
+        self.offsets().map(|(at, offset)| offset_row(self.quantities.offset_name(at), offset))
     }
 
     fn row(&self, place: usize, quantity: Quantity) -> ReportRow {
@@ -97,6 +108,10 @@ impl GearboxFit {
         lines.push(BacklashFit::statement(&self.backlash));
         lines.extend(self.said_of_channels());
         lines.extend(WheelFit::statements(&self.wheel));
+        lines.extend(self.offsets().filter_map(|(at, Known { value, sd, .. })| {
+            let ends_pa = [value - SIDES * sd, value, value + SIDES * sd];
+            said_of_offset(&format!("the pressure of {}", self.quantities.elements[at]), ends_pa)
+        }));
         lines.extend(self.given_is_possible().then(|| {
             "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
         }));
@@ -194,7 +209,15 @@ impl GearboxFit {
     fn given_is_possible(&self) -> bool {
         use Quantity as Q;
         let is_of_signals = |quantity| {
-            matches!(quantity, Q::InputDelay | Q::EngineDelay | Q::PressureScale | Q::ReportedDelay | Q::ReportedScale)
+            matches!(
+                quantity,
+                Q::InputDelay
+                    | Q::EngineDelay
+                    | Q::PressureScale
+                    | Q::PressureOffset(_)
+                    | Q::ReportedDelay
+                    | Q::ReportedScale
+            )
         };
         let is_of_car = |quantity| !matches!(quantity, Q::Drag(_)) && !is_of_signals(quantity);
         let seen = || self.quantities.all.iter().copied().filter(|quantity| self.is_seen(*quantity));
@@ -208,7 +231,9 @@ impl GearboxFit {
 
     /// What is said of inertias that stay those of the file.
     fn said_of_kept(&self) -> Option<String> {
-        let name = |(pair, x): &(usize, f64)| format!("{} (x {:.2})", self.quantities.pair_names[*pair], x.exp());
+        let name = |(pair, x): &(usize, f64)| {
+            format!("{} (x {:.2}, not identifiable)", self.quantities.pair_names[*pair], x.exp())
+        };
         let kept: Vec<String> = self.drawn_off.iter().map(name).collect();
         (!kept.is_empty()).then(|| {
             format!(

@@ -38,7 +38,8 @@ pub struct ShiftLog {
     pub engine_torque: Series,
     /// Commands of the offgoing and of the oncoming element, A or %.
     pub commands: [Series; 2],
-    /// Measured pressure of the offgoing and of the oncoming element, Pa, where the log has it.
+    /// Measured pressure of the offgoing and of the oncoming element, Pa, where the log has it; that of an element from before and after the shift
+    /// too.
     pub pressure: [Series; 2],
     /// When both clutches slip, s; found from the readings.
     pub slip_s: [f64; 2],

@@ -35,6 +35,14 @@ const LEAST_SCALE: f64 = 1.0 / 3.0;
 const MOST_SCALE: f64 = 3.0;
 
 impl HeldOut {
+    /// Interval of the scale of the valve errors that holds it in 95 %: of a mean of as many squares as there are shifts, those before included.
+    pub fn valve_error_interval(&self) -> [f64; 2] {
+        let count = self.shifts as f64 + SHIFTS_BEFORE;
+        // The logarithm of the root of a mean of n squares has a deviation of 1/sqrt(2 n).
+        let half = 1.96 / (2.0 * count).sqrt();
+        [-half, half].map(|side| (self.valve_error_scale * side.exp()).clamp(LEAST_SCALE, MOST_SCALE))
+    }
+
     /// What the scale of the valve errors says of itself in a file.
     pub(super) fn comment(&self) -> String {
         format!(

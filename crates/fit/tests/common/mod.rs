@@ -201,6 +201,7 @@ impl TestCar {
         let mut more = Draw::new(!seed);
         let pressure_late_s = more.between(0.0, 0.01);
         truth.push((Parameter::PressureDelay, pressure_late_s / 0.01));
+        truth.push((Parameter::PressureOffset, 0.0));
         let mut fill = 1.0;
         if file.oncoming.has_stroke {
             fill = draw_fill(&mut car.oncoming, &mut more);

@@ -169,9 +169,10 @@ fn commands_that_are_stored_late_or_early_are_noticed_and_the_given_values_are_k
         (-0.1, ["too early against the speeds: add ", " to `late_s` of the channel of each command"]),
     ] {
         let late = found(commands_s);
-        let late_s = late.commands_late_s().unwrap();
-        assert!((late_s - commands_s).abs() < 0.01, "{late_s}");
-        let words = format!("about {:.0} ms {}{:.3}{}", 1e3 * late_s.abs(), words[0], late_s, words[1]);
+        let Known { value: late_s, sd, .. } = late.commands_late_s().unwrap();
+        assert!((late_s - commands_s).abs() < 0.01_f64.min(3.0 * sd) && sd < 0.01, "{late_s} {sd}");
+        let [size_ms, half_ms] = [late_s.abs(), 2.0 * sd].map(|time_s| 1e3 * time_s);
+        let words = format!("are {size_ms:.0} +- {half_ms:.0} ms {}{late_s:.3}{}", words[0], words[1]);
         assert!(late.statements().iter().any(|line| line.starts_with("warning: ") && line.contains(&words)), "{words}");
         assert!(late.reason_against(None).is_some_and(|reason| reason.contains(&words)));
         // The values are those of commands in time.

@@ -308,7 +308,7 @@ impl Drawn {
             Quantity::Input if self.file.converter.is_some() => self.draw.converter.ln(),
             Quantity::Input | Quantity::TorqueRatio | Quantity::Delay(_) => 0.0,
             Quantity::Lag(place) => self.draw.timing[element(place)].map_or(0.0, |timing| timing.lag.ln()),
-            Quantity::InputDelay | Quantity::PressureScale => 0.0,
+            Quantity::InputDelay | Quantity::PressureScale | Quantity::PressureOffset(_) => 0.0,
             Quantity::EngineDelay => self.channels.late_s[0] / 0.01,
             Quantity::Mass => self.vehicle[0].ln(),
             Quantity::Rolling => self.vehicle[1].ln(),
@@ -445,7 +445,11 @@ impl Truth {
         for log in shifts {
             let row = rows.shift(log.gears[0], log.gears[1]).unwrap();
             let Some(clutch) = row.clutches.iter().position(|clutch| clutch.element == place) else { continue };
-            // A sensor is read during the whole command, as a recorder takes it.
+            // A sensor is read from half a second before the command on, as a recorder takes it; until then the oncoming element is empty.
+            for i in (1..=50).rev().filter(|_| clutch == 1) {
+                let noise_pa = SENSOR_PA * (f64::from(i % 3) - 1.0);
+                log.pressure[clutch].push(log.command_s[0] - 0.01 * f64::from(i), noise_pa);
+            }
             let during = log.turbine.between([log.command_s[0], log.command_s[1]]);
             for (time_s, _) in during.collect::<Vec<_>>() {
                 let noise_pa = SENSOR_PA * (2.0 * random.uniform() - 1.0);

@@ -1,10 +1,12 @@
 //! What is between a command and the plates: pistons with a stroke, and valves with a hysteresis.
 
 use config::Car;
-use fit::ReadingAges;
-use fit::gearbox::{GearboxFit, Quantity, Recorder, open_loop};
+use fit::gearbox::{GearboxFit, Quantity, Recorded, Recorder, ShiftLog, open_loop};
+use fit::{ReadingAges, Series};
+use observer::Reading;
+use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
 
-use crate::drawn::{self, Case, Drawn, car, city, every_fifth, hilly};
+use crate::drawn::{self, Case, Drawn, Truth, car, city, every_fifth, hilly};
 use crate::{fitted, rows};
 
 /// The quantities of the elements that lie outside of their intervals, with errors in deviations.
@@ -153,4 +155,89 @@ fn a_pressure_in_another_unit_tells_nothing_of_a_piston_with_a_stroke() {
         let moved = (fit.unknown(quantity) - without.unknown(quantity)) / without.sd(quantity);
         assert!(moved.abs() < 0.5, "{quantity:?}: {moved}");
     }
+}
+
+/// The place of element C in the tables.
+fn place_of_c(drawn: &Drawn) -> usize {
+    let at = drawn.file.gearbox.elements.iter().position(|element| element.name == "C").unwrap();
+    drawn.tables().place(at).unwrap()
+}
+
+/// The shifts with the pressure of an element by a sensor with a zero offset: with what it reads before, or while both clutches slip alone.
+fn measured_with_offset(drawn: &Drawn, driven: &(Recorded, Truth), offset_pa: f64, from_rest: bool) -> Vec<ShiftLog> {
+    let (recorded, truth) = driven;
+    let (tables, place) = (drawn.tables(), place_of_c(drawn));
+    let mut shifts = recorded.shifts.clone();
+    truth.measure(&mut shifts, &tables, place, 1);
+    for log in &mut shifts {
+        let span_s = if from_rest { [0.0, f64::INFINITY] } else { log.slip_s };
+        for pressure in &mut log.pressure {
+            let mut read = Series::default();
+            pressure.between(span_s).for_each(|(time_s, pa)| read.push(time_s, pa + offset_pa));
+            *pressure = read;
+        }
+    }
+    shifts
+}
+
+#[test]
+fn the_zero_offset_of_a_pressure_sensor_is_not_taken_for_the_gain_of_its_valve() {
+    for (name, seed) in [("eight_speed.toml", 11), ("eight_speed_stroke.toml", 2)] {
+        let drawn = Drawn::of(car(name), seed, Case::Usual);
+        let driven = drawn.driven(&hilly(&city(2), seed));
+        let (tables, place) = (drawn.tables(), place_of_c(&drawn));
+        let gain = Quantity::Gain(place);
+        for from_rest in [true, false] {
+            let fit_with =
+                |offset_pa: f64| fitted(&drawn, &measured_with_offset(&drawn, &driven, offset_pa, from_rest));
+            let right = fit_with(0.0);
+            let truth = drawn.true_unknown(&tables, &right.quantities, gain);
+            let sd = right.sd(gain);
+            let case = format!("{name}, from rest {from_rest}");
+            assert!((right.unknown(gain) - truth).abs() < 2.0 * sd, "{case}: {} {truth} {sd}", right.unknown(gain));
+            // With readings at rest it is known as well as without any offset.
+            assert!(!from_rest || sd < 0.02, "{case}: {sd}");
+            for offset_pa in [-20e3, 10e3, 30e3] {
+                let fit = fit_with(offset_pa);
+                // The prior mean of no offset pulls where no reading is at rest: less than a quarter of what is stated.
+                let moved = (fit.unknown(gain) - right.unknown(gain)) / sd;
+                assert!(moved.abs() < if from_rest { 1e-3 } else { 0.25 }, "{case} {offset_pa}: {moved}");
+                let found = fit.zero_offset_pa(place).unwrap();
+                assert!((found.value - offset_pa).abs() < 2.0 * found.sd, "{case} {offset_pa}: {found:?}");
+                let row = fit.report().into_iter().find(|row| row.name == "C: pressure sensor, zero offset").unwrap();
+                assert!(row.value.ends_with(" kPa") && row.interval.contains(" to "), "{row:?}");
+                let said = fit.statements().join("\n");
+                assert!(said.contains("the pressure of C reads ") || found.value.abs() < 2.0 * found.sd, "{said}");
+            }
+        }
+    }
+}
+
+/// The sensor of an element is read all the time: what it reads before a shift is its zero offset.
+#[test]
+fn readings_of_an_element_around_a_shift_show_the_zero_offset_of_its_sensor() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 11, Case::Usual);
+    let (tables, place) = (drawn.tables(), place_of_c(&drawn));
+    let mut recorder = Recorder::new(&drawn.file, &tables, ReadingAges::of(&drawn::sensors()));
+    let is_of_c = |input: &ShiftInput<f64>| {
+        let row = tables.tables().shift(input.gear.from, input.gear.to).copied();
+        row.and_then(|row| row.clutches.iter().position(|clutch| clutch.element == place))
+    };
+    for (time_s, input) in rows(&drawn, 1) {
+        recorder.push(time_s, &input);
+        // What a clutch holds in a gear, and nothing where its valve has no current.
+        let command = input.commands[place].map_or(0.0, |reading| reading.value);
+        let reading = Reading { value: 12e3 + 1e6 * command, age_s: 0.0 };
+        recorder.push_pressure(time_s, [0, 1].map(|which| Some(reading).filter(|_| is_of_c(&input) == Some(which))));
+        let mut pressures = [None; MAX_ELEMENTS];
+        pressures[place] = Some(reading);
+        recorder.push_element_pressures(time_s, &pressures);
+    }
+    let shifts = recorder.finish().shifts;
+    let of_c: Vec<&Series> = shifts.iter().flat_map(|log| &log.pressure).filter(|series| !series.is_empty()).collect();
+    assert!(of_c.len() > 4);
+    assert!(shifts.iter().all(|log| log.pressure.iter().all(|p| p.is_empty() || p.time_s[0] < log.command_s[0])));
+    let fit = fitted(&drawn, &shifts);
+    let found = fit.zero_offset_pa(place);
+    assert!(found.is_some_and(|found| (found.value - 12e3).abs() < 2.0 * found.sd && found.sd < 1.5e3), "{found:?}");
 }

@@ -53,6 +53,10 @@ pub struct ShiftQuality {
     /// Turbine speed above that of the old gear before an upshift's inertia phase, or above that of the new gear after a
     /// downshift's, rad/s; not below zero.
     pub flare_rad_s: Option<f64>,
+    /// Half of the interval of 95 % of the flare, rad/s.
+    pub flare_half_rad_s: Option<f64>,
+    /// The same of begin and end of the inertia phase, s.
+    pub inertia_half_s: Option<f64>,
     /// Jerk of the car, m/s^3, as [`drivetrain::jerk`] defines it.
     pub jerk_m_s3: Option<f64>,
 }

@@ -44,7 +44,50 @@ pub(super) fn quality(
     points: &RatioWatch,
     output_rad_per_m: Option<f64>,
 ) -> ShiftQuality {
-    ShiftQuality { flare_rad_s: flare(shift, ratios, points), jerk_m_s3: jerk(shift, tracks, output_rad_per_m) }
+    let [inertia_half_s, flare_half_rad_s] = halves(shift, points);
+    let flare_rad_s = flare(shift, ratios, points);
+    ShiftQuality {
+        flare_rad_s,
+        flare_half_rad_s: flare_half_rad_s.filter(|_| flare_rad_s.is_some()),
+        inertia_half_s,
+        jerk_m_s3: jerk(shift, tracks, output_rad_per_m),
+    }
+}
+
+/// Half of the intervals of 95 % of the times of the inertia phase, s, and of the flare, rad/s: by the scatter of the ratio before and after the
+/// inertia phase, and by the time between its points. None where too few points show the scatter.
+fn halves(shift: &Shift, points: &RatioWatch) -> [Option<f64>; 2] {
+    /// Points are looked at for so long before and after, s, but for so long next to the inertia phase.
+    const LOOK_S: f64 = 0.5;
+    const NEXT_S: f64 = 0.05;
+    /// Fewest points of one side.
+    const POINTS: usize = 5;
+    /// Part of the way of the ratio within the inertia phase.
+    const WAY: f64 = 0.9;
+    const SIDES: f64 = 1.96;
+    let Some([begin_s, end_s]) = shift.inertia_s else { return [None; 2] };
+    let spans = [[begin_s - LOOK_S, begin_s - NEXT_S], [end_s + NEXT_S, end_s + LOOK_S]];
+    let (mut variance, mut logs, mut output, mut step_s) = (f64::INFINITY, [0.0; 2], 0.0_f64, 0.0_f64);
+    for ([from_s, to_s], log) in spans.into_iter().zip(&mut logs) {
+        let found: Vec<(f64, f64)> =
+            points.between(from_s, to_s).map(|point| (point.time_s, point.ratio.ln())).collect();
+        if found.len() < POINTS {
+            return [None; 2];
+        }
+        let number = found.len() as f64;
+        let mean = found.iter().map(|(_, log)| log).sum::<f64>() / number;
+        // A flare on one side is no scatter.
+        let squares = found.iter().map(|(_, log)| (log - mean).powi(2)).sum::<f64>();
+        variance = variance.min(squares / (number - 1.0));
+        *log = mean;
+        output = points.between(from_s, to_s).map(|point| point.output_rad_s).fold(output, f64::max);
+        step_s = step_s.max((found[found.len() - 1].0 - found[0].0) / (number - 1.0));
+    }
+    let scatter = variance.sqrt();
+    let rate = WAY * (logs[1] - logs[0]).abs() / (end_s - begin_s);
+    let time_s = SIDES * (scatter / rate).hypot(step_s / 12.0_f64.sqrt());
+    let flare = SIDES * scatter * logs[0].max(logs[1]).exp() * output;
+    [time_s, flare].map(|half| Some(half).filter(|half| half.is_finite()))
 }
 
 fn flare(shift: &Shift, ratios: &[f64], points: &RatioWatch) -> Option<f64> {

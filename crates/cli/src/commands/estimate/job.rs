@@ -62,7 +62,7 @@ pub(super) fn estimate(
     let shifts = shifts.earlier_by(findings.origin_s());
     let sentences = findings.sentences();
     sentences.iter().for_each(|sentence| say.note(sentence));
-    report_shifts(&shifts, say);
+    report_shifts(&shifts, output.is_some(), say)?;
     if options.sensors.is_none() {
         say.note(WITHOUT_SENSORS);
     }
@@ -225,21 +225,18 @@ impl Rows<'_> {
     }
 }
 
-/// The shifts as a table, if there are any.
-fn report_shifts(shifts: &Shifts<'_>, say: &mut Messages) {
+/// The shifts as a table, if there are any; `has_file` says whether standard output is free for it.
+fn report_shifts(shifts: &Shifts<'_>, has_file: bool, say: &mut Messages) -> Result<(), Failure> {
     if shifts.found.is_empty() {
-        return;
+        return Ok(());
     }
     /// Rows that a terminal shows.
     const SHOWN: usize = 40;
     let (titles, rows) = shift_rows(&shifts.found, SHOWN);
     let more = shifts.found.len() - rows.len();
-    for line in output::titled_lines(3, &titles, &rows) {
-        say.note(&line);
-    }
-    if more > 0 {
-        say.note(&format!("and {more} more shifts"));
-    }
+    let mut lines = output::titled_lines(3, &titles, &rows);
+    lines.extend((more > 0).then(|| format!("and {more} more shifts")));
+    say.table(&lines, has_file)?;
     let others = || shifts.found.iter().filter(|shift| !shift.of_vehicle);
     if let Some(first) = others().next() {
         say.note(&format!(
@@ -256,4 +253,5 @@ fn report_shifts(shifts: &Shifts<'_>, say: &mut Messages) {
              the kiss point\nhint: check unit and scale of the command, and whether it is that of the oncoming clutch"
         )),
     }
+    Ok(())
 }

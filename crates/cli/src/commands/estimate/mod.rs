@@ -24,7 +24,7 @@ use trace::ShownPath as _;
 
 use self::earlier::replaces_only_estimates;
 use crate::args::{Estimate, FormatChoice};
-use crate::commands::{channel_map_of_car, check_output, not_an_input};
+use crate::commands::{channel_map_of_car, check_output, not_an_input, warn_of_mapping};
 use crate::failure::Failure;
 use crate::output;
 use crate::signals::stop_then_end;
@@ -42,7 +42,16 @@ struct Setup<'a> {
 
 /// Messages of one log: shown as they come, or together when it is done.
 pub(super) struct Messages {
-    held: Option<Vec<String>>,
+    held: Option<Held>,
+}
+
+/// What is shown when a log is done.
+#[derive(Default)]
+struct Held {
+    /// On standard error.
+    notes: Vec<String>,
+    /// On standard output.
+    lines: Vec<String>,
 }
 
 impl Messages {
@@ -54,8 +63,28 @@ impl Messages {
     fn note(&mut self, message: &str) {
         match &mut self.held {
             None => output::note(message),
-            Some(held) => held.push(message.to_owned()),
+            Some(held) => held.notes.push(message.to_owned()),
         }
+    }
+
+    /// Lines of a table: on standard output where the estimates go into a file, else a message.
+    fn table(&mut self, lines: &[String], has_file: bool) -> Result<(), Failure> {
+        match &mut self.held {
+            _ if !has_file => lines.iter().for_each(|line| self.note(line)),
+            None => lines.iter().try_for_each(|line| output::line(line))?,
+            Some(held) => held.lines.extend_from_slice(lines),
+        }
+        Ok(())
+    }
+
+    /// Shows what was held, of the log with this name.
+    fn show(self, log: &Path) -> Result<(), Failure> {
+        let Held { notes, lines } = self.held.unwrap_or_default();
+        output::note(&format!("log: {}\n{}\n", log.display(), notes.join("\n")));
+        if !lines.is_empty() {
+            output::line(&format!("{}:\n{}\n", log.display(), lines.join("\n")))?;
+        }
+        Ok(())
     }
 }
 
@@ -67,6 +96,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
             format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.shown());
         return Err(Failure::Input(message));
     }
+    warn_of_mapping(&options.mapping, &options.logs);
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
         any_car::check_options(options)?;
         let prepare = || any_car::CarSetup::new(options);
@@ -173,10 +203,9 @@ fn several<S: Sync>(
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let (Some(log), Some(output)) = (logs.get(at), outputs.get(at)) else { return };
-            let mut messages = Messages { held: Some(vec![format!("log: {}", log.shown())]) };
+            let mut messages = Messages { held: Some(Held::default()) };
             let result = estimate(&setup, log, Some(output), &mut messages);
-            output::note(&(messages.held.unwrap_or_default().join("\n") + "\n"));
-            if let Err(failure) = result {
+            if let Err(failure) = result.and(messages.show(log)) {
                 output::error(&failure.to_string());
                 failures.lock().unwrap_or_else(PoisonError::into_inner).push((at, failure));
             }

@@ -113,6 +113,7 @@ fn record_one(
         recorder.push_reported(step.reported_n_m);
         recorder.push(step.time_s, &step.input);
         recorder.push_pressure(step.time_s, step.shift_pressures(tables));
+        recorder.push_element_pressures(step.time_s, &step.pressures);
         count += 1;
         if count.is_multiple_of(STEPS) {
             bar.set_message(format!("reading {}, {:.0} s", log.shown(), step.time_s));
@@ -152,10 +153,11 @@ fn said_of(checked: &HeldOut) -> String {
     const GOOD_VALVES: f64 = 0.7;
     let [given, fitted] = checked.turbine_rad_s;
     let scale = checked.valve_error_scale;
+    let [low, high] = checked.valve_error_interval();
     let mut text = format!(
         "{} shifts held out: turbine speed while both clutches slip, by the torques of the given file off by {given:.2} rad/s, of the fitted one \
          by {fitted:.2} rad/s; the fitted file is the better one in {}\n\
-         with this file the torques of these shifts by the valves alone err by {scale:.2} of what its error bounds say of friction and valves; `estimate` \
+         with this file the torques of these shifts by the valves alone err by {scale:.2} (95 % {low:.2} to {high:.2}) of what its error bounds say of friction and valves; `estimate` \
          trusts the valves by as much (`error_bounds.valve_error_scale`)",
         checked.shifts, checked.better
     );

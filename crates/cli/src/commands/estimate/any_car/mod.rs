@@ -146,7 +146,7 @@ pub(super) fn estimate(
     }
     drive = drive.earlier_by(origin_s);
     drive.warnings.splice(0..0, said_of_origin(origin_s));
-    report(&drive, car, say);
+    report(&drive, car, output.is_some(), say)?;
     if setup.sensors.is_none() && !car.gearbox.has_ratios_alone() {
         say.note(WITHOUT_SENSORS);
     }
@@ -222,18 +222,18 @@ fn write_page(
     Ok(())
 }
 
-/// The shifts as a table, and what was found.
-fn report(drive: &ScoredDrive, car: &Car, say: &mut Messages) {
+/// The shifts as a table, and what was found; `has_file` says whether standard output is free for the table.
+fn report(drive: &ScoredDrive, car: &Car, has_file: bool, say: &mut Messages) -> Result<(), Failure> {
     let (titles, mut rows) = shift_rows(drive, car);
     let more = rows.len().saturating_sub(SHOWN);
     rows.truncate(SHOWN);
     let titles: Vec<String> = titles.into_iter().map(str::to_owned).collect();
     if !rows.is_empty() {
-        output::titled_lines(3, &titles, &rows).iter().for_each(|line| say.note(line));
-    }
-    if more > 0 {
-        say.note(&format!("and {more} more shifts"));
+        let mut lines = output::titled_lines(3, &titles, &rows);
+        lines.extend((more > 0).then(|| format!("and {more} more shifts")));
+        say.table(&lines, has_file)?;
     }
     shift_words(drive, car).iter().for_each(|(word, meaning)| say.note(&format!("{word}: {meaning}")));
     findings(drive).iter().for_each(|sentence| say.note(sentence));
+    Ok(())
 }
