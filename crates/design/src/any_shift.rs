@@ -234,6 +234,7 @@ pub fn any_shift_filter<'a>(
         limits: InputLimits {
             speed_max_rad_s: SPEED_MOST_RAD_S,
             command_max: 1.2 * command_max(car, errors),
+            command_error: 0.0,
             pressure_max_pa: pressure_max_pa(car, errors),
             shaft_torque_max_n_m: 3.0 * shaft_n_m(car),
         },

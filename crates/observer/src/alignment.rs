@@ -127,11 +127,13 @@ impl<T: Real> Alignment<'_, T> {
         let standing = state.command.map(|last| Reading { age_s: last.age_s + dt_s, ..last });
         state.command = standing.filter(|last| last.age_s <= T::of(LOST_S));
         let command = match input.command {
-            Some(reading) if limits.command_valid(reading.value) => {
-                state.command = Some(reading);
-                ChannelHealth::Good
-            }
-            Some(_) => ChannelHealth::Refused,
+            Some(reading) => match limits.possible_command(reading.value) {
+                Some(value) => {
+                    state.command = Some(Reading { value, ..reading });
+                    ChannelHealth::Good
+                }
+                None => ChannelHealth::Refused,
+            },
             None if state.command.is_some() => ChannelHealth::Absent,
             None => ChannelHealth::Lost,
         };
@@ -165,8 +167,13 @@ fn step_observer<T: Real, O: SampleEstimator<T>>(
     state: &mut O::SampleState,
     aligned: &Aligned<T>,
 ) -> Estimate<T> {
-    let mut estimate = observer.step_sample(state, &aligned.sample);
-    estimate.channels = aligned.channels;
+    let Aligned { mut sample, mut channels } = *aligned;
+    if channels.engine == ChannelHealth::Lost && !observer.needs_engine() {
+        sample.engine_rad_s = sample.turbine_rad_s;
+        channels.engine = ChannelHealth::Unused;
+    }
+    let mut estimate = observer.step_sample(state, &sample);
+    estimate.channels = channels;
     if !O::READS_WHEEL {
         estimate.channels.wheel = ChannelHealth::Unused;
     }

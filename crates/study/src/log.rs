@@ -165,12 +165,12 @@ impl Log {
         &self.signals
     }
 
-    /// Refuses a log without the wheel speed.
+    /// Refuses a log without a column of this name.
     ///
     /// # Errors
     /// It has none.
-    pub fn require_wheel_speed(&self) -> Result<(), TraceError> {
-        self.rows.require(signal::WHEEL_SPEED).map(drop)
+    pub fn require(&self, name: &str) -> Result<(), TraceError> {
+        self.rows.require(name).map(drop)
     }
 
     /// Median time between two of the first [`FIRST_LOOK`] samples, s.

@@ -1,7 +1,8 @@
 //! A log of a drive of a car with any gearbox as a table: its columns, and what the filter is shown of a row.
 //!
 //! The columns have the names of `wetclutch simulate`. Time, turbine and output speed, gear, target gear and the command of every
-//! element's valve are needed, with a converter the engine speed too, without one the reported engine torque. True values and measured
+//! element's valve are needed, without a converter the reported engine torque too. With one the estimate is the open loop where there is no
+//! engine speed. True values and measured
 //! pressures are compared where the log has them.
 
 use config::Car;
@@ -116,7 +117,7 @@ impl Columns {
         let oncoming = truth([signal::ONCOMING_PRESSURE, signal::ONCOMING_TORQUE, signal::ONCOMING_SLIP]);
         let has_converter = car.converter.is_some();
         Ok(Self {
-            engine: if has_converter { Some(require(signal::ENGINE_SPEED)?) } else { find(signal::ENGINE_SPEED) },
+            engine: find(signal::ENGINE_SPEED),
             turbine: require(signal::TURBINE_SPEED)?,
             output: require(signal::OUTPUT_SPEED)?,
             wheel: find(signal::WHEEL_SPEED),

@@ -1,7 +1,7 @@
 //! A log of a drive of a car with any gearbox, of any format, by a channel map: each channel with a clock of its own.
 //!
-//! Turbine and output speed, gear, target gear and the command of every element's valve are needed, with a converter the engine speed
-//! too, without one the engine torque. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
+//! Turbine and output speed, gear, target gear and the command of every element's valve are needed, without a converter the engine torque
+//! too. With one the estimate is the open loop where there is no engine speed. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
 
 use config::Car;
 use config::gearbox::element_column;
@@ -232,7 +232,7 @@ fn key_of(column: &str) -> String {
 /// Refuses a map that lacks a channel that is needed.
 fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(), LogError> {
     let mut needed = vec![Role::TurbineSpeed, Role::OutputSpeed, Role::Gear, Role::TargetGear];
-    needed.push(if car.converter.is_some() { Role::EngineSpeed } else { Role::EngineTorque });
+    needed.extend(car.converter.is_none().then_some(Role::EngineTorque));
     let commands = element_commands(car).into_iter().filter(|(at, _)| tables.place(*at).is_some());
     let keys: Vec<String> =
         needed.iter().map(|role| role.name().to_owned()).chain(commands.map(|(_, name)| key_of(&name))).collect();

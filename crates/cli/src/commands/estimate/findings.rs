@@ -1,6 +1,6 @@
 //! What is said about the estimates of a log.
 
-use config::Vehicle;
+use config::{ObserverKind, Vehicle};
 use logs::Role;
 use observer::{ChannelHealth, Estimate as Sample, Health};
 use report::tables::{health_meaning, phase_name};
@@ -8,7 +8,8 @@ use study::log::FIRST_LOOK;
 use study::{ErrorScore, Passages};
 use trace::units;
 
-use super::measured::Step;
+use super::measured::{Measured, Step};
+use super::observer::is_open_loop;
 use super::ratios::Ratios;
 use super::said_of_origin;
 use super::watched::is_looked_at;
@@ -70,7 +71,7 @@ impl Findings {
     pub(super) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
         self.pass(row.time_s);
         self.rows += 1;
-        self.ratios.push(&row.input, is_looked_at(self.rows, FIRST_LOOK));
+        self.ratios.push(row.time_s, &row.input, is_looked_at(self.rows, FIRST_LOOK));
         let input = &row.input;
         let readings = [
             input.engine_rad_s,
@@ -84,8 +85,10 @@ impl Findings {
         for (at, (reading, health)) in readings.iter().zip(estimate.channels.each()).enumerate() {
             // An observer that does without a channel refuses none of its readings.
             let taken = matches!(health, ChannelHealth::Good | ChannelHealth::Unused);
-            self.came[at] += u64::from(reading.is_some());
-            self.taken[at] += u64::from(reading.is_some() && taken);
+            // One without a value is of a sensor that fails, and tells nothing of the channel.
+            let came = reading.is_some_and(|reading| reading.value.is_finite());
+            self.came[at] += u64::from(came);
+            self.taken[at] += u64::from(came && taken);
         }
         self.passages.push(row.time_s, estimate.phase);
         match self.health.iter_mut().find(|(health, _)| *health == estimate.health) {
@@ -115,7 +118,8 @@ impl Findings {
     ///
     /// # Errors
     /// More than half of the readings of a channel were refused, or none came; or most estimates are outside their range.
-    pub(super) fn check(&self, commands: [Role; 2], needs_wheel: bool) -> Result<(), Failure> {
+    pub(super) fn check(&self, commands: [Role; 2], log: &Measured<'_>, observer: ObserverKind) -> Result<(), Failure> {
+        let needs_wheel = log.has_wheel_speed() && observer != ObserverKind::Rigid && !is_open_loop(observer);
         if self.rows == 0 && self.other_gear > 0 {
             return Err(Failure::Input(
                 "the log is never in the gears of the vehicle file's shift\nhint: check `gearbox.ratios` of the channel map and the \
@@ -129,6 +133,7 @@ impl Findings {
             let (came, taken, name) = (self.came[at], self.taken[at], role.name());
             let is_needed = match role {
                 Role::WheelSpeed => needs_wheel,
+                Role::EngineSpeed => !is_open_loop(observer),
                 Role::OffgoingCurrent | Role::OffgoingDuty | Role::EngineTorque => false,
                 _ => true,
             };

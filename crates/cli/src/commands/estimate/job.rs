@@ -153,8 +153,7 @@ fn check_findings(
         CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
         CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],
     };
-    let without_wheel = [ObserverKind::Rigid, ObserverKind::OpenLoop, ObserverKind::OpenLoopMaps];
-    findings.check(commands, log.has_wheel_speed() && !without_wheel.contains(&observer))
+    findings.check(commands, log, observer)
 }
 
 /// Writes the page, beside the table of shifts.

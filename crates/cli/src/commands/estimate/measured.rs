@@ -40,6 +40,27 @@ pub(super) struct Measured<'a> {
     gears: Option<GearsOfShift>,
     /// Time since the last step in them, s.
     waited_s: f64,
+    looked_at: LookedAt,
+}
+
+/// What came in the steps before the first estimate.
+#[derive(Default)]
+struct LookedAt {
+    steps: u64,
+    has_engine: bool,
+    has_wheel: bool,
+}
+
+impl LookedAt {
+    fn of<'i>(inputs: impl Iterator<Item = &'i Input<f64>>) -> Self {
+        let mut seen = Self::default();
+        for input in inputs {
+            seen.steps += 1;
+            seen.has_engine |= input.engine_rad_s.is_some();
+            seen.has_wheel |= input.wheel_rad_s.is_some();
+        }
+        seen
+    }
 }
 
 /// Rows of signals with the names of the program, or channels with clocks of their own.
@@ -65,7 +86,6 @@ struct Channels<'a> {
     asked_of: Option<(ClutchValve<f64>, f64)>,
     looked_at: VecDeque<(Step, Vec<Reading>)>,
     median_step_s: f64,
-    has_wheel_speed: bool,
 }
 
 /// What is known at one time.
@@ -177,8 +197,9 @@ impl<'a> Measured<'a> {
         // Turbine and output speed are there, and tell shifts.
         let finder = ShiftFinder::new(&gearbox, |role| has(&log, role))?;
         let ahead = watched.rows();
+        let looked_at = LookedAt::of(log.looked_at().map(|(input, _)| input));
         let source = Source::Rows(Box::new(Rows { log, row: LogRow::NONE, watched, ahead }));
-        Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears: None, waited_s: 0.0 })
+        Ok(Self::of(source, finder, gearbox.ratios, None, looked_at))
     }
 
     /// Channels of a log by a map.
@@ -203,7 +224,7 @@ impl<'a> Measured<'a> {
                 asked.name()
             )));
         }
-        let needed = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, command];
+        let needed = [Role::TurbineSpeed, Role::OutputSpeed, command];
         if let Some(missing) = needed.into_iter().find(|role| !map.has(*role)) {
             return Err(Failure::Input(format!(
                 "the channel map has no {}\nhint: an estimate needs {}; add `[channel.{}]` or --channel {0}=NAME",
@@ -229,7 +250,6 @@ impl<'a> Measured<'a> {
             asked_of: (command == asked).then_some((vehicle.oncoming.valve, vehicle.limits.pressure_max_pa)),
             looked_at: VecDeque::new(),
             median_step_s: f64::NAN,
-            has_wheel_speed: map.has(Role::WheelSpeed),
         };
         while channels.looked_at.len() < look
             && let Some(step) = channels.read()
@@ -243,27 +263,55 @@ impl<'a> Measured<'a> {
         check_step(path, channels.median_step_s, true)?;
         let shift = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
         let gears = GearsOfShift::new(&gearbox, shift);
+        let looked_at = LookedAt::of(channels.looked_at.iter().map(|(step, _)| &step.input));
         let source = Source::Channels(Box::new(channels));
-        Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears, waited_s: 0.0 })
+        Ok(Self::of(source, finder, gearbox.ratios, gears, looked_at))
     }
 
+    fn of(
+        source: Source<'a>,
+        finder: ShiftFinder,
+        ratios: Vec<f64>,
+        gears: Option<GearsOfShift>,
+        looked_at: LookedAt,
+    ) -> Self {
+        Self { source, step: Step::none(), finder, ratios, resets: 0, gears, waited_s: 0.0, looked_at }
+    }
+
+    /// Whether a reading of the wheel speed came before the first estimate.
     pub(super) fn has_wheel_speed(&self) -> bool {
-        match &self.source {
-            Source::Rows(rows) => rows.log.signals().has_wheel_speed(),
-            Source::Channels(channels) => channels.has_wheel_speed,
-        }
+        self.looked_at.has_wheel
     }
 
-    /// Refuses a log without the wheel speed.
-    pub(super) fn require_wheel_speed(&self) -> Result<(), Failure> {
-        match &self.source {
-            Source::Rows(rows) => Ok(rows.log.require_wheel_speed()?),
-            Source::Channels(channels) if channels.has_wheel_speed => Ok(()),
-            Source::Channels(_) => Err(Failure::Input(
-                "the channel map has no wheel_speed, which this observer needs\nhint: add `[channel.wheel_speed]`, or use `--observer rigid`"
-                    .to_owned(),
-            )),
+    /// The same of the engine speed.
+    pub(super) fn has_engine_speed(&self) -> bool {
+        self.looked_at.has_engine
+    }
+
+    /// Refuses a log without engine or wheel speed.
+    pub(super) fn require(&self, role: Role) -> Result<(), Failure> {
+        let (comes, column, hint) = match role {
+            Role::WheelSpeed => (self.has_wheel_speed(), signal::WHEEL_SPEED, "rigid"),
+            _ => (self.has_engine_speed(), signal::ENGINE_SPEED, "open-loop"),
+        };
+        if comes {
+            return Ok(());
         }
+        let name = role.name();
+        match &self.source {
+            Source::Rows(rows) => rows.log.require(column)?,
+            Source::Channels(channels) if channels.maps(role) => {}
+            Source::Channels(_) => {
+                return Err(Failure::Input(format!(
+                    "the channel map has no {name}, which this observer needs\nhint: add `[channel.{name}]`, or use `--observer {hint}`"
+                )));
+            }
+        }
+        Err(Failure::Input(format!(
+            "{name} has no value in any of the first {} samples, and this observer needs it\nhint: use `--observer {hint}`, or look at \
+             the log with `wetclutch inspect`",
+            output::grouped(self.looked_at.steps)
+        )))
     }
 
     pub(super) fn median_step_s(&self) -> f64 {
@@ -307,10 +355,12 @@ impl<'a> Measured<'a> {
             }
             Source::Channels(channels) => channels,
         };
+        // An observer that needs one of them was not chosen, or has refused the log.
+        let may_be_empty = [Role::EngineSpeed, Role::WheelSpeed];
         if let Some(contradiction) = self.finder.contradiction() {
             say.note(&format!("warning: {contradiction}"));
         }
-        report_readings(channels.steps.readings(), say)
+        report_readings(channels.steps.readings(), &may_be_empty, say)
     }
 }
 
@@ -385,13 +435,20 @@ pub(super) fn old_commands(median_s: f64, bound_s: f64) -> Option<String> {
 /// Share by which times of rows are rounded.
 const ROUNDING: f64 = 1e-3;
 
-/// Says what was met in mapped channels, after their last step.
+/// Says what was met in mapped channels, after their last step; those of some roles may be empty.
 ///
 /// # Errors
 /// Most samples of a channel could not be used, or a unit is wrong by all appearances.
-pub(super) fn report_readings(readings: &Readings<'_>, say: &mut Messages) -> Result<(), Failure> {
+pub(super) fn report_readings(
+    readings: &Readings<'_>,
+    may_be_empty: &[Role],
+    say: &mut Messages,
+) -> Result<(), Failure> {
     for role in readings.summary() {
         let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
+        if total == 0 && may_be_empty.contains(&role.role) {
+            say.note(&format!("warning: the channel of {} has no samples", role.name));
+        }
         if good < total {
             say.note(&format!(
                 "{} of {} samples of {} are not used: {}",
@@ -405,7 +462,7 @@ pub(super) fn report_readings(readings: &Readings<'_>, say: &mut Messages) -> Re
     for note in readings.notes() {
         say.note(&format!("warning: {note}"));
     }
-    Ok(readings.check()?)
+    Ok(readings.check_without(may_be_empty)?)
 }
 
 /// What the vehicle file says about the gearbox.
@@ -477,6 +534,11 @@ impl Rows {
 }
 
 impl Channels<'_> {
+    /// Whether the map has a channel for a role.
+    fn maps(&self, role: Role) -> bool {
+        self.steps.readings().summary().iter().any(|entry| entry.role == role)
+    }
+
     fn read(&mut self) -> Option<Result<(Step, Vec<Reading>), Failure>> {
         let mut readings = Vec::new();
         let step = self.steps.next_seeing(|reading| readings.push(reading))?;

@@ -5,8 +5,13 @@ use crate::ValveModel;
 use crate::any_shift::Piston;
 use drivetrain::{Clutch, ClutchValve, Cylinder, Table1, ValveMaps};
 
-const LIMITS: InputLimits<f64> =
-    InputLimits { speed_max_rad_s: 1e3, command_max: 1.2, pressure_max_pa: 1.1e6, shaft_torque_max_n_m: 1e4 };
+const LIMITS: InputLimits<f64> = InputLimits {
+    speed_max_rad_s: 1e3,
+    command_max: 1.2,
+    command_error: 0.0,
+    pressure_max_pa: 1.1e6,
+    shaft_torque_max_n_m: 1e4,
+};
 
 const UNCERTAINTY: ShiftUncertainty<f64> = ShiftUncertainty {
     torque_share: 0.12,

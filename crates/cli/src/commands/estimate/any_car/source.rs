@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use config::Car;
 use design::ShiftTables;
-use logs::{ChannelMap, Log, LogError};
+use logs::{ChannelMap, Log, LogError, Role};
 use study::any_shift::car_log::{CarLog, LogStep};
 use study::any_shift::channels::{CarChannels, own_map};
 use trace::{CsvRows, Following, shown_path};
@@ -102,7 +102,7 @@ impl<'a> CarSource<'a> {
             Self::Channels(channels) => {
                 let gears = channels.check_gears()?;
                 gears.iter().for_each(|note| say.note(&format!("warning: {note}")));
-                report_readings(channels.readings(), say)
+                report_readings(channels.readings(), &[Role::EngineSpeed, Role::WheelSpeed], say)
             }
         }
     }
