@@ -52,10 +52,17 @@ const NEXT_TO: [&[usize]; WATCHED] = [&[TURBINE, OUTPUT], &[ENGINE, OUTPUT], &[E
 #[derive(Debug, Clone, Copy)]
 pub struct SpeedFaults {
     believed: [Option<Believed>; WATCHED],
-    /// Since when the readings of each are faults, s.
-    since_s: [Option<f64>; WATCHED],
+    faults: [Option<Fault>; WATCHED],
     /// Output over wheel speed when both were last believed; not a number before.
     output_over_wheel: f64,
+}
+
+/// A fault of a speed.
+#[derive(Debug, Clone, Copy)]
+struct Fault {
+    since_s: f64,
+    /// Whether it began with the value of another speed.
+    is_another: bool,
 }
 
 /// The last reading of a speed that was believed.
@@ -70,7 +77,7 @@ struct Believed {
 impl SpeedFaults {
     /// Before the first readings.
     pub fn new() -> Self {
-        Self { believed: [None; WATCHED], since_s: [None; WATCHED], output_over_wheel: f64::NAN }
+        Self { believed: [None; WATCHED], faults: [None; WATCHED], output_over_wheel: f64::NAN }
     }
 
     /// Whether the next reading of a speed, in rad/s, is a fault; never of a role that is not watched.
@@ -84,12 +91,13 @@ impl SpeedFaults {
             // The clock began anew.
             *self = Self::new();
         }
-        let is_fault = self.believed[at].is_some_and(|before| match self.since_s[at] {
+        let is_fault = self.believed[at].is_some_and(|before| match self.faults[at] {
             None => self.begins(at, before, rad_s, time_s),
-            Some(since_s) => self.lasts(at, before, rad_s, [since_s, time_s]),
+            Some(fault) => self.lasts(at, before, rad_s, (fault, time_s)),
         });
         if is_fault {
-            self.since_s[at].get_or_insert(time_s);
+            let is_another = self.is_another(at, rad_s, time_s);
+            self.faults[at].get_or_insert(Fault { since_s: time_s, is_another });
         } else {
             self.believe(at, rad_s, time_s);
         }
@@ -100,7 +108,7 @@ impl SpeedFaults {
         let before = self.believed[at].filter(|before| before.rad_s == rad_s);
         let first_s = before.map_or(time_s, |before| before.first_s);
         self.believed[at] = Some(Believed { rad_s, time_s, first_s });
-        self.since_s[at] = None;
+        self.faults[at] = None;
         if let (OUTPUT | WHEEL, Some(output), Some(wheel)) =
             (at, self.turning(OUTPUT, time_s), self.turning(WHEEL, time_s))
         {
@@ -123,13 +131,13 @@ impl SpeedFaults {
     }
 
     /// Whether a fault goes on with a reading.
-    fn lasts(&self, at: usize, before: Believed, rad_s: f64, [since_s, time_s]: [f64; 2]) -> bool {
+    fn lasts(&self, at: usize, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
         let fell = rad_s.abs() <= FELL * before.rad_s.abs();
-        let is_short = time_s - since_s <= LONGEST_S;
+        let is_short = time_s - fault.since_s <= LONGEST_S;
         let is_wrong = || {
             jumps(at, before, rad_s, time_s)
                 || fell
-                || self.is_another(at, rad_s, time_s)
+                || (fault.is_another && self.is_another(at, rad_s, time_s))
                 || self.parts(at, rad_s, time_s)
         };
         let is_dead = || rad_s.abs() <= ZERO_RAD_S && fell && self.is_contradicted(at, before, time_s);
@@ -249,6 +257,27 @@ mod tests {
                     assert_eq!(found[at].len(), all, "{at} {step_s} {length_s}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_speed_that_was_zero_is_believed_again_in_the_direct_gear() {
+        for at in [TURBINE, OUTPUT] {
+            let found = faults(0.01, |time_s| {
+                let mut speeds = in_gear(time_s);
+                if time_s > 2.0 {
+                    speeds[TURBINE] = speeds[OUTPUT];
+                }
+                if time_s > 1.0 && time_s < 2.5 {
+                    speeds[at] = 0.0;
+                }
+                speeds
+            });
+            assert!(
+                found[at].len() >= 149 && found[at].iter().all(|time_s| *time_s < 2.5),
+                "{at}: {:?}",
+                found[at].last()
+            );
         }
     }
 

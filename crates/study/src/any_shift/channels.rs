@@ -7,7 +7,7 @@ use config::Car;
 use config::gearbox::element_column;
 use design::ShiftTables;
 use drivetrain::CommandKind;
-use logs::{ChannelMap, Log, LogError, Mapped, Places, Reading, Readings, Role, Steps};
+use logs::{ChannelMap, Log, LogError, Mapped, OnChange, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
@@ -58,6 +58,8 @@ pub struct CarChannels<'a> {
     tables: &'a ShiftTables<f64>,
     steps: Steps<'a, Newest>,
     entries: Vec<Entry>,
+    /// Commands of which the map says that they are sent on change, by their places in the filter's tables.
+    on_change: [OnChange; MAX_ELEMENTS],
     gears: Gears,
     lock_up_applied: bool,
     pedal: f64,
@@ -78,11 +80,22 @@ impl<'a> CarChannels<'a> {
     ) -> Result<Self, LogError> {
         let entries = map.channels.iter().map(|entry| entry_of(entry, car, tables)).collect::<Result<Vec<_>, _>>()?;
         require(map, car, tables)?;
+        let mut on_change = [OnChange::default(); MAX_ELEMENTS];
+        for (mapped, entry) in map.channels.iter().zip(&entries).filter(|(mapped, _)| mapped.sent_on_change) {
+            if let Some((_, Some(place))) = entry.element {
+                on_change[place] = OnChange::by_map(mapped.delay_s);
+            }
+        }
         let readings = Readings::new(log, map)?;
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
         let gears = Gears::new([Role::Gear, Role::TargetGear].map(Role::name));
         let (lock_up_applied, pedal, vehicle_m_s, oil_degc) = (false, f64::NAN, None, None);
-        Ok(Self { car, tables, steps, entries, gears, lock_up_applied, pedal, vehicle_m_s, oil_degc })
+        Ok(Self { car, tables, steps, entries, on_change, gears, lock_up_applied, pedal, vehicle_m_s, oil_degc })
+    }
+
+    /// The commands by their places in the filter's tables, with those of which the map says that they are sent on change.
+    pub fn commands_on_change(&self) -> [OnChange; MAX_ELEMENTS] {
+        self.on_change
     }
 
     /// The readings, with their summary and notes.

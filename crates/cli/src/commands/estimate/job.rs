@@ -13,7 +13,8 @@ use study::LogSample;
 use study::shift_estimates::no_estimate;
 
 use super::findings::Findings;
-use super::measured::{Measured, Step, check_span, old_commands, slow_log};
+use super::log_checks::{check_span, old_commands, slow_log};
+use super::measured::{Measured, Step};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};

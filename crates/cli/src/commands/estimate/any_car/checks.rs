@@ -16,7 +16,7 @@ use study::any_shift::pressure_command::pressure_command_column;
 use study::log::FIRST_LOOK;
 use trace::{shown_path, signal};
 
-use super::super::measured::{check_span, check_step};
+use super::super::log_checks::{check_span, check_step};
 use super::super::watched::{WatchedColumn, WatchedColumns};
 use crate::failure::Failure;
 use crate::output;
