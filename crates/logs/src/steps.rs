@@ -130,7 +130,7 @@ impl<'a, P: Places> Steps<'a, P> {
         open.places.close(open.time_s, dt_s)
     }
 
-    /// The next step; `seen` takes every reading that was met on the way and is not refused, also those that no observer reads. A reading that
+    /// The next step; `seen` takes every reading that was met on the way, also those that are refused or that no observer reads. A reading that
     /// begins the step after is among them.
     pub fn next_seeing(&mut self, mut seen: impl FnMut(Reading)) -> Option<Result<P::Step, LogError>> {
         while !self.ended {
@@ -145,9 +145,7 @@ impl<'a, P: Places> Steps<'a, P> {
                 }
                 Some(Ok(reading)) => reading,
             };
-            if !reading.is_refused() {
-                seen(reading);
-            }
+            seen(reading);
             let entry = self.readings.entry();
             let before = self.open.take();
             let is_first = before.is_none();

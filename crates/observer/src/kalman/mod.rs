@@ -364,7 +364,8 @@ impl<T: Real> KalmanFilter<T> {
     /// gear's ratio, and a reading of one tells both: where both come, they take turns.
     #[inline]
     fn skipped(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Option<usize> {
-        if input.turbine_rad_s.is_none() || input.output_rad_s.is_none() {
+        let comes = |reading: Option<Reading<T>>| reading.is_some_and(|reading| self.limits.speed_valid(reading.value));
+        if !(comes(input.turbine_rad_s) && comes(input.output_rad_s)) {
             return None;
         }
         state.turn = if state.turn == TURBINE { OUTPUT } else { TURBINE };

@@ -18,7 +18,7 @@ use super::gear_signal::Gears;
 use super::pressure_command::{command_for, pressure_command_column};
 use crate::frozen_rows::FrozenRows;
 use crate::row_clock::{RowClock, RowTime};
-use crate::row_samples::RowSamples;
+use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
 /// Names for neither a forward gear nor reverse.
 const NEUTRAL: [&str; 2] = ["N", "P"];
@@ -209,6 +209,7 @@ impl<'c> CarLog<'c> {
     /// One that is needed is missing.
     pub fn of(rows: CsvRows, car: &'c Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
         let rows = rows.with_wheel_radius(car.road.wheel_radius_m)?;
+        refuse_misnamed_engine(&rows)?;
         let columns = Columns::of(&rows, car, tables)?;
         let (clock, frozen, samples) = (RowClock::default(), FrozenRows::new(), RowSamples::new(&rows));
         let gears = Gears::new([signal::GEAR, signal::TARGET_GEAR]);

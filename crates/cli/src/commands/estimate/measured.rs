@@ -146,9 +146,7 @@ impl Step {
 fn each_reading(input: &Input<f64>, row: &LogRow, mut see: impl FnMut(&Reading)) {
     let stamp_s = row.time_s;
     let mut see = |role: Role, value: f64, age_s: f64| {
-        if value.is_finite() {
-            see(&Reading { role, time_s: stamp_s - age_s, stamp_s, value });
-        }
+        see(&Reading { role, time_s: stamp_s - age_s, stamp_s, value });
     };
     let speeds = [
         (Role::EngineSpeed, input.engine_rad_s),
@@ -169,7 +167,9 @@ fn each_reading(input: &Input<f64>, row: &LogRow, mut see: impl FnMut(&Reading))
         (Role::VehicleSpeed, vehicle_m_s),
         (Role::VehicleAcceleration, vehicle_m_s2),
     ] {
-        see(role, value, 0.0);
+        if value.is_finite() {
+            see(role, value, 0.0);
+        }
     }
 }
 
