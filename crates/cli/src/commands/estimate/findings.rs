@@ -29,6 +29,8 @@ pub(super) struct Findings {
     health: Vec<(Health, u64)>,
     /// None if a row has no true value.
     errors: Option<ErrorScore>,
+    /// Samples without a command of the valve that can be used.
+    without_command: u64,
     /// Readings that came, and those of them that were taken, of each channel.
     came: [u64; CHANNELS],
     taken: [u64; CHANNELS],
@@ -50,6 +52,7 @@ impl Findings {
             passages: Passages::default(),
             health: Vec::new(),
             errors: Some(ErrorScore::new(0.0)),
+            without_command: 0,
             came: [0; CHANNELS],
             taken: [0; CHANNELS],
         }
@@ -90,6 +93,8 @@ impl Findings {
             self.came[at] += u64::from(came);
             self.taken[at] += u64::from(came && taken);
         }
+        let is_lost = matches!(estimate.channels.command, ChannelHealth::Lost | ChannelHealth::Refused);
+        self.without_command += u64::from(is_lost);
         self.passages.push(row.time_s, estimate.phase);
         match self.health.iter_mut().find(|(health, _)| *health == estimate.health) {
             Some((_, count)) => *count += 1,
@@ -161,15 +166,6 @@ impl Findings {
     fn check_estimates(&self) -> Result<(), Failure> {
         let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::HeldClutchSlips, Health::Flare];
         let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
-        let lost = of(&Health::CommandRejected);
-        if 2 * lost > self.rows && self.rows >= ENOUGH_ROWS {
-            return Err(Failure::Input(format!(
-                "{} of {} samples have no command of the valve that can be used\nhint: look at its channel with `wetclutch inspect`; a log of \
-                 another car, or of one with a whole gearbox, may have it in its shifts alone, and that needs the vehicle file of that car",
-                output::grouped(lost),
-                output::grouped(self.rows)
-            )));
-        }
         let count: u64 = impossible.iter().map(of).sum();
         if 2 * count <= self.rows || self.rows < ENOUGH_ROWS {
             return Ok(());
@@ -184,10 +180,24 @@ impl Findings {
         )))
     }
 
+    /// That most samples have no command: the valve model, on which every observer rests, goes on with the last one.
+    fn warning_of_commands(&self) -> Option<String> {
+        (2 * self.without_command > self.rows && self.rows >= ENOUGH_ROWS).then(|| {
+            format!(
+                "warning: {} of {} samples have no command of the valve that can be used\nhint: if it is sent on change, say so by `sent_on_change = \
+                 true` in a channel map; else look at its channel with `wetclutch inspect`. A log of another car, or of one with a whole gearbox, \
+                 may have it in its shifts alone, and that needs the vehicle file of that car",
+                output::grouped(self.without_command),
+                output::grouped(self.rows)
+            )
+        })
+    }
+
     /// What was found, in sentences.
     pub(super) fn sentences(&self) -> Vec<String> {
         let mut said: Vec<String> =
             self.ratios.contradiction().map(|said| format!("warning: {said}")).into_iter().collect();
+        said.extend(self.warning_of_commands());
         for (health, count) in &self.health {
             // A few are normal while the cylinder fills: there the observers' valve model is faster than the valve maps.
             let few = matches!(health, Health::OutsideRange | Health::LimitedToRange) && 100 * count <= self.rows;

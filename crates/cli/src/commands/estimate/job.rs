@@ -247,8 +247,9 @@ fn report_shifts(shifts: &Shifts<'_>, say: &mut Messages) {
     match shifts.found.iter().filter(|shift| shift.of_vehicle && shift.estimated.is_none()).count() {
         0 => {}
         unseen => say.note(&format!(
-            "warning: {unseen} shifts of the vehicle file are in the speeds and not in the command of the valve, which stays below \
-             the kiss point\nhint: check unit and scale of the command, and whether it is that of the oncoming clutch"
+            "warning: {unseen} shifts of the vehicle file are in the speeds and not in the estimate: the command of the valve stays below \
+             the kiss point, or a speed is refused throughout the shift\nhint: check unit and scale of the command, and whether it is that of the \
+             oncoming clutch"
         )),
     }
 }
