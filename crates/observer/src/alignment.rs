@@ -121,6 +121,9 @@ impl<T: Real> Alignment<'_, T> {
         let dt_s = if possible { input.dt_s } else { T::infinity() };
         let limits = self.limits;
         let (engine_rad_s, engine) = state.engine.take(dt_s, input.engine_rad_s, limits);
+        // What has never come is in no channel, and an observer may do without.
+        let has_come = state.engine.last.is_some() || input.engine_rad_s.is_some();
+        let engine = if has_come { engine } else { ChannelHealth::Unused };
         let (turbine_rad_s, turbine) = state.turbine.take(dt_s, input.turbine_rad_s, limits);
         let (output_rad_s, output) = state.output.take(dt_s, input.output_rad_s, limits);
         let (wheel_rad_s, wheel) = state.wheel.take(dt_s, input.wheel_rad_s, limits);
@@ -168,9 +171,11 @@ fn step_observer<T: Real, O: SampleEstimator<T>>(
     aligned: &Aligned<T>,
 ) -> Estimate<T> {
     let Aligned { mut sample, mut channels } = *aligned;
-    if channels.engine == ChannelHealth::Lost && !observer.needs_engine() {
-        sample.engine_rad_s = sample.turbine_rad_s;
-        channels.engine = ChannelHealth::Unused;
+    if channels.engine == ChannelHealth::Unused {
+        match observer.needs_engine() {
+            true => channels.engine = ChannelHealth::Lost,
+            false => sample.engine_rad_s = sample.turbine_rad_s,
+        }
     }
     let mut estimate = observer.step_sample(state, &sample);
     estimate.channels = channels;

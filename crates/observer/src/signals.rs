@@ -448,3 +448,35 @@ pub trait SampleEstimator<T> {
     /// Takes one sample and returns the estimate at its time. Never panics; allocates nothing.
     fn step_sample(&self, state: &mut Self::SampleState, sample: &Sample<T>) -> Estimate<T>;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn limits<T: Real>() -> InputLimits<T> {
+        let [speed_max_rad_s, command_max, command_error] = [800.0, 1.2, 0.01].map(T::of);
+        let (pressure_max_pa, shaft_torque_max_n_m) = (T::of(1.1e6), T::of(5e3));
+        InputLimits { speed_max_rad_s, command_max, command_error, pressure_max_pa, shaft_torque_max_n_m }
+    }
+
+    fn a_command_within_its_error_of_the_range_is_its_end<T: Real>() {
+        let limits = limits::<T>();
+        let of = |command: f64| limits.possible_command(T::of(command)).map(|command| command.to_f64_exact());
+        assert_eq!([-0.003, -0.0099, 0.0].map(of), [Some(0.0); 3]);
+        let most = T::of(1.2).to_f64_exact();
+        assert_eq!([1.2, 1.209].map(of), [Some(most); 2]);
+        assert_eq!([-0.011, 1.211, f64::NAN, f64::NEG_INFINITY, f64::INFINITY].map(of), [None; 5]);
+        assert_eq!(of(0.5), Some(0.5));
+        let read = |value: f64, age_s: f64| limits.read_command(&Reading { value: T::of(value), age_s: T::of(age_s) });
+        assert_eq!(read(-0.003, 0.02), Some(Reading { value: T::zero(), age_s: T::of(0.02) }));
+        assert_eq!([read(0.3, -0.01), read(0.3, f64::INFINITY), read(-1.0, 0.0)], [None; 3]);
+    }
+
+    #[test]
+    fn a_command_within_its_error_of_the_range_is_its_end_in_both_precisions() {
+        a_command_within_its_error_of_the_range_is_its_end::<f64>();
+        a_command_within_its_error_of_the_range_is_its_end::<f32>();
+        let cast = limits::<f64>().cast::<f32>();
+        assert_eq!(cast.command_error, 0.01);
+    }
+}

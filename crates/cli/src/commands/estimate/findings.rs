@@ -166,6 +166,16 @@ impl Findings {
     fn check_estimates(&self) -> Result<(), Failure> {
         let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::HeldClutchSlips, Health::Flare];
         let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
+        let lost = self.without_command;
+        if 2 * lost > self.rows && self.rows >= ENOUGH_ROWS {
+            return Err(Failure::Input(format!(
+                "{} of {} samples have no command of the valve that can be used\nhint: if it is sent on change, say so by `sent_on_change = true` \
+                 in a channel map; else look at its channel with `wetclutch inspect`. A log of another car, or of one with a whole gearbox, may have \
+                 it in its shifts alone, and that needs the vehicle file of that car",
+                output::grouped(lost),
+                output::grouped(self.rows)
+            )));
+        }
         let count: u64 = impossible.iter().map(of).sum();
         if 2 * count <= self.rows || self.rows < ENOUGH_ROWS {
             return Ok(());
@@ -180,24 +190,10 @@ impl Findings {
         )))
     }
 
-    /// That most samples have no command: the valve model, on which every observer rests, goes on with the last one.
-    fn warning_of_commands(&self) -> Option<String> {
-        (2 * self.without_command > self.rows && self.rows >= ENOUGH_ROWS).then(|| {
-            format!(
-                "warning: {} of {} samples have no command of the valve that can be used\nhint: if it is sent on change, say so by `sent_on_change = \
-                 true` in a channel map; else look at its channel with `wetclutch inspect`. A log of another car, or of one with a whole gearbox, \
-                 may have it in its shifts alone, and that needs the vehicle file of that car",
-                output::grouped(self.without_command),
-                output::grouped(self.rows)
-            )
-        })
-    }
-
     /// What was found, in sentences.
     pub(super) fn sentences(&self) -> Vec<String> {
         let mut said: Vec<String> =
             self.ratios.contradiction().map(|said| format!("warning: {said}")).into_iter().collect();
-        said.extend(self.warning_of_commands());
         for (health, count) in &self.health {
             // A few are normal while the cylinder fills: there the observers' valve model is faster than the valve maps.
             let few = matches!(health, Health::OutsideRange | Health::LimitedToRange) && 100 * count <= self.rows;
