@@ -437,10 +437,10 @@ fn a_sensor_that_fails_for_most_of_the_log_does_not_refuse_it() {
 fn a_speed_that_moved_and_stops_is_frozen_after_five_samples() {
     let mut text = "time_s,t_rpm,o_rpm\n".to_owned();
     for row in 0..400 {
-        let output = 1000.0 + f64::from(row) + 0.1 * f64::from(row % 3);
-        let turbine = 2.1 * if (200..230).contains(&row) { 1200.0 } else { output } + 0.01 * f64::from(row % 2);
-        let turbine = if (200..230).contains(&row) { 2520.0 } else { turbine };
-        writeln!(text, "{:.2},{turbine},{output}", 0.01 * f64::from(row)).unwrap();
+        // Slow at first, where the speeds show how fine they are.
+        let output = 1000.0 + if row < 50 { 0.1 * f64::from(row) } else { f64::from(row - 45) };
+        let turbine = if (200..230).contains(&row) { 2425.5 } else { 2.1 * output };
+        writeln!(text, "{:.2},{turbine:.2},{output:.2}", 0.01 * f64::from(row)).unwrap();
     }
     let (_, summary, _) = readings(&text, &map(&["turbine_speed=t_rpm", "output_speed=o_rpm"])).unwrap();
     let frozen = count(&summary, Quality::Frozen);
