@@ -230,6 +230,7 @@ pub fn any_shift_filter<'a>(
             speed_max_rad_s: SPEED_MOST_RAD_S,
             // Of any element; each has its own.
             command_max: budget.widest(|element| element.command_max),
+            command_error: budget.widest(|element| element.command),
             pressure_max_pa: budget.widest(|element| element.pressure_max_pa),
             shaft_torque_max_n_m: 3.0 * shaft_n_m(car),
         },

@@ -164,7 +164,7 @@ fn find(log: &mut Log, map: &ChannelMap) -> Result<(Vec<Shift>, Vec<String>), Fi
     let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
     let mut readings = Readings::new(log, map)?;
     let mut resets = 0;
-    while let Some(reading) = readings.next() {
+    while let Some(reading) = readings.next_or_refused() {
         let reading = reading?;
         if readings.resets() > resets {
             resets = readings.resets();

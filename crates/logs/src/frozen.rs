@@ -3,7 +3,9 @@
 //! A speed is frozen that stands still, to the last digit and away from zero, for [`FROZEN_S`] and [`FROZEN_SAMPLES`] samples and
 //! three times as many samples as ever before, while a speed that it cannot part from changes by more than a tyre slips,
 //! [`FROZEN_CHANGE`], and by more than [`FROZEN_QUANTA`] of its own quanta: it is not used until it changes. Its quantum is the
-//! smallest change that was seen of it; before it has changed, [`FROZEN_FROM_START_S`] and [`FROZEN_CHANGE_FROM_START`] count.
+//! smallest change that was seen of it; before it has changed, [`FROZEN_FROM_START_S`] and [`FROZEN_CHANGE_FROM_START`] count. One that
+//! changed by [`FROZEN_QUANTA`] of its quanta from sample to sample stands for [`STOPPED_S`] and [`STOPPED_SAMPLES`] only, and the other
+//! changes by those quanta.
 //! Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from a turbine that is nearly as fast
 //! or faster: below that the idle control may hold the engine while the car comes to rest.
 
@@ -22,8 +24,17 @@ pub const FROZEN_CHANGE: f64 = 0.02;
 pub const FROZEN_CHANGE_FROM_START: f64 = 0.1;
 /// And by so many of its own quanta: a value may move by nearly one unseen, and a filter or a hysteresis may hide as much again.
 pub const FROZEN_QUANTA: f64 = 3.0;
+/// Weight of a change in the mean of the latest ones.
+const LATEST: f64 = 0.125;
+/// Fraction by which the other speed changes at least while one has stopped \[chosen\]: no noise.
+const STOPPED_CHANGE: f64 = 0.002;
 /// A turbine above this share of the engine's speed takes the engine along when it changes.
 pub const COUPLED: f64 = 0.95;
+
+/// A speed that moved has stopped when it stood still for so long, s, and for so many samples \[chosen\].
+pub const STOPPED_S: f64 = 0.05;
+/// See [`STOPPED_S`].
+pub const STOPPED_SAMPLES: u32 = 5;
 
 /// Roles that are speeds: the first five.
 pub const SPEEDS: usize = 5;
@@ -43,6 +54,8 @@ pub struct FrozenSpeed {
     longest_still: u32,
     /// The smallest change so far.
     quantum: f64,
+    /// Mean change from sample to sample, of late.
+    moves: f64,
 }
 
 /// A speed that stands still.
@@ -59,15 +72,18 @@ struct Still {
 impl FrozenSpeed {
     /// Watches the speed of this role.
     pub fn new(role: Role) -> Self {
-        Self { role, still: None, longest_still: 0, quantum: f64::INFINITY }
+        Self { role, still: None, longest_still: 0, quantum: f64::INFINITY, moves: 0.0 }
     }
 
     /// Whether the speed is frozen, with its next value and the newest values of the others.
     pub fn is_frozen(&mut self, value: f64, time_s: f64, speeds: &Speeds) -> bool {
         let Some(still) = self.still.as_mut().filter(|still| still.value == value) else {
             if let Some(before) = self.still {
-                self.quantum = self.quantum.min((value - before.value).abs());
-                if !before.frozen {
+                let change = (value - before.value).abs();
+                self.quantum = self.quantum.min(change);
+                self.moves += LATEST * (change / f64::from(before.samples) - self.moves);
+                // A car that stands says nothing of how coarse its speeds are.
+                if !before.frozen && before.value != 0.0 {
                     self.longest_still = self.longest_still.max(before.samples);
                 }
             }
@@ -82,10 +98,15 @@ impl FrozenSpeed {
             0 => (FROZEN_FROM_START_S, FROZEN_CHANGE_FROM_START),
             _ => (FROZEN_S, FROZEN_CHANGE),
         };
+        let quantum = if self.quantum.is_finite() { FROZEN_QUANTA * self.quantum } else { 0.0 };
         let long = still.samples >= FROZEN_SAMPLES.max(3 * self.longest_still) && time_s - still.since_s >= limit_s;
-        if !still.frozen && value != 0.0 && long {
-            let quanta = if self.quantum.is_finite() { FROZEN_QUANTA * self.quantum / value.abs() } else { 0.0 };
-            let limit = share.max(quanta);
+        let stopped = self.longest_still > 0
+            && self.moves > quantum
+            && still.samples >= STOPPED_SAMPLES.max(3 * self.longest_still)
+            && time_s - still.since_s >= STOPPED_S;
+        if !still.frozen && value != 0.0 && (long || stopped) {
+            let quanta = quantum / value.abs();
+            let limit = if stopped { quanta.max(STOPPED_CHANGE) } else { share.max(quanta) };
             still.frozen = partners(self.role).iter().any(|partner| {
                 // Without one of both nothing has changed.
                 let (now, then) = (speeds[*partner as usize], still.others[*partner as usize]);

@@ -41,6 +41,8 @@ pub struct Mapped {
     pub delay_s: f64,
     /// By how much its time stamps are too late against those of the other channels, s; negative: too early.
     pub late_s: f64,
+    /// Whether a command is sent when it changes: it stands until the next sample.
+    pub sent_on_change: bool,
     /// Least and greatest value in the unit; others are not used.
     pub valid_range: Option<[f64; 2]>,
 }
@@ -59,6 +61,7 @@ impl Mapped {
             offset: 0.0,
             delay_s: 0.0,
             late_s: 0.0,
+            sent_on_change: false,
             valid_range: None,
         }
     }
@@ -136,6 +139,8 @@ struct RawChannel {
     delay_s: f64,
     #[serde(default)]
     late_s: f64,
+    #[serde(default)]
+    sent_on_change: bool,
     valid_range: Option<[f64; 2]>,
 }
 
@@ -265,6 +270,12 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
     if !(-10.0..=10.0).contains(&raw.late_s) {
         return Err(format!("{} is {}, expected -10 to 10", key("late_s"), raw.late_s));
     }
+    if raw.sent_on_change && !(role.is_command() || role == Role::OncomingPressureCommand) {
+        return Err(format!(
+            "{} is for the commands of valves: another signal between two samples is not known",
+            key("sent_on_change")
+        ));
+    }
     if let Some([least, greatest]) = raw.valid_range
         && (least >= greatest || least.is_nan() || greatest.is_nan())
     {
@@ -281,6 +292,7 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
         offset: finite(raw.offset, "offset")?,
         delay_s: raw.delay_s,
         late_s: raw.late_s,
+        sent_on_change: raw.sent_on_change,
         valid_range: raw.valid_range,
     })
 }

@@ -5,6 +5,7 @@
 //! - a value outside `valid_range` of the map is not used;
 //! - several channels of one signal count where all of them have the same time stamp;
 //! - a speed that stands still while it cannot is not used until it changes, see [`crate::frozen`];
+//! - a speed that no shaft can have, as a zero while the car drives, is not used, see [`crate::speed_faults`];
 //! - the friction torque of the engine, where it is mapped, is taken off the engine torque.
 
 use crate::frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
@@ -13,7 +14,7 @@ use crate::in_order::InOrder;
 use crate::map::Resolved;
 use crate::plausibility::{Extremes, Finding, Likely, Seen};
 use crate::samples::{Quality, QualityCounts};
-use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, plausibility};
+use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, SpeedFaults, plausibility};
 
 /// A value of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +27,13 @@ pub struct Reading {
     pub stamp_s: f64,
     /// The value in the unit of the role.
     pub value: f64,
+}
+
+impl Reading {
+    /// Whether its value cannot be used.
+    pub fn is_refused(&self) -> bool {
+        self.value.is_nan()
+    }
 }
 
 /// What came of the samples of a role.
@@ -69,6 +77,7 @@ pub struct Readings<'a> {
     /// Place of the last reading's entry in the map.
     entry: usize,
     speeds: Speeds,
+    faults: SpeedFaults,
     /// Whether the newest gear is a negative number: reverse.
     is_reverse: bool,
     /// Newest friction torque of the engine, N m; zero where it is not mapped, none before its first value.
@@ -109,6 +118,7 @@ impl<'a> Readings<'a> {
             in_order,
             entry: 0,
             speeds: NO_SPEEDS,
+            faults: SpeedFaults::new(),
             is_reverse: false,
             friction_n_m: (!map.has(Role::EngineFrictionTorque)).then_some(0.0),
         })
@@ -169,17 +179,32 @@ impl<'a> Readings<'a> {
     /// # Errors
     /// Most samples are unusable, or a unit is wrong by all appearances.
     pub fn check(&self) -> Result<(), LogError> {
+        self.check_without(&[])
+    }
+
+    /// As [`Self::check`], where channels of these roles may have no sample at all.
+    ///
+    /// # Errors
+    /// Those of [`Self::check`].
+    pub fn check_without(&self, may_be_empty: &[Role]) -> Result<(), LogError> {
         let summary = self.summary();
         for (role, channels) in summary.iter().zip(&self.roles) {
             let name = channels.resolved.entry.key();
             // A held sample could be used, were it not the one before.
             let (good, total) = (role.counts.of(Quality::Good) + role.counts.of(Quality::Held), role.counts.total());
+            if total == 0 && may_be_empty.contains(&role.role) {
+                continue;
+            }
             if total == 0 {
                 return Err(LogError::map(format!(
                     "the channel of {name} has no samples\nhint: check it with `wetclutch inspect`, or leave `channel.{name}` out"
                 )));
             }
             // A request that is rarely made is rightly absent.
+            // A sensor that fails in the drive leaves what it gave before. A log goes on without output and wheel speed.
+            let is_frozen = matches!(role.role, Role::OutputSpeed | Role::WheelSpeed);
+            let frozen = if is_frozen { role.counts.of(Quality::Frozen) } else { 0 };
+            let total = total - role.counts.of(Quality::Impossible) - frozen;
             if 2 * good < total && role.role != Role::TorqueReductionRequest {
                 return Err(LogError::map(format!(
                     "{} of {total} samples of {name} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",
@@ -191,7 +216,7 @@ impl<'a> Readings<'a> {
         self.check_units(Seen::All)
     }
 
-    /// Gives the sample to a role; a reading if it is one.
+    /// Gives the sample to a role; a reading if it is one, and one without a value where the sensor gave none of its shaft.
     fn take(&mut self, (role, part): (usize, usize), sample: &crate::Sample) -> Option<Reading> {
         let channels = &mut self.roles[role];
         let entry = &channels.resolved.entry;
@@ -237,18 +262,27 @@ impl<'a> Readings<'a> {
         let stamp_s = sample.time_s - entry.late_s;
         let time_s = stamp_s - entry.delay_s;
         if quality == Quality::Good && kind.is_speed() {
-            if channels.frozen.is_frozen(value, sample.time_s, &self.speeds) {
-                quality = Quality::Frozen;
+            quality = if self.faults.is_fault(kind, value, sample.time_s) {
+                Quality::Impossible
+            } else if channels.frozen.is_frozen(value, sample.time_s, &self.speeds) {
+                Quality::Frozen
             } else {
-                self.speeds[kind as usize] = value;
-            }
-            if channels.held.is_held(value) && quality == Quality::Good {
+                Quality::Good
+            };
+            if quality != Quality::Impossible && channels.held.is_held(value) && quality == Quality::Good {
                 quality = Quality::Held;
+            }
+            if matches!(quality, Quality::Good | Quality::Held) {
+                self.speeds[kind as usize] = value;
             }
         }
         channels.counts.push(quality);
-        if quality != Quality::Good {
-            return None;
+        match quality {
+            Quality::Good => {}
+            Quality::Frozen | Quality::Impossible => {
+                return Some(Reading { role: kind, time_s, stamp_s, value: f64::NAN });
+            }
+            _ => return None,
         }
         if kind == Role::Gear {
             self.is_reverse = value < 0.0;
@@ -264,6 +298,15 @@ impl Iterator for Readings<'_> {
     type Item = Result<Reading, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
+        let is_one = |next: &Self::Item| next.as_ref().map_or(true, |reading| !reading.is_refused());
+        std::iter::from_fn(|| self.next_or_refused()).find(is_one)
+    }
+}
+
+impl Readings<'_> {
+    /// The next reading, also one that is refused: a frozen or an impossible speed. Its value is not a number, so that an observer
+    /// reports its channel as refused.
+    pub fn next_or_refused(&mut self) -> Option<Result<Reading, LogError>> {
         loop {
             let newest_s = self.sample.map_or(f64::NEG_INFINITY, |sample| sample.time_s);
             if let Some((entry, reading)) = self.in_order.as_mut().and_then(|waiting| waiting.next(newest_s)) {

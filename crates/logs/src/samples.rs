@@ -25,13 +25,15 @@ pub enum Quality {
     OutOfRange,
     /// The value stands still while another speed changes, see [`crate::frozen`].
     Frozen,
+    /// No shaft can have this speed, see [`crate::speed_faults`].
+    Impossible,
     /// The speed of the sample before, which a table holds until the next one comes, see [`crate::held`]: the first of them counts.
     Held,
 }
 
 impl Quality {
     /// All of them, in their order.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Good,
         Self::Missing,
         Self::Invalid,
@@ -40,6 +42,7 @@ impl Quality {
         Self::Backward,
         Self::OutOfRange,
         Self::Frozen,
+        Self::Impossible,
         Self::Held,
     ];
 
@@ -54,6 +57,7 @@ impl Quality {
             Self::Backward => "backward",
             Self::OutOfRange => "out of range",
             Self::Frozen => "frozen",
+            Self::Impossible => "impossible",
             Self::Held => "held",
         }
     }

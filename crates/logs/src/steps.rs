@@ -130,11 +130,11 @@ impl<'a, P: Places> Steps<'a, P> {
         open.places.close(open.time_s, dt_s)
     }
 
-    /// The next step; `seen` takes every reading that was met on the way, also those that no observer reads. A reading that
+    /// The next step; `seen` takes every reading that was met on the way, also those that are refused or that no observer reads. A reading that
     /// begins the step after is among them.
     pub fn next_seeing(&mut self, mut seen: impl FnMut(Reading)) -> Option<Result<P::Step, LogError>> {
         while !self.ended {
-            let reading = match self.readings.next() {
+            let reading = match self.readings.next_or_refused() {
                 None => {
                     self.ended = true;
                     break;

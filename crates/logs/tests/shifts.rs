@@ -414,3 +414,29 @@ fn a_public_drive_has_its_three_upshifts() {
         assert_eq!(shift.load, Load::PowerOn);
     }
 }
+
+#[test]
+fn a_shift_over_which_a_speed_is_refused_is_found_by_the_ratios_around_it() {
+    let drive = Drive::new(2, &[(3.0, 3)]);
+    let roles = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed];
+    let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };
+    for role in [Role::TurbineSpeed, Role::OutputSpeed] {
+        let found = |to_s: f64, is_refused: bool| {
+            let mut finder = ShiftFinder::new(&gearbox, |role| roles.contains(&role)).unwrap();
+            for mut reading in drive.readings(&roles) {
+                if reading.role == role && reading.time_s > 2.7 && reading.time_s < to_s {
+                    if !is_refused {
+                        continue;
+                    }
+                    reading.value = f64::NAN;
+                }
+                finder.push(&reading);
+            }
+            gears(&finder.finish())
+        };
+        assert_eq!(found(4.2, true), [(2, 3)], "{role:?}");
+        // A hole may hold more than one shift, and so may a failure of more than three seconds.
+        assert_eq!(found(4.2, false), [], "{role:?}");
+        assert_eq!(found(5.9, true), [], "{role:?}");
+    }
+}

@@ -121,17 +121,22 @@ impl<T: Real> Alignment<'_, T> {
         let dt_s = if possible { input.dt_s } else { T::infinity() };
         let limits = self.limits;
         let (engine_rad_s, engine) = state.engine.take(dt_s, input.engine_rad_s, limits);
+        // What has never come is in no channel, and an observer may do without.
+        let has_come = state.engine.last.is_some() || input.engine_rad_s.is_some();
+        let engine = if has_come { engine } else { ChannelHealth::Unused };
         let (turbine_rad_s, turbine) = state.turbine.take(dt_s, input.turbine_rad_s, limits);
         let (output_rad_s, output) = state.output.take(dt_s, input.output_rad_s, limits);
         let (wheel_rad_s, wheel) = state.wheel.take(dt_s, input.wheel_rad_s, limits);
         let standing = state.command.map(|last| Reading { age_s: last.age_s + dt_s, ..last });
         state.command = standing.filter(|last| last.age_s <= T::of(LOST_S));
         let command = match input.command {
-            Some(reading) if limits.command_valid(reading.value) => {
-                state.command = Some(reading);
-                ChannelHealth::Good
-            }
-            Some(_) => ChannelHealth::Refused,
+            Some(reading) => match limits.possible_command(reading.value) {
+                Some(value) => {
+                    state.command = Some(Reading { value, ..reading });
+                    ChannelHealth::Good
+                }
+                None => ChannelHealth::Refused,
+            },
             None if state.command.is_some() => ChannelHealth::Absent,
             None => ChannelHealth::Lost,
         };
@@ -165,8 +170,15 @@ fn step_observer<T: Real, O: SampleEstimator<T>>(
     state: &mut O::SampleState,
     aligned: &Aligned<T>,
 ) -> Estimate<T> {
-    let mut estimate = observer.step_sample(state, &aligned.sample);
-    estimate.channels = aligned.channels;
+    let Aligned { mut sample, mut channels } = *aligned;
+    if channels.engine == ChannelHealth::Unused {
+        match observer.needs_engine() {
+            true => channels.engine = ChannelHealth::Lost,
+            false => sample.engine_rad_s = sample.turbine_rad_s,
+        }
+    }
+    let mut estimate = observer.step_sample(state, &sample);
+    estimate.channels = channels;
     if !O::READS_WHEEL {
         estimate.channels.wheel = ChannelHealth::Unused;
     }

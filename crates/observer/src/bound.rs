@@ -183,7 +183,7 @@ impl<T: Real> RangeEstimator<T> {
             // The guaranteed ranges do not depend on the phase.
             (state.tracker.time_step(sample), None)
         };
-        let command = input.command.filter(|reading| limits.usable_command(reading));
+        let command = input.command.and_then(|reading| limits.read_command(&reading));
         for (unread_s, channel) in state.unread_s.iter_mut().zip([channels.turbine, channels.output]) {
             let is_read = channel == ChannelHealth::Good;
             *unread_s = if is_read { zero } else { *unread_s + dt_s.unwrap_or_else(T::infinity) };
@@ -193,8 +193,10 @@ impl<T: Real> RangeEstimator<T> {
         // A slip carried on by its rate may be wrong by what it changes at most, twice: once that it does, once that it did.
         let carried = T::one() + (unread_s + unread_s) / self.age_s;
         let error = self.budget.slip_rad_s * if fresh { T::one() } else { carried };
-        let slip_rad_s =
-            self.slips(&state.alignment, sample).filter(|_| usable).map(|[low, high]| [low - error, high + error]);
+        let slip_rad_s = self
+            .slips(&state.alignment, sample)
+            .filter(|_| limits.slip_valid(sample))
+            .map(|[low, high]| [low - error, high + error]);
         let read = fresh && channels.wheel == ChannelHealth::Good;
         Seen { dt_s, command, phase, sample, slip_rad_s, read }
     }

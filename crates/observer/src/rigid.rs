@@ -99,6 +99,13 @@ impl<T: Real> SampleEstimator<T> for RigidObserver<T> {
     type SampleState = RigidState<T>;
     const READS_WHEEL: bool = false;
 
+    /// The open loop does without.
+    #[inline]
+    fn needs_engine(&self) -> bool {
+        let is_open_loop = |gains: &RigidGains<T>| *gains == RigidGains::open_loop();
+        !self.gains.ends.iter().all(is_open_loop)
+    }
+
     fn tracker(&self) -> &Tracker<T> {
         &self.tracker
     }

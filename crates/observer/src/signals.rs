@@ -121,6 +121,8 @@ pub struct InputLimits<T> {
     pub speed_max_rad_s: T,
     /// Largest valve command, A or %; the smallest is zero.
     pub command_max: T,
+    /// Error of a reading of a valve command, A or %: one that is so far outside the range of the commands is its end.
+    pub command_error: T,
     /// Highest pressure that the supply can give, Pa; the lowest is zero.
     pub pressure_max_pa: T,
     /// Largest size of a drive-shaft torque, N m.
@@ -131,9 +133,13 @@ impl<T: Real> InputLimits<T> {
     /// Whether the speeds can be used.
     #[inline]
     pub fn speeds_valid(&self, sample: &Sample<T>) -> bool {
-        self.speed_valid(sample.engine_rad_s)
-            && self.speed_valid(sample.turbine_rad_s)
-            && sample.slip_rad_s.abs() <= self.speed_max_rad_s + self.speed_max_rad_s
+        self.speed_valid(sample.engine_rad_s) && self.slip_valid(sample)
+    }
+
+    /// Whether turbine speed and slip can be used.
+    #[inline]
+    pub fn slip_valid(&self, sample: &Sample<T>) -> bool {
+        self.speed_valid(sample.turbine_rad_s) && sample.slip_rad_s.abs() <= self.speed_max_rad_s + self.speed_max_rad_s
     }
 
     /// Whether a speed can be one of this gearbox.
@@ -149,10 +155,25 @@ impl<T: Real> InputLimits<T> {
         self.speed_valid(sample.wheel_rad_s)
     }
 
+    /// The valve command of a reading; none if it cannot be one. The current of a valve that is off is measured a little above or below
+    /// zero.
+    #[inline]
+    pub fn possible_command(&self, command: T) -> Option<T> {
+        let possible = command >= -self.command_error && command <= self.command_max + self.command_error;
+        possible.then(|| command.at_least(T::zero()).at_most(self.command_max))
+    }
+
     /// Whether a valve command can be used.
     #[inline]
     pub fn command_valid(&self, command: T) -> bool {
-        command >= T::zero() && command <= self.command_max
+        self.possible_command(command).is_some()
+    }
+
+    /// A reading of a valve command as far as it can be used.
+    #[inline]
+    pub(crate) fn read_command(&self, reading: &Reading<T>) -> Option<Reading<T>> {
+        let value = self.possible_command(reading.value).filter(|_| self.usable_command(reading))?;
+        Some(Reading { value, ..*reading })
     }
 
     /// Whether a reading of a valve command can be used.
@@ -178,6 +199,7 @@ impl<T: Real> InputLimits<T> {
         InputLimits {
             speed_max_rad_s: U::of(self.speed_max_rad_s.to_f64_exact()),
             command_max: U::of(self.command_max.to_f64_exact()),
+            command_error: U::of(self.command_error.to_f64_exact()),
             pressure_max_pa: U::of(self.pressure_max_pa.to_f64_exact()),
             shaft_torque_max_n_m: U::of(self.shaft_torque_max_n_m.to_f64_exact()),
         }
@@ -410,6 +432,13 @@ pub trait SampleEstimator<T> {
     /// Whether it reads the speed of the driven wheels.
     const READS_WHEEL: bool;
 
+    /// Whether it needs the engine speed. One that does not takes the turbine speed in its place where the log has none: a converter that
+    /// does not slip.
+    #[inline]
+    fn needs_engine(&self) -> bool {
+        true
+    }
+
     /// Its checks, valve and phase.
     fn tracker(&self) -> &Tracker<T>;
 
@@ -418,4 +447,36 @@ pub trait SampleEstimator<T> {
 
     /// Takes one sample and returns the estimate at its time. Never panics; allocates nothing.
     fn step_sample(&self, state: &mut Self::SampleState, sample: &Sample<T>) -> Estimate<T>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn limits<T: Real>() -> InputLimits<T> {
+        let [speed_max_rad_s, command_max, command_error] = [800.0, 1.2, 0.01].map(T::of);
+        let (pressure_max_pa, shaft_torque_max_n_m) = (T::of(1.1e6), T::of(5e3));
+        InputLimits { speed_max_rad_s, command_max, command_error, pressure_max_pa, shaft_torque_max_n_m }
+    }
+
+    fn a_command_within_its_error_of_the_range_is_its_end<T: Real>() {
+        let limits = limits::<T>();
+        let of = |command: f64| limits.possible_command(T::of(command)).map(|command| command.to_f64_exact());
+        assert_eq!([-0.003, -0.0099, 0.0].map(of), [Some(0.0); 3]);
+        let most = T::of(1.2).to_f64_exact();
+        assert_eq!([1.2, 1.209].map(of), [Some(most); 2]);
+        assert_eq!([-0.011, 1.211, f64::NAN, f64::NEG_INFINITY, f64::INFINITY].map(of), [None; 5]);
+        assert_eq!(of(0.5), Some(0.5));
+        let read = |value: f64, age_s: f64| limits.read_command(&Reading { value: T::of(value), age_s: T::of(age_s) });
+        assert_eq!(read(-0.003, 0.02), Some(Reading { value: T::zero(), age_s: T::of(0.02) }));
+        assert_eq!([read(0.3, -0.01), read(0.3, f64::INFINITY), read(-1.0, 0.0)], [None; 3]);
+    }
+
+    #[test]
+    fn a_command_within_its_error_of_the_range_is_its_end_in_both_precisions() {
+        a_command_within_its_error_of_the_range_is_its_end::<f64>();
+        a_command_within_its_error_of_the_range_is_its_end::<f32>();
+        let cast = limits::<f64>().cast::<f32>();
+        assert_eq!(cast.command_error, 0.01);
+    }
 }

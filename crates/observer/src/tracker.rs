@@ -188,17 +188,16 @@ impl<T: Real> Tracker<T> {
     #[inline]
     pub fn begin(&self, state: &mut TrackerState<T>, sample: &Sample<T>) -> Option<Interval<T>> {
         let dt_s = state.time_step(sample)?;
-        let (speeds_valid, command_valid) =
-            (self.limits.speeds_valid(sample), self.limits.command_valid(sample.command));
-        let health = match (speeds_valid, command_valid) {
+        let (speeds_valid, command) = (self.limits.speeds_valid(sample), self.limits.possible_command(sample.command));
+        let health = match (speeds_valid, command.is_some()) {
             (false, _) => Health::SpeedsRejected,
             (true, false) => Health::CommandRejected,
             (true, true) => Health::Good,
         };
         let interval = self.interval(state, dt_s, health);
         state.valve_pressure_pa = self.limits.possible_pressure(interval.pressure(state.valve_pressure_pa));
-        if command_valid {
-            state.command = sample.command;
+        if let Some(command) = command {
+            state.command = command;
         }
         Some(interval)
     }

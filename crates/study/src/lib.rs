@@ -7,6 +7,7 @@
 
 pub mod any_shift;
 pub mod bench;
+pub mod came_speed;
 pub mod campaign;
 pub mod comparison;
 pub mod consistency;
@@ -33,6 +34,7 @@ pub mod swapped_speeds;
 pub mod worst_case;
 
 pub use bench::{Bench, bench};
+pub use came_speed::CameSpeed;
 pub use campaign::{Campaign, Row, Status, Summary, execute};
 pub use comparison::{Comparison, ObserverRun, StudyError, compare};
 pub use consistency::Consistency;

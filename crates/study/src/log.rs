@@ -11,7 +11,7 @@ use trace::{CsvRows, TraceError, signal};
 use crate::Signals;
 use crate::frozen_rows::FrozenRows;
 use crate::row_clock::{RowClock, RowTime};
-use crate::row_samples::RowSamples;
+use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
 /// Rows that are looked at before the first estimate: gains are designed for the median time between them.
 pub const FIRST_LOOK: usize = 10_000;
@@ -125,6 +125,7 @@ impl Log {
     /// A signal is missing, or one of the first rows is wrong.
     pub fn of(rows: CsvRows, vehicle: &Vehicle, look: usize) -> Result<Self, TraceError> {
         let rows = rows.with_wheel_radius(vehicle.road.wheel_radius_m)?;
+        refuse_misnamed_engine(&rows)?;
         let signals = Signals::choose(vehicle, |name| rows.find(name), |name| rows.require(name))?;
         let truth = rows.find(signal::TRUE_PHASE).zip(rows.find(signal::ONCOMING_PRESSURE));
         let truth = truth.map(|(phase, pressure)| TruthColumns { phase, pressure });
@@ -165,12 +166,12 @@ impl Log {
         &self.signals
     }
 
-    /// Refuses a log without the wheel speed.
+    /// Refuses a log without a column of this name.
     ///
     /// # Errors
     /// It has none.
-    pub fn require_wheel_speed(&self) -> Result<(), TraceError> {
-        self.rows.require(signal::WHEEL_SPEED).map(drop)
+    pub fn require(&self, name: &str) -> Result<(), TraceError> {
+        self.rows.require(name).map(drop)
     }
 
     /// Median time between two of the first [`FIRST_LOOK`] samples, s.

@@ -2,7 +2,18 @@
 
 use std::cell::Cell;
 
-use trace::{CsvRows, TraceError};
+use trace::{CsvRows, TraceError, signal};
+
+/// Refuses a table without an engine speed that has a column with a similar name: it is meant, and an estimate without it is another.
+///
+/// # Errors
+/// It has such a column.
+pub(crate) fn refuse_misnamed_engine(rows: &CsvRows) -> Result<(), TraceError> {
+    let age = signal::age_of(signal::ENGINE_SPEED);
+    let is_similar = |name: &str| name.starts_with("engine_speed") && Some(name) != age;
+    let is_misnamed = rows.find(signal::ENGINE_SPEED).is_none() && rows.names().any(is_similar);
+    if is_misnamed { rows.require(signal::ENGINE_SPEED).map(drop) } else { Ok(()) }
+}
 
 /// What came of the cells of each column.
 pub(crate) struct RowSamples {

@@ -10,7 +10,7 @@ use trace::{Trace, TraceError, signal};
 /// The signals that the observers read. `C` is where one is found: the values of a column, or its place in a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Signals<C> {
-    engine_rad_s: Channel<C>,
+    engine_rad_s: Option<Channel<C>>,
     turbine_rad_s: Channel<C>,
     output: Output<C>,
     wheel_rad_s: Option<Channel<C>>,
@@ -51,7 +51,7 @@ enum Output<C> {
 
 impl<C: Copy> Signals<C> {
     /// Chooses the columns. Where the output speed was not recorded it follows from the turbine speed and the slip of the
-    /// oncoming clutch.
+    /// oncoming clutch. The open loop does without the engine speed.
     ///
     /// # Errors
     /// A signal that is needed is missing.
@@ -70,7 +70,7 @@ impl<C: Copy> Signals<C> {
                 (None, Some(slip)) => Output::OncomingSlip(slip),
                 _ => Output::Speed(required(signal::OUTPUT_SPEED)?),
             },
-            engine_rad_s: required(signal::ENGINE_SPEED)?,
+            engine_rad_s: found(signal::ENGINE_SPEED),
             wheel_rad_s: found(signal::WHEEL_SPEED),
             command: required(command_name)?,
             offgoing_command: found(command_signals(kind).1),
@@ -102,7 +102,7 @@ impl<C: Copy> Signals<C> {
         let optional = |channel: Option<Channel<C>>| channel.map_or(Ok(None), |channel| channel.reading(&value));
         Ok(Input {
             dt_s,
-            engine_rad_s: self.engine_rad_s.reading(&value)?,
+            engine_rad_s: optional(self.engine_rad_s)?,
             turbine_rad_s,
             output_rad_s,
             wheel_rad_s: optional(self.wheel_rad_s)?,

@@ -215,11 +215,15 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
     let mut readings = Readings::new(log, map)?;
     let (mut first_s, mut last_s, mut origin_s, mut resets) = (f64::NAN, f64::NAN, None, 0);
     let mut rates = Rates::default();
-    while let Some(reading) = readings.next() {
+    while let Some(reading) = readings.next_or_refused() {
         let reading = reading?;
         if readings.resets() > resets {
             resets = readings.resets();
             finder.restart();
+        }
+        if reading.is_refused() {
+            finder.push(&reading);
+            continue;
         }
         first_s = first_s.min(reading.time_s);
         last_s = reading.time_s;

@@ -11,7 +11,7 @@ fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
     let cases = [
         (text.replacen("turbine_speed_rad_s", "turbine_speed_rpm", 1), "turbine_speed cannot be in rpm: "),
         (text.replacen("element_int_current_a", "element_int_current_ma", 1), "element_int_current cannot be in mA: "),
-        (with_column(&text, "engine_speed_rad_s", |_| String::new()), "engine_speed has no value in any of"),
+        (with_column(&text, "turbine_speed_rad_s", |_| String::new()), "turbine_speed has no value in any of"),
         (
             with_column(&text, "output_speed_rad_s", |value| format!("-{value}")),
             "output_speed is negative and turbine_speed",

@@ -44,14 +44,20 @@ fn a_speed_that_stops_is_found_in_a_table_without_a_map() {
         let text = said(&estimate(&frozen(column, 4.0, 7.0), &["-o", &folder.path("out.csv")]));
         let note = format!("readings of {name}_speed stand still while the car does not, and are not used");
         assert!(text.contains(&note), "{name}: {text}");
-        // Half a second is waited for, and the engine until the turbine is close to it.
+        // Up to half a second is waited for, 0.05 s where the speed moved before, and the engine until the turbine is close to it.
         let count: f64 =
             text.split(&format!(" of 951 {note}")).next().unwrap().rsplit(' ').next().unwrap().parse().unwrap();
-        assert!((150.0..=251.0).contains(&count), "{name}: {count}");
+        assert!((150.0..=296.0).contains(&count), "{name}: {count}");
         // No reading is a reason for the health; the range does not trust the frozen speed any more.
         assert!(!text.contains("health: good 100.0 %") || name == "engine", "{name}: {text}");
-        let text = refused(&estimate(&frozen(column, 4.0, 10.0), &["-o", &folder.path("out.csv")]));
-        assert!(text.contains(&format!("hint: check the sensor of {name}_speed")), "{text}");
+        // A log goes on without output and wheel speed.
+        let output = estimate(&frozen(column, 4.0, 10.0), &["-o", &folder.path("out.csv")]);
+        if ["engine", "turbine"].contains(&name) {
+            let text = refused(&output);
+            assert!(text.contains(&format!("hint: check the sensor of {name}_speed")), "{text}");
+        } else {
+            assert!(said(&output).contains(&note), "{name}");
+        }
     }
 }
 

@@ -252,7 +252,7 @@ fn a_shift_without_its_command_is_said() {
     let folder = Folder::new("command");
     let log = folder.drives("log.csv", 1, Some(("oncoming_current_a", 0.001)));
     let text = said(&estimate(&log, &["-o", &folder.path("out.csv")]));
-    assert!(text.contains("1 shifts of the vehicle file are in the speeds and not in the command"), "{text}");
+    assert!(text.contains("1 shifts of the vehicle file are in the speeds and not in the estimate"), "{text}");
     assert!(rows(&folder.read("out_shifts.csv"))[0]["friction_work_j"].is_empty());
 }
 

@@ -12,6 +12,7 @@ mod day_of_logs;
 mod design_car;
 mod drives;
 mod equations;
+mod failing_channels;
 mod first_words;
 mod fit;
 mod fit_gearbox;

@@ -349,6 +349,7 @@ fn limits(
     Ok(InputLimits {
         speed_max_rad_s: check.number("observer.speed_max_rad_s", &raw.speed_max_rad_s, 100.0..=5e3)?,
         command_max: check.number("observer.command_max", &raw.command_max, 0.1..=100.0)?,
+        command_error: bounds.command,
         pressure_max_pa: bounds.pressure_max_pa,
         shaft_torque_max_n_m,
     })

@@ -62,6 +62,9 @@ impl GearsOfShift {
 
     /// Takes a reading.
     pub fn push(&mut self, reading: &Reading) {
+        if reading.is_refused() {
+            return;
+        }
         let output_rad_s = match (reading.role, self.output_rad_per_m) {
             (Role::TurbineSpeed, _) => {
                 self.turbine_rad_s = reading.value;

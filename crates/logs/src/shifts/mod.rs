@@ -264,6 +264,12 @@ impl ShiftFinder {
     /// Takes a reading. Readings of each role come in the order of time.
     pub fn push(&mut self, reading: &Reading) {
         let Reading { role, time_s, value, .. } = *reading;
+        if reading.is_refused() {
+            if matches!(role, Role::TurbineSpeed | Role::OutputSpeed) {
+                self.ratio.refused(time_s);
+            }
+            return;
+        }
         if !is_of_a_car(role, value) {
             return;
         }

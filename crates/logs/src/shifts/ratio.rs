@@ -80,6 +80,8 @@ pub(super) struct RatioWatch {
     before: Option<InGear>,
     now: Option<InGear>,
     changes: VecDeque<RatioChange>,
+    /// From when until when the newest readings were refused, s: their sensor failed, and the car drove on.
+    refused_s: Option<[f64; 2]>,
     unfit: Unfit,
 }
 
@@ -102,6 +104,7 @@ impl RatioWatch {
             before: None,
             now: None,
             changes: VecDeque::new(),
+            refused_s: None,
             unfit: Unfit::default(),
         }
     }
@@ -130,6 +133,22 @@ impl RatioWatch {
             self.outputs.pop_front();
         }
         self.join();
+    }
+
+    /// A reading of turbine or output speed that was refused.
+    pub(super) fn refused(&mut self, time_s: f64) {
+        match &mut self.refused_s {
+            Some([_, last_s]) if time_s - *last_s <= HOLE_S => *last_s = last_s.max(time_s),
+            refused_s => *refused_s = Some([time_s, time_s]),
+        }
+    }
+
+    /// Whether what lies between two times is a hole: not where readings came throughout and were refused.
+    fn is_hole(&self, from_s: f64, to_s: f64) -> bool {
+        let is_bridged = self
+            .refused_s
+            .is_some_and(|[first_s, last_s]| from_s <= last_s && first_s - from_s <= HOLE_S && to_s - last_s <= HOLE_S);
+        to_s - from_s > HOLE_S && !is_bridged
     }
 
     pub(super) fn next_change(&mut self) -> Option<RatioChange> {
@@ -164,7 +183,7 @@ impl RatioWatch {
             } else {
                 // Standstill and holes: what is before is not compared with what comes after.
                 self.raw_count = 0;
-                if self.now.or(self.before).is_none_or(|gear| time_s - gear.last_s > HOLE_S) {
+                if self.now.or(self.before).is_none_or(|gear| self.is_hole(gear.last_s, time_s)) {
                     (self.before, self.now) = (None, None);
                 }
             }
@@ -178,7 +197,7 @@ impl RatioWatch {
     }
 
     fn take(&mut self, point: Point) {
-        let hole = self.points.back().is_some_and(|last| point.time_s - last.time_s > HOLE_S);
+        let hole = self.points.back().is_some_and(|last| self.is_hole(last.time_s, point.time_s));
         if hole {
             (self.before, self.now) = (None, None);
         }

@@ -280,9 +280,7 @@ impl<T: Real> KalmanFilter<T> {
         let Some(reading) = input.command else {
             return if state.commands.is_fresh(T::of(LOST_S)) { ChannelHealth::Absent } else { ChannelHealth::Lost };
         };
-        if !self.limits.usable_command(&reading) {
-            return ChannelHealth::Refused;
-        }
+        let Some(reading) = self.limits.read_command(&reading) else { return ChannelHealth::Refused };
         let settled_pa = self.valve.valve.settled_pressure(reading.value);
         if state.commands.newest_pa().is_none() {
             // The first command is taken to have stood for long.
@@ -298,7 +296,13 @@ impl<T: Real> KalmanFilter<T> {
         let lost = T::of(LOST_S);
         let Some(reading) = input.engine_rad_s else {
             let lost = state.engine.is_none_or(|engine| engine.silent_s > lost);
-            return if lost { ChannelHealth::Lost } else { ChannelHealth::Absent };
+            // The valve maps alone do without.
+            let is_needed = self.uncertainty.output_least_rad_s < T::infinity();
+            return match lost {
+                true if is_needed => ChannelHealth::Lost,
+                true => ChannelHealth::Unused,
+                false => ChannelHealth::Absent,
+            };
         };
         if !(self.limits.speed_valid(reading.value) && reading.age_s >= T::zero() && reading.age_s <= lost) {
             return ChannelHealth::Refused;
@@ -360,7 +364,8 @@ impl<T: Real> KalmanFilter<T> {
     /// gear's ratio, and a reading of one tells both: where both come, they take turns.
     #[inline]
     fn skipped(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Option<usize> {
-        if input.turbine_rad_s.is_none() || input.output_rad_s.is_none() {
+        let comes = |reading: Option<Reading<T>>| reading.is_some_and(|reading| self.limits.speed_valid(reading.value));
+        if !(comes(input.turbine_rad_s) && comes(input.output_rad_s)) {
             return None;
         }
         state.turn = if state.turn == TURBINE { OUTPUT } else { TURBINE };

@@ -63,9 +63,7 @@ impl<T: Real> OffgoingPressure<T> {
                 Some(_) => ChannelHealth::Lost,
             };
         };
-        if !limits.usable_command(&reading) {
-            return ChannelHealth::Refused;
-        }
+        let Some(reading) = limits.read_command(&reading) else { return ChannelHealth::Refused };
         let settled_pa = offgoing.valve.valve.settled_pressure(reading.value);
         if self.commands.newest_pa().is_none() {
             // The first command is taken to have stood for long.

@@ -1,7 +1,8 @@
 //! A log of a drive of a car with any gearbox as a table: its columns, and what the filter is shown of a row.
 //!
 //! The columns have the names of `wetclutch simulate`. Time, turbine and output speed, gear, target gear and the command of every
-//! element's valve are needed, with a converter the engine speed too, without one the reported engine torque. True values and measured
+//! element's valve are needed, without a converter the reported engine torque too. With one the estimate is the open loop where there is no
+//! engine speed. True values and measured
 //! pressures are compared where the log has them.
 
 use config::Car;
@@ -17,7 +18,7 @@ use super::gear_signal::Gears;
 use super::pressure_command::{command_for, pressure_command_column};
 use crate::frozen_rows::FrozenRows;
 use crate::row_clock::{RowClock, RowTime};
-use crate::row_samples::RowSamples;
+use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
 /// Names for neither a forward gear nor reverse.
 const NEUTRAL: [&str; 2] = ["N", "P"];
@@ -116,7 +117,7 @@ impl Columns {
         let oncoming = truth([signal::ONCOMING_PRESSURE, signal::ONCOMING_TORQUE, signal::ONCOMING_SLIP]);
         let has_converter = car.converter.is_some();
         Ok(Self {
-            engine: if has_converter { Some(require(signal::ENGINE_SPEED)?) } else { find(signal::ENGINE_SPEED) },
+            engine: find(signal::ENGINE_SPEED),
             turbine: require(signal::TURBINE_SPEED)?,
             output: require(signal::OUTPUT_SPEED)?,
             wheel: find(signal::WHEEL_SPEED),
@@ -208,6 +209,7 @@ impl<'c> CarLog<'c> {
     /// One that is needed is missing.
     pub fn of(rows: CsvRows, car: &'c Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
         let rows = rows.with_wheel_radius(car.road.wheel_radius_m)?;
+        refuse_misnamed_engine(&rows)?;
         let columns = Columns::of(&rows, car, tables)?;
         let (clock, frozen, samples) = (RowClock::default(), FrozenRows::new(), RowSamples::new(&rows));
         let gears = Gears::new([signal::GEAR, signal::TARGET_GEAR]);

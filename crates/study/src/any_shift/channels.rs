@@ -1,13 +1,13 @@
 //! A log of a drive of a car with any gearbox, of any format, by a channel map: each channel with a clock of its own.
 //!
-//! Turbine and output speed, gear, target gear and the command of every element's valve are needed, with a converter the engine speed
-//! too, without one the engine torque. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
+//! Turbine and output speed, gear, target gear and the command of every element's valve are needed, without a converter the engine torque
+//! too. With one the estimate is the open loop where there is no engine speed. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
 
 use config::Car;
 use config::gearbox::element_column;
 use design::ShiftTables;
 use drivetrain::CommandKind;
-use logs::{ChannelMap, Log, LogError, Mapped, Places, Reading, Readings, Role, Steps};
+use logs::{ChannelMap, Log, LogError, Mapped, OnChange, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
@@ -58,6 +58,8 @@ pub struct CarChannels<'a> {
     tables: &'a ShiftTables<f64>,
     steps: Steps<'a, Newest>,
     entries: Vec<Entry>,
+    /// Commands of which the map says that they are sent on change, by their places in the filter's tables.
+    on_change: [OnChange; MAX_ELEMENTS],
     gears: Gears,
     lock_up_applied: bool,
     pedal: f64,
@@ -78,11 +80,22 @@ impl<'a> CarChannels<'a> {
     ) -> Result<Self, LogError> {
         let entries = map.channels.iter().map(|entry| entry_of(entry, car, tables)).collect::<Result<Vec<_>, _>>()?;
         require(map, car, tables)?;
+        let mut on_change = [OnChange::default(); MAX_ELEMENTS];
+        for (mapped, entry) in map.channels.iter().zip(&entries).filter(|(mapped, _)| mapped.sent_on_change) {
+            if let Some((_, Some(place))) = entry.element {
+                on_change[place] = OnChange::by_map(mapped.delay_s);
+            }
+        }
         let readings = Readings::new(log, map)?;
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
         let gears = Gears::new([Role::Gear, Role::TargetGear].map(Role::name));
         let (lock_up_applied, pedal, vehicle_m_s, oil_degc) = (false, f64::NAN, None, None);
-        Ok(Self { car, tables, steps, entries, gears, lock_up_applied, pedal, vehicle_m_s, oil_degc })
+        Ok(Self { car, tables, steps, entries, on_change, gears, lock_up_applied, pedal, vehicle_m_s, oil_degc })
+    }
+
+    /// The commands by their places in the filter's tables, with those of which the map says that they are sent on change.
+    pub fn commands_on_change(&self) -> [OnChange; MAX_ELEMENTS] {
+        self.on_change
     }
 
     /// The readings, with their summary and notes.
@@ -232,7 +245,7 @@ fn key_of(column: &str) -> String {
 /// Refuses a map that lacks a channel that is needed.
 fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(), LogError> {
     let mut needed = vec![Role::TurbineSpeed, Role::OutputSpeed, Role::Gear, Role::TargetGear];
-    needed.push(if car.converter.is_some() { Role::EngineSpeed } else { Role::EngineTorque });
+    needed.extend(car.converter.is_none().then_some(Role::EngineTorque));
     let commands = element_commands(car).into_iter().filter(|(at, _)| tables.place(*at).is_some());
     let keys: Vec<String> =
         needed.iter().map(|role| role.name().to_owned()).chain(commands.map(|(_, name)| key_of(&name))).collect();

@@ -4,6 +4,7 @@ use config::Car;
 use observer::{Health, Reading};
 
 use super::ratio_scale::{RatioScale, WrongScale};
+use crate::CameSpeed;
 use crate::ratio_histogram::RatioHistogram;
 use crate::swapped_speeds::SwappedSpeeds;
 
@@ -37,15 +38,15 @@ pub(super) struct InGear<'c> {
     /// Output over wheel speed in the rows that have both; how many there are, and how long they are, s.
     output_over_wheel: RatioHistogram<1000>,
     wheel_rows: (u64, f64),
-    /// Newest speed of the wheels, rad/s.
-    wheel_rad_s: f64,
+    wheel: CameSpeed,
 }
 
 /// A row in a gear.
 pub(super) struct InGearRow {
     /// The gear, by its place in the gearbox.
     pub(super) gear: usize,
-    /// Time since the row before, s.
+    /// Its time, and that since the row before, s.
+    pub(super) time_s: f64,
     pub(super) dt_s: f64,
     /// Newest speeds of engine, turbine and output as they came, rad/s.
     pub(super) came_rad_s: [f64; 3],
@@ -66,19 +67,20 @@ impl<'c> InGear<'c> {
             scale: RatioScale::new(car),
             output_over_wheel: RatioHistogram::default(),
             wheel_rows: (0, 0.0),
-            wheel_rad_s: f64::NAN,
+            wheel: CameSpeed::default(),
         }
     }
 
     pub(super) fn push(&mut self, row: &InGearRow) {
         let [engine, turbine, output] = row.came_rad_s;
-        if let Some(Reading { value, .. }) = row.wheel {
-            self.wheel_rad_s = value;
+        let wheel = row.wheel.filter(|reading| reading.value.is_finite());
+        if let Some(Reading { value, .. }) = wheel {
+            self.wheel.push(row.time_s, value);
         }
         let ratio = self.car.gearbox.gears.get(row.gear).map_or(f64::NAN, |gear| gear.ratio);
         // An output speed in a wrong unit may be too slow to count. Without a converter the turbine turns with the engine at a standstill.
         let by_turbine = if self.car.converter.is_some() { turbine / ratio } else { f64::NAN };
-        let by_wheels = self.wheel_rad_s * self.car.driveline.final_ratio;
+        let by_wheels = self.wheel.at(row.time_s) * self.car.driveline.final_ratio;
         if ratio.is_nan() {
             return;
         }
@@ -93,11 +95,15 @@ impl<'c> InGear<'c> {
             return;
         }
         let by_output = ratio * output;
+        if (turbine - by_output).is_nan() {
+            // One of both is lost, and the other shows no ratio.
+            return;
+        }
         self.swapped.push(engine, turbine, &[by_output]);
         self.scale.push(row.gear, ratio, row.came_rad_s);
         self.rows[0] += 1;
         self.rows[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
-        if let (Some(output), Some(wheel)) = (row.output, row.wheel) {
+        if let (Some(output), Some(wheel)) = (row.output.filter(|reading| reading.value.is_finite()), wheel) {
             self.output_over_wheel.push(output.value / wheel.value);
             self.wheel_rows.0 += 1;
             self.wheel_rows.1 += row.dt_s.clamp(0.0, 1.0);

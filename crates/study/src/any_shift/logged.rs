@@ -23,6 +23,7 @@ use super::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk, not_of_th
 pub use super::ratio_scale::WrongScale;
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
+use crate::CameSpeed;
 use crate::shift_estimates::is_refused;
 
 /// Slip below which a true clutch sticks, rad/s.
@@ -39,8 +40,8 @@ pub struct LoggedDrive<'c> {
     state: AnyShiftState<f64>,
     learning: LearningCount,
     passing: PassingShifts,
-    /// Newest speeds of engine, turbine and output, rad/s: as they came, and those that the filter did not refuse.
-    came_rad_s: [f64; 3],
+    /// Newest speeds of engine, turbine and output, rad/s: as they came, with the time, and those that the filter did not refuse.
+    came: [CameSpeed; 3],
     speeds_rad_s: [f64; 3],
     begun_s: f64,
     /// Where the turbine is in it.
@@ -117,7 +118,7 @@ impl<'c> LoggedDrive<'c> {
             state,
             learning: LearningCount::of(state.learnt()),
             passing: PassingShifts::default(),
-            came_rad_s: [f64::NAN; 3],
+            came: [CameSpeed::default(); 3],
             speeds_rad_s: [f64::NAN; 3],
             begun_s: f64::NAN,
             beyond: BeyondGears::new(&car.gearbox, [NO_GEAR; 2], [f64::NAN; 2]),
@@ -159,8 +160,8 @@ impl<'c> LoggedDrive<'c> {
         let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
         let channels = [estimate.channels.engine, estimate.channels.turbine, estimate.channels.output];
         for (at, (reading, health)) in readings.into_iter().zip(channels).enumerate() {
-            let Some(Reading { value, .. }) = reading else { continue };
-            self.came_rad_s[at] = value;
+            let Some(Reading { value, .. }) = reading.filter(|reading| reading.value.is_finite()) else { continue };
+            self.came[at].push(step.time_s, value);
             if !is_refused(health) {
                 self.speeds_rad_s[at] = value;
             }
@@ -181,6 +182,7 @@ impl<'c> LoggedDrive<'c> {
             self.holes.cut = None;
         }
         let is_hole = self.holes.is_hole(input.dt_s);
+        let came_rad_s = self.came.each_ref().map(|came| came.at(step.time_s));
         if let Some(open) = self.passing.open.as_ref().filter(|_| is_hole) {
             self.holes.count += 1;
             self.holes.cut = gears.filter(|gears| *gears == [open.from, open.to]);
@@ -201,7 +203,8 @@ impl<'c> LoggedDrive<'c> {
                 self.in_gear.push(&InGearRow {
                     gear: from,
                     dt_s: input.dt_s,
-                    came_rad_s: self.came_rad_s,
+                    time_s: step.time_s,
+                    came_rad_s,
                     output: input.output_rad_s,
                     wheel: input.wheel_rad_s,
                     health: estimate.health,
@@ -210,7 +213,7 @@ impl<'c> LoggedDrive<'c> {
         }
         // In a shift the gear may be the new one already.
         self.gear = gears.map_or(Some(from), |_| None);
-        let [engine, turbine, output] = self.came_rad_s;
+        let [engine, turbine, output] = came_rad_s;
         if gears.is_none() {
             self.converter.push(self.car, step, [engine, turbine]);
             self.lock_up.push(self.car, step, [engine, turbine]);
@@ -240,9 +243,15 @@ impl<'c> LoggedDrive<'c> {
         self.in_gear.rows()
     }
 
-    /// The rows in a gear while the car moves, if there are enough of them and the filter could use the readings of none.
+    /// The rows in a gear while the car moves, if there are enough of them and the filter could use the readings of none. Without an engine
+    /// speed it is rightly the open loop.
     pub fn unusable(&self) -> Option<Unusable> {
-        self.in_gear.unusable()
+        self.in_gear.unusable().filter(|_| !self.is_open_loop())
+    }
+
+    /// Whether the engine speed, which the filter needs in front of a converter, has never come.
+    fn is_open_loop(&self) -> bool {
+        self.car.converter.is_some() && !self.car.gearbox.has_ratios_alone() && !self.came[0].has_come()
     }
 
     /// Output over wheel speed in a gear at speed, in the middle; not a number where too few rows have both.
@@ -346,6 +355,12 @@ impl<'c> LoggedDrive<'c> {
         self.end(f64::NAN, usize::MAX);
         let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));
         let mut warnings: Vec<String> = swapped.into_iter().chain(self.commands.warnings()).collect();
+        if self.is_open_loop() {
+            warnings.push(
+                "warning: there is no engine speed, which gives the turbine torque: pressures and torques are those of the valve models alone (open loop)"
+                    .to_owned(),
+            );
+        }
         warnings.extend(self.doubted.warning(self.car));
         warnings.extend(self.delay.warning());
         warnings.extend(self.converter.warning(self.car));

@@ -1,6 +1,6 @@
 //! What is said about the estimates of a log.
 
-use config::Vehicle;
+use config::{ObserverKind, Vehicle};
 use logs::Role;
 use observer::{ChannelHealth, Estimate as Sample, Health};
 use report::tables::{health_meaning, phase_name};
@@ -8,7 +8,8 @@ use study::log::FIRST_LOOK;
 use study::{ErrorScore, Passages};
 use trace::units;
 
-use super::measured::Step;
+use super::measured::{Measured, Step};
+use super::observer::is_open_loop;
 use super::ratios::Ratios;
 use super::said_of_origin;
 use super::watched::is_looked_at;
@@ -28,6 +29,8 @@ pub(super) struct Findings {
     health: Vec<(Health, u64)>,
     /// None if a row has no true value.
     errors: Option<ErrorScore>,
+    /// Samples without a command of the valve that can be used.
+    without_command: u64,
     /// Readings that came, and those of them that were taken, of each channel.
     came: [u64; CHANNELS],
     taken: [u64; CHANNELS],
@@ -49,6 +52,7 @@ impl Findings {
             passages: Passages::default(),
             health: Vec::new(),
             errors: Some(ErrorScore::new(0.0)),
+            without_command: 0,
             came: [0; CHANNELS],
             taken: [0; CHANNELS],
         }
@@ -70,7 +74,7 @@ impl Findings {
     pub(super) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
         self.pass(row.time_s);
         self.rows += 1;
-        self.ratios.push(&row.input, is_looked_at(self.rows, FIRST_LOOK));
+        self.ratios.push(row.time_s, &row.input, is_looked_at(self.rows, FIRST_LOOK));
         let input = &row.input;
         let readings = [
             input.engine_rad_s,
@@ -84,9 +88,13 @@ impl Findings {
         for (at, (reading, health)) in readings.iter().zip(estimate.channels.each()).enumerate() {
             // An observer that does without a channel refuses none of its readings.
             let taken = matches!(health, ChannelHealth::Good | ChannelHealth::Unused);
-            self.came[at] += u64::from(reading.is_some());
-            self.taken[at] += u64::from(reading.is_some() && taken);
+            // One without a value is of a sensor that fails, and tells nothing of the channel.
+            let came = reading.is_some_and(|reading| reading.value.is_finite());
+            self.came[at] += u64::from(came);
+            self.taken[at] += u64::from(came && taken);
         }
+        let is_lost = matches!(estimate.channels.command, ChannelHealth::Lost | ChannelHealth::Refused);
+        self.without_command += u64::from(is_lost);
         self.passages.push(row.time_s, estimate.phase);
         match self.health.iter_mut().find(|(health, _)| *health == estimate.health) {
             Some((_, count)) => *count += 1,
@@ -115,7 +123,8 @@ impl Findings {
     ///
     /// # Errors
     /// More than half of the readings of a channel were refused, or none came; or most estimates are outside their range.
-    pub(super) fn check(&self, commands: [Role; 2], needs_wheel: bool) -> Result<(), Failure> {
+    pub(super) fn check(&self, commands: [Role; 2], log: &Measured<'_>, observer: ObserverKind) -> Result<(), Failure> {
+        let needs_wheel = log.has_wheel_speed() && observer != ObserverKind::Rigid && !is_open_loop(observer);
         if self.rows == 0 && self.other_gear > 0 {
             return Err(Failure::Input(
                 "the log is never in the gears of the vehicle file's shift\nhint: check `gearbox.ratios` of the channel map and the \
@@ -129,6 +138,7 @@ impl Findings {
             let (came, taken, name) = (self.came[at], self.taken[at], role.name());
             let is_needed = match role {
                 Role::WheelSpeed => needs_wheel,
+                Role::EngineSpeed => !is_open_loop(observer),
                 Role::OffgoingCurrent | Role::OffgoingDuty | Role::EngineTorque => false,
                 _ => true,
             };
@@ -156,11 +166,12 @@ impl Findings {
     fn check_estimates(&self) -> Result<(), Failure> {
         let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::HeldClutchSlips, Health::Flare];
         let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
-        let lost = of(&Health::CommandRejected);
+        let lost = self.without_command;
         if 2 * lost > self.rows && self.rows >= ENOUGH_ROWS {
             return Err(Failure::Input(format!(
-                "{} of {} samples have no command of the valve that can be used\nhint: look at its channel with `wetclutch inspect`; a log of \
-                 another car, or of one with a whole gearbox, may have it in its shifts alone, and that needs the vehicle file of that car",
+                "{} of {} samples have no command of the valve that can be used\nhint: if it is sent on change, say so by `sent_on_change = true` \
+                 in a channel map; else look at its channel with `wetclutch inspect`. A log of another car, or of one with a whole gearbox, may have \
+                 it in its shifts alone, and that needs the vehicle file of that car",
                 output::grouped(lost),
                 output::grouped(self.rows)
             )));

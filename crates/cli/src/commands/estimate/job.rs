@@ -14,7 +14,8 @@ use study::shift_estimates::no_estimate;
 use trace::ShownPath as _;
 
 use super::findings::Findings;
-use super::measured::{Measured, Step, WITHOUT_SENSORS, check_span, old_commands, slow_log, warn_of_dbc};
+use super::log_checks::{WITHOUT_SENSORS, check_span, old_commands, slow_log, warn_of_dbc};
+use super::measured::{Measured, Step};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
@@ -158,8 +159,7 @@ fn check_findings(
         CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
         CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],
     };
-    let without_wheel = [ObserverKind::Rigid, ObserverKind::OpenLoop, ObserverKind::OpenLoopMaps];
-    findings.check(commands, log.has_wheel_speed() && !without_wheel.contains(&observer))
+    findings.check(commands, log, observer)
 }
 
 /// Writes the page, beside the table of shifts.
@@ -249,8 +249,9 @@ fn report_shifts(shifts: &Shifts<'_>, has_file: bool, say: &mut Messages) -> Res
     match shifts.found.iter().filter(|shift| shift.of_vehicle && shift.estimated.is_none()).count() {
         0 => {}
         unseen => say.note(&format!(
-            "warning: {unseen} shifts of the vehicle file are in the speeds and not in the command of the valve, which stays below \
-             the kiss point\nhint: check unit and scale of the command, and whether it is that of the oncoming clutch"
+            "warning: {unseen} shifts of the vehicle file are in the speeds and not in the estimate: the command of the valve stays below \
+             the kiss point, or a speed is refused throughout the shift\nhint: check unit and scale of the command, and whether it is that of the \
+             oncoming clutch"
         )),
     }
     Ok(())

@@ -9,17 +9,18 @@ use std::sync::atomic::AtomicBool;
 
 use config::Vehicle;
 use drivetrain::{ClutchValve, CommandKind};
-use logs::plausibility::{Seen, likely_time_unit, too_fast_a_time};
+use logs::plausibility::Seen;
 use logs::{
-    ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, Reading, Readings, Role, Shift, ShiftFinder, Steps,
+    ChannelMap, Gearbox, GearsOfShift, Log, LogError, OnChange, Reading, Readings, Role, Shift, ShiftFinder, Steps,
 };
 use observer::{ChannelHealth, Input, Reading as Measurement};
 use study::any_shift::pressure_command::command_of_valve;
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use study::shift_estimates::is_refused;
-use trace::{CsvRows, Following, ShownPath as _, TraceError, signal};
+use trace::{CsvRows, Following, ShownPath as _, signal};
 
 use super::Messages;
+use super::log_checks::{check_step, other_delimiter, report_readings, sent_on_change};
 use super::watched::{WatchedColumn, WatchedColumns};
 use crate::failure::Failure;
 use crate::output;
@@ -40,6 +41,29 @@ pub(super) struct Measured<'a> {
     gears: Option<GearsOfShift>,
     /// Time since the last step in them, s.
     waited_s: f64,
+    looked_at: LookedAt,
+    /// Of the oncoming and of the offgoing clutch, and whether the log shows that they are sent on change.
+    commands: [(OnChange, bool); 2],
+}
+
+/// What came in the steps before the first estimate.
+#[derive(Default)]
+struct LookedAt {
+    steps: u64,
+    has_engine: bool,
+    has_wheel: bool,
+}
+
+impl LookedAt {
+    fn of<'i>(inputs: impl Iterator<Item = &'i Input<f64>>) -> Self {
+        let mut seen = Self::default();
+        for input in inputs {
+            seen.steps += 1;
+            seen.has_engine |= input.engine_rad_s.is_some();
+            seen.has_wheel |= input.wheel_rad_s.is_some();
+        }
+        seen
+    }
 }
 
 /// Rows of signals with the names of the program, or channels with clocks of their own.
@@ -65,7 +89,6 @@ struct Channels<'a> {
     asked_of: Option<(ClutchValve<f64>, f64)>,
     looked_at: VecDeque<(Step, Vec<Reading>)>,
     median_step_s: f64,
-    has_wheel_speed: bool,
 }
 
 /// What is known at one time.
@@ -123,9 +146,7 @@ impl Step {
 fn each_reading(input: &Input<f64>, row: &LogRow, mut see: impl FnMut(&Reading)) {
     let stamp_s = row.time_s;
     let mut see = |role: Role, value: f64, age_s: f64| {
-        if value.is_finite() {
-            see(&Reading { role, time_s: stamp_s - age_s, stamp_s, value });
-        }
+        see(&Reading { role, time_s: stamp_s - age_s, stamp_s, value });
     };
     let speeds = [
         (Role::EngineSpeed, input.engine_rad_s),
@@ -146,7 +167,9 @@ fn each_reading(input: &Input<f64>, row: &LogRow, mut see: impl FnMut(&Reading))
         (Role::VehicleSpeed, vehicle_m_s),
         (Role::VehicleAcceleration, vehicle_m_s2),
     ] {
-        see(role, value, 0.0);
+        if value.is_finite() {
+            see(role, value, 0.0);
+        }
     }
 }
 
@@ -177,8 +200,9 @@ impl<'a> Measured<'a> {
         // Turbine and output speed are there, and tell shifts.
         let finder = ShiftFinder::new(&gearbox, |role| has(&log, role))?;
         let ahead = watched.rows();
+        let looked_at = LookedAt::of(log.looked_at().map(|(input, _)| input));
         let source = Source::Rows(Box::new(Rows { log, row: LogRow::NONE, watched, ahead }));
-        Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears: None, waited_s: 0.0 })
+        Ok(Self::of(source, finder, gearbox.ratios, None, looked_at, [OnChange::default(); 2]))
     }
 
     /// Channels of a log by a map.
@@ -203,7 +227,7 @@ impl<'a> Measured<'a> {
                 asked.name()
             )));
         }
-        let needed = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, command];
+        let needed = [Role::TurbineSpeed, Role::OutputSpeed, command];
         if let Some(missing) = needed.into_iter().find(|role| !map.has(*role)) {
             return Err(Failure::Input(format!(
                 "the channel map has no {}\nhint: an estimate needs {}; add `[channel.{}]` or --channel {0}=NAME",
@@ -229,7 +253,6 @@ impl<'a> Measured<'a> {
             asked_of: (command == asked).then_some((vehicle.oncoming.valve, vehicle.limits.pressure_max_pa)),
             looked_at: VecDeque::new(),
             median_step_s: f64::NAN,
-            has_wheel_speed: map.has(Role::WheelSpeed),
         };
         while channels.looked_at.len() < look
             && let Some(step) = channels.read()
@@ -243,27 +266,76 @@ impl<'a> Measured<'a> {
         check_step(path, channels.median_step_s, true)?;
         let shift = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
         let gears = GearsOfShift::new(&gearbox, shift);
+        let looked_at = LookedAt::of(channels.looked_at.iter().map(|(step, _)| &step.input));
         let source = Source::Channels(Box::new(channels));
-        Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears, waited_s: 0.0 })
+        let on_change = |roles: [Role; 2]| {
+            let mut mapped = map.channels.iter().filter(|mapped| mapped.sent_on_change);
+            mapped
+                .find(|mapped| roles.contains(&mapped.role))
+                .map_or_else(OnChange::default, |mapped| OnChange::by_map(mapped.delay_s))
+        };
+        let commands = [on_change([command; 2]), on_change([Role::OffgoingCurrent, Role::OffgoingDuty])];
+        Ok(Self::of(source, finder, gearbox.ratios, gears, looked_at, commands))
     }
 
+    fn of(
+        source: Source<'a>,
+        finder: ShiftFinder,
+        ratios: Vec<f64>,
+        gears: Option<GearsOfShift>,
+        looked_at: LookedAt,
+        mut commands: [OnChange; 2],
+    ) -> Self {
+        let mut look = |input: &Input<f64>| {
+            for (command, reading) in commands.iter_mut().zip([input.command, input.offgoing_command]) {
+                command.look(input.dt_s, reading.map(|reading| reading.value));
+            }
+        };
+        match &source {
+            Source::Rows(rows) => rows.log.looked_at().for_each(|(input, _)| look(input)),
+            Source::Channels(channels) => channels.looked_at.iter().for_each(|(step, _)| look(&step.input)),
+        }
+        let commands = commands.map(|mut command| {
+            let is_shown = command.is_shown();
+            (command, is_shown)
+        });
+        Self { source, step: Step::none(), finder, ratios, resets: 0, gears, waited_s: 0.0, looked_at, commands }
+    }
+
+    /// Whether a reading of the wheel speed came before the first estimate.
     pub(super) fn has_wheel_speed(&self) -> bool {
-        match &self.source {
-            Source::Rows(rows) => rows.log.signals().has_wheel_speed(),
-            Source::Channels(channels) => channels.has_wheel_speed,
-        }
+        self.looked_at.has_wheel
     }
 
-    /// Refuses a log without the wheel speed.
-    pub(super) fn require_wheel_speed(&self) -> Result<(), Failure> {
-        match &self.source {
-            Source::Rows(rows) => Ok(rows.log.require_wheel_speed()?),
-            Source::Channels(channels) if channels.has_wheel_speed => Ok(()),
-            Source::Channels(_) => Err(Failure::Input(
-                "the channel map has no wheel_speed, which this observer needs\nhint: add `[channel.wheel_speed]`, or use `--observer rigid`"
-                    .to_owned(),
-            )),
+    /// The same of the engine speed.
+    pub(super) fn has_engine_speed(&self) -> bool {
+        self.looked_at.has_engine
+    }
+
+    /// Refuses a log without engine or wheel speed.
+    pub(super) fn require(&self, role: Role) -> Result<(), Failure> {
+        let (comes, column, hint) = match role {
+            Role::WheelSpeed => (self.has_wheel_speed(), signal::WHEEL_SPEED, "rigid"),
+            _ => (self.has_engine_speed(), signal::ENGINE_SPEED, "open-loop"),
+        };
+        if comes {
+            return Ok(());
         }
+        let name = role.name();
+        match &self.source {
+            Source::Rows(rows) => rows.log.require(column)?,
+            Source::Channels(channels) if channels.maps(role) => {}
+            Source::Channels(_) => {
+                return Err(Failure::Input(format!(
+                    "the channel map has no {name}, which this observer needs\nhint: add `[channel.{name}]`, or use `--observer {hint}`"
+                )));
+            }
+        }
+        Err(Failure::Input(format!(
+            "{name} has no value in any of the first {} samples, and this observer needs it\nhint: use `--observer {hint}`, or look at \
+             the log with `wetclutch inspect`",
+            output::grouped(self.looked_at.steps)
+        )))
     }
 
     pub(super) fn median_step_s(&self) -> f64 {
@@ -298,6 +370,11 @@ impl<'a> Measured<'a> {
     /// # Errors
     /// Most samples of a channel could not be used, or a unit is wrong by all appearances.
     pub(super) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
+        let shown = self.commands.iter().zip(["oncoming", "offgoing"]).filter(|((_, is_shown), _)| *is_shown);
+        let shown: Vec<&str> = shown.map(|(_, name)| name).collect();
+        if !shown.is_empty() {
+            say.note(&sent_on_change(&shown.join(", ")));
+        }
         let channels = match &self.source {
             Source::Rows(rows) => {
                 for note in rows.log.check_readings()? {
@@ -307,116 +384,13 @@ impl<'a> Measured<'a> {
             }
             Source::Channels(channels) => channels,
         };
+        // An observer that needs one of them was not chosen, or has refused the log.
+        let may_be_empty = [Role::EngineSpeed, Role::WheelSpeed];
         if let Some(contradiction) = self.finder.contradiction() {
             say.note(&format!("warning: {contradiction}"));
         }
-        report_readings(channels.steps.readings(), say)
+        report_readings(channels.steps.readings(), &may_be_empty, say)
     }
-}
-
-/// A table with another delimiter than the comma is one of a single column; a channel map reads it.
-pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
-    let delimiter = match &error {
-        TraceError::MissingColumn { present, .. } => match present.as_slice() {
-            [only] => [';', '\t', '|'].into_iter().find(|delimiter| only.contains(*delimiter)),
-            _ => None,
-        },
-        _ => None,
-    };
-    let Some(delimiter) = delimiter else { return error.into() };
-    let given = path.shown();
-    Failure::Input(format!(
-        "{}: the columns are separated by `{}`, which is read by a channel map only\n\
-         hint: `wetclutch inspect {given} --suggest > map.toml` writes one; check it, then add --map map.toml",
-        path.shown(),
-        delimiter.escape_debug()
-    ))
-}
-
-/// Warns of a DBC that is given for a table with the names of the program.
-pub(super) fn warn_of_dbc(map: &ChannelMap) {
-    if map.open.dbc.is_some() {
-        output::note(&format!("warning: {}", logs::log::NO_FRAMES));
-    }
-}
-
-/// Refuses a log with so much time between its rows that it has no shifts: the time is in another unit by all appearances.
-pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<(), Failure> {
-    const LONGEST_S: f64 = 1.0;
-    if median_s < LONGEST_S || median_s.is_nan() {
-        return Ok(());
-    }
-    let unit = likely_time_unit(median_s).unwrap_or("ms");
-    let hint = match (is_mapped, unit) {
-        (true, unit) => format!("set `unit = \"{unit}\"` under [time] in the channel map"),
-        (false, "ms") => format!("call its column `time_ms` in place of `{}`", signal::TIME),
-        (false, _) => format!("convert it to s, or let a channel map read it, with `unit = \"{unit}\"` under [time]"),
-    };
-    Err(Failure::Input(format!(
-        "{}: the middle time between two rows is {median_s} s, longer than a phase of a shift\n\
-         hint: if the time is in {unit}, {hint}",
-        path.shown()
-    )))
-}
-
-/// Refuses a log whose time passes too fast, once its last row is known.
-pub(super) fn check_span(path: &Path, median_s: f64, span_s: f64) -> Result<(), Failure> {
-    let wrong = too_fast_a_time(median_s, span_s);
-    wrong.map_or(Ok(()), |wrong| Err(Failure::Input(format!("{}: {wrong}", path.shown()))))
-}
-
-/// Says that a log has too few rows for its shifts.
-pub(super) fn slow_log(median_s: f64) -> Option<String> {
-    /// Five rows in an inertia phase of half a second \[chosen\].
-    const LONGEST_S: f64 = 0.1;
-    (median_s > LONGEST_S * (1.0 + ROUNDING)).then(|| {
-        format!(
-            "warning: the middle time between two rows is {median_s:.3} s, too long for the estimate of a shift: an inertia phase takes 0.3 to 1 s, \
-             and {} s without a reading count as a lost channel\nhint: record speeds and commands every {LONGEST_S} s or more often",
-            observer::LOST_S
-        )
-    })
-}
-
-/// What the ranges assume of the sensors where no file describes them.
-pub(super) const WITHOUT_SENSORS: &str = "ranges: no sensor file was given (--sensors), so a reading of a speed counts as one of the time of its row, and a command errs \
-     by no more than the error bounds of the vehicle file. The ranges are guaranteed only where that is so; a [sensors] table makes them those of the sensors";
-
-/// Says that commands may be older than the bounds of the vehicle file allow: a row shows a command that was sent since the row before.
-pub(super) fn old_commands(median_s: f64, bound_s: f64) -> Option<String> {
-    (median_s > bound_s * (1.0 + ROUNDING)).then(|| {
-        format!(
-            "warning: the middle time between two rows is {median_s:.3} s, and by `command_age_s` of the vehicle file a command is at most {bound_s} s \
-             older than the row that shows it first. The guaranteed range does not hold for commands that change at any time between two rows\n\
-             hint: set `command_age_s = {median_s:.3}` under [design.error_bounds], or record the commands more often"
-        )
-    })
-}
-
-/// Share by which times of rows are rounded.
-const ROUNDING: f64 = 1e-3;
-
-/// Says what was met in mapped channels, after their last step.
-///
-/// # Errors
-/// Most samples of a channel could not be used, or a unit is wrong by all appearances.
-pub(super) fn report_readings(readings: &Readings<'_>, say: &mut Messages) -> Result<(), Failure> {
-    for role in readings.summary() {
-        let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
-        if good < total {
-            say.note(&format!(
-                "{} of {} samples of {} are not used: {}",
-                output::grouped(total - good),
-                output::grouped(total),
-                role.name,
-                role.counts.faults()
-            ));
-        }
-    }
-    for note in readings.notes() {
-        say.note(&format!("warning: {note}"));
-    }
-    Ok(readings.check()?)
 }
 
 /// What the vehicle file says about the gearbox.
@@ -488,6 +462,11 @@ impl Rows {
 }
 
 impl Channels<'_> {
+    /// Whether the map has a channel for a role.
+    fn maps(&self, role: Role) -> bool {
+        self.steps.readings().summary().iter().any(|entry| entry.role == role)
+    }
+
     fn read(&mut self) -> Option<Result<(Step, Vec<Reading>), Failure>> {
         let mut readings = Vec::new();
         let step = self.steps.next_seeing(|reading| readings.push(reading))?;
@@ -550,23 +529,9 @@ impl Measured<'_> {
             step.input.dt_s += std::mem::take(&mut self.waited_s);
         }
         step.shifts = self.finder.take_settled(step.time_s);
+        let [(oncoming, _), (offgoing, _)] = &mut self.commands;
+        oncoming.stand(&mut step.input.command);
+        offgoing.stand(&mut step.input.offgoing_command);
         Ok(true)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_further_apart_than_commands_may_be_old_are_told() {
-        assert_eq!(
-            [0.01, 0.05, 0.050_000_001, f64::NAN].map(|median_s| old_commands(median_s, 0.05)),
-            [const { None }; 4]
-        );
-        let told = old_commands(0.06, 0.05).unwrap_or_default();
-        assert!(told.contains("at most 0.05 s") && told.contains("`command_age_s = 0.060`"), "{told}");
-        assert_eq!(slow_log(0.1 + 1e-9), None);
-        assert!(slow_log(0.11).is_some());
     }
 }

@@ -4,6 +4,7 @@ pub(super) mod any_car;
 mod earlier;
 mod findings;
 mod job;
+mod log_checks;
 mod measured;
 pub(super) mod observer;
 mod outputs;

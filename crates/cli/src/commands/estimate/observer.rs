@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use config::{ObserverKind, Sensors, Vehicle};
 use design::{compliant_open_loop_phases, rigid_open_loop_phases};
+use logs::Role;
 use report::tables::phase_name;
 use study::AnyObserver;
 use trace::ShownPath as _;
@@ -57,6 +58,11 @@ fn is_filter(kind: ObserverKind) -> bool {
     [ObserverKind::Kalman, ObserverKind::Extended, ObserverKind::Unscented].contains(&kind)
 }
 
+/// Whether it is a valve model alone, which reads no engine speed.
+pub(super) fn is_open_loop(kind: ObserverKind) -> bool {
+    matches!(kind, ObserverKind::OpenLoop | ObserverKind::OpenLoopMaps)
+}
+
 /// The observer for a log, with what is to be said about it.
 pub(super) fn choose(
     options: &Estimate,
@@ -64,21 +70,29 @@ pub(super) fn choose(
     log: &Measured<'_>,
     say: &mut Messages,
 ) -> Result<Chosen, Failure> {
-    let has_wheel = log.has_wheel_speed();
+    let (has_engine, has_wheel) = (log.has_engine_speed(), log.has_wheel_speed());
     let (choice, method) = match options.observer {
+        ObserverChoice::Best if !has_engine => (ObserverChoice::OpenLoopMaps, MethodChoice::Iss),
         ObserverChoice::Best => best(has_wheel),
         chosen => (chosen, options.method.unwrap_or(MethodChoice::Iss)),
     };
     if options.observer == ObserverChoice::Best {
-        say.note(if has_wheel {
-            "observer: kalman, because the log has a wheel speed"
-        } else {
-            "observer: rigid with peak-to-peak gains, because the log has no wheel_speed_rad_s, which kalman needs"
+        say.note(match (has_engine, has_wheel) {
+            (false, _) => "observer: open-loop-maps, because the log has no engine speed, which all observers need but the open loops",
+            (true, true) => "observer: kalman, because the log has a wheel speed",
+            (true, false) => {
+                "observer: rigid with peak-to-peak gains, because the log has no wheel_speed_rad_s, which kalman needs"
+            }
         });
     }
     let kind = kind(choice);
     if options.sensors.is_some() && !is_filter(kind) {
         return Err(match options.observer {
+            ObserverChoice::Best if !has_engine => Failure::Input(
+                "the log has no engine speed: the best observer is then open-loop-maps, which does not use --sensors\n\
+                 hint: leave --sensors out, or give the log an engine_speed_rad_s (in a channel map: engine_speed)"
+                    .to_owned(),
+            ),
             ObserverChoice::Best => Failure::Input(
                 "the log has no wheel speed: the best observer is then rigid, which does not use --sensors\n\
                  hint: leave --sensors out, or give the log a wheel_speed_rad_s (in a channel map: wheel_speed), with which it is kalman"
@@ -88,7 +102,10 @@ pub(super) fn choose(
         });
     }
     if is_filter(kind) || [ObserverKind::Compliant, ObserverKind::Inversion].contains(&kind) {
-        log.require_wheel_speed()?;
+        log.require(Role::WheelSpeed)?;
+    }
+    if !is_open_loop(kind) {
+        log.require(Role::EngineSpeed)?;
     }
     let sensors = options.sensors.as_deref().map(sensors).transpose()?;
     let step_s = log.median_step_s();
@@ -96,7 +113,7 @@ pub(super) fn choose(
     for missed in &missed {
         say.note(&format!("warning: continuing with the best certified gain\n{missed}"));
     }
-    if step_s > observer.sample_max_s() && !matches!(kind, ObserverKind::OpenLoop | ObserverKind::OpenLoopMaps) {
+    if step_s > observer.sample_max_s() && !is_open_loop(kind) {
         say.note(&format!(
             "the sample time is {:.0} ms, and this observer corrects over at most {:.0} ms: using the open loop\n\
              hint: `--observer rigid --method peak-to-peak` designs gains for the sample time of the log",

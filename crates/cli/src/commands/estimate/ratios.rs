@@ -2,6 +2,7 @@
 
 use config::Vehicle;
 use observer::{Input, Reading};
+use study::CameSpeed;
 use study::ratio_histogram::RatioHistogram;
 use study::swapped_speeds::SwappedSpeeds;
 
@@ -27,8 +28,8 @@ const TIME_S: f64 = 3.0;
 pub(super) struct Ratios {
     gears: [f64; 2],
     final_ratio: f64,
-    /// Newest turbine, output and wheel speed, rad/s.
-    newest_rad_s: [f64; 3],
+    /// Engine, turbine, output and wheel speed.
+    came: [CameSpeed; 4],
     moving_s: f64,
     moving: u64,
     in_gear: u64,
@@ -36,8 +37,6 @@ pub(super) struct Ratios {
     in_gear_by_wheel: u64,
     turbine_over_output: RatioHistogram<PER_CENT>,
     output_over_wheel: RatioHistogram<PER_CENT>,
-    /// Newest engine speed, rad/s.
-    engine_rad_s: f64,
     swapped: SwappedSpeeds,
 }
 
@@ -46,14 +45,13 @@ impl Ratios {
         Self {
             gears: [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()],
             final_ratio: vehicle.driveline.final_ratio,
-            newest_rad_s: [f64::NAN; 3],
+            came: [CameSpeed::default(); 4],
             moving_s: 0.0,
             moving: 0,
             in_gear: 0,
             in_gear_by_wheel: 0,
             turbine_over_output: RatioHistogram::default(),
             output_over_wheel: RatioHistogram::default(),
-            engine_rad_s: f64::NAN,
             swapped: SwappedSpeeds::default(),
         }
     }
@@ -64,21 +62,18 @@ impl Ratios {
     }
 
     /// Takes the speeds of a row; only where it is looked at, they are judged.
-    pub(super) fn push(&mut self, input: &Input<f64>, is_looked_at: bool) {
-        let readings = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
-        for (newest, reading) in self.newest_rad_s.iter_mut().zip(readings) {
+    pub(super) fn push(&mut self, time_s: f64, input: &Input<f64>, is_looked_at: bool) {
+        let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
+        for (came, reading) in self.came.iter_mut().zip(readings) {
             if let Some(Reading { value, .. }) = reading.filter(|reading| reading.value.is_finite()) {
-                *newest = value;
+                came.push(time_s, value);
             }
         }
-        if let Some(Reading { value, .. }) = input.engine_rad_s.filter(|reading| reading.value.is_finite()) {
-            self.engine_rad_s = value;
-        }
-        let [turbine, output, wheel] = self.newest_rad_s;
+        let [engine, turbine, output, wheel] = self.came.each_ref().map(|came| came.at(time_s));
         if is_looked_at && output > OUTPUT_MIN_RAD_S && turbine.is_finite() {
             self.moving += 1;
             self.moving_s += input.dt_s.clamp(0.0, 1.0);
-            self.swapped.push(self.engine_rad_s, turbine, &self.gears.map(|gear| gear * output));
+            self.swapped.push(engine, turbine, &self.gears.map(|gear| gear * output));
             let ratio = turbine / output;
             let fits = |ratio: f64| u64::from(self.gears.iter().any(|gear| (ratio / gear - 1.0).abs() < IN_GEAR));
             self.in_gear += fits(ratio);

@@ -16,7 +16,7 @@ use study::any_shift::pressure_command::pressure_command_column;
 use study::log::FIRST_LOOK;
 use trace::{ShownPath as _, signal};
 
-use super::super::measured::{check_span, check_step};
+use super::super::log_checks::{check_span, check_step};
 use super::super::watched::{WatchedColumn, WatchedColumns};
 use crate::failure::Failure;
 use crate::output;
@@ -92,7 +92,8 @@ impl Columns {
     pub(super) fn of(log: &CarLog<'_>, car: &Car, tables: &ShiftTables<f64>) -> Self {
         let has_converter = car.converter.is_some();
         let others = [
-            (Role::EngineSpeed, signal::ENGINE_SPEED, has_converter),
+            // Without it the estimate is the open loop.
+            (Role::EngineSpeed, signal::ENGINE_SPEED, false),
             (Role::TurbineSpeed, signal::TURBINE_SPEED, true),
             (Role::OutputSpeed, signal::OUTPUT_SPEED, true),
             (Role::WheelSpeed, signal::WHEEL_SPEED, false),

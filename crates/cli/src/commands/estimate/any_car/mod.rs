@@ -24,7 +24,7 @@ use self::columns::{Knows, Row, before_readings, chosen, columns};
 use self::learnt::Kept;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
-use super::measured::{WITHOUT_SENSORS, slow_log};
+use super::log_checks::{WITHOUT_SENSORS, slow_log};
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::ratios::check_wheel;

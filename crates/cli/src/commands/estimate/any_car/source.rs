@@ -1,5 +1,6 @@
 //! Where the steps of a drive come from: a table with the names of the program, or mapped channels.
 
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -8,13 +9,15 @@ use std::sync::atomic::AtomicBool;
 
 use config::Car;
 use design::ShiftTables;
-use logs::{ChannelMap, Log, LogError};
+use logs::{ChannelMap, Log, LogError, OnChange, Role};
+use observer::any_shift::MAX_ELEMENTS;
 use study::any_shift::car_log::{CarLog, LogStep};
 use study::any_shift::channels::{CarChannels, own_map};
+use study::log::FIRST_LOOK;
 use trace::{CsvRows, Following, ShownPath as _};
 
 use super::super::Messages;
-use super::super::measured::{other_delimiter, report_readings, warn_of_dbc};
+use super::super::log_checks::{other_delimiter, report_readings, sent_on_change, warn_of_dbc};
 use super::checks::Columns;
 use crate::failure::Failure;
 
@@ -31,9 +34,28 @@ pub(in crate::commands) struct CarReading<'a> {
 }
 
 /// The steps of a log.
-pub(in crate::commands) enum CarSource<'a> {
+pub(in crate::commands) struct CarSource<'a> {
+    kind: SourceKind<'a>,
+    /// The first steps, which are looked at before the first is used.
+    looked_at: VecDeque<LogStep>,
+    /// The commands of the elements, by their places in the filter's tables.
+    commands: [OnChange; MAX_ELEMENTS],
+    /// Elements whose commands are sent on change, as the log shows.
+    on_change: Vec<String>,
+}
+
+enum SourceKind<'a> {
     Rows(Box<CarLog<'a>>),
     Channels(Box<CarChannels<'a>>),
+}
+
+impl SourceKind<'_> {
+    fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
+        Ok(match self {
+            Self::Rows(rows) => rows.next_step()?,
+            Self::Channels(channels) => channels.next_step()?,
+        })
+    }
 }
 
 impl<'a> CarSource<'a> {
@@ -44,6 +66,7 @@ impl<'a> CarSource<'a> {
         opened: &'a mut Option<Log>,
     ) -> Result<Self, Failure> {
         let CarReading { car, tables, map, stop, threads } = reading;
+        let is_followed = stop.is_some();
         let stop = stop.map(Arc::clone);
         let is_pipe = path == Path::new("-");
         if map.channels.is_empty() && (is_pipe || !logs::needs_map(path)?) {
@@ -55,7 +78,8 @@ impl<'a> CarSource<'a> {
                 None => Box::new(File::open(path).map_err(opening)?),
             };
             let rows = CsvRows::of_log(path, input).map_err(|error| other_delimiter(path, error))?;
-            return Ok(Self::Rows(Box::new(CarLog::of(rows, car, tables)?)));
+            let kind = SourceKind::Rows(Box::new(CarLog::of(rows, car, tables)?));
+            return Self::looking_ahead(kind, [OnChange::default(); MAX_ELEMENTS], reading, is_followed);
         }
         let log = match stop {
             Some(stop) => Log::follow(path, &map.open, stop)?,
@@ -77,35 +101,67 @@ impl<'a> CarSource<'a> {
             map
         };
         let channels = CarChannels::of(opened.insert(log), map, car, tables)?;
-        Ok(Self::Channels(Box::new(channels)))
+        let commands = channels.commands_on_change();
+        Self::looking_ahead(SourceKind::Channels(Box::new(channels)), commands, reading, is_followed)
+    }
+
+    /// Looks at the first steps: which commands are sent on change. A log that is followed is not waited for.
+    fn looking_ahead(
+        mut kind: SourceKind<'a>,
+        mut commands: [OnChange; MAX_ELEMENTS],
+        CarReading { car, tables, .. }: CarReading<'a>,
+        is_followed: bool,
+    ) -> Result<Self, Failure> {
+        let mut looked_at = VecDeque::new();
+        while !is_followed && looked_at.len() < FIRST_LOOK {
+            let Some(step) = kind.next_step()? else { break };
+            for (command, reading) in commands.iter_mut().zip(&step.input.commands) {
+                command.look(step.input.dt_s, reading.map(|reading| reading.value));
+            }
+            looked_at.push_back(step);
+        }
+        let shown = commands.each_mut().map(OnChange::is_shown);
+        let elements = car.gearbox.elements.iter().enumerate();
+        let on_change = elements.filter(|(at, _)| tables.place(*at).is_some_and(|place| shown[place]));
+        let on_change = on_change.map(|(_, element)| element.name.clone()).collect();
+        Ok(Self { kind, looked_at, commands, on_change })
     }
 
     /// What watches the columns of a table; mapped channels are watched by their readings.
     pub(super) fn columns(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<Columns> {
-        match self {
-            Self::Rows(rows) => Some(Columns::of(rows, car, tables)),
-            Self::Channels(_) => None,
+        match &self.kind {
+            SourceKind::Rows(rows) => Some(Columns::of(rows, car, tables)),
+            SourceKind::Channels(_) => None,
         }
     }
 
     pub(in crate::commands) fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
-        Ok(match self {
-            Self::Rows(rows) => rows.next_step()?,
-            Self::Channels(channels) => channels.next_step()?,
-        })
+        let next = match self.looked_at.pop_front() {
+            Some(step) => Some(step),
+            None => self.kind.next_step()?,
+        };
+        Ok(next.map(|mut step| {
+            for (command, reading) in self.commands.iter_mut().zip(&mut step.input.commands) {
+                command.stand(reading);
+            }
+            step
+        }))
     }
 
     /// Says what was met in the log, after its last step.
     pub(in crate::commands) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
-        match self {
-            Self::Rows(rows) => {
+        if !self.on_change.is_empty() {
+            say.note(&sent_on_change(&self.on_change.join(", ")));
+        }
+        match &self.kind {
+            SourceKind::Rows(rows) => {
                 rows.check_readings()?.iter().for_each(|note| say.note(&format!("warning: {note}")));
                 Ok(())
             }
-            Self::Channels(channels) => {
+            SourceKind::Channels(channels) => {
                 let gears = channels.check_gears()?;
                 gears.iter().for_each(|note| say.note(&format!("warning: {note}")));
-                report_readings(channels.readings(), say)
+                report_readings(channels.readings(), &[Role::EngineSpeed, Role::WheelSpeed], say)
             }
         }
     }

@@ -1,0 +1,403 @@
+//! Speeds that no shaft has: of a sensor that times out and reads zero, and of a channel that shows another speed.
+//!
+//! A shaft passes every speed between two others, and it takes torque and time. A reading is a fault
+//!
+//! - if it is further from the last one that was believed than the shaft's largest acceleration allows in the time between them, or
+//! - if it fell to a tenth of that and less while another speed shows that the shaft turns, or
+//! - if it came by a jump to the value of the speed next to it: two sensors of two shafts do not agree by a jump, or
+//! - if output and wheel speed, which the final drive ties, part.
+//!
+//! A fault lasts until the readings are those of the shaft again, and for [`LONGEST_S`] at most: what lasts longer is how the log goes on,
+//! as where two recordings are joined. Only a zero stays a fault for as long as the other speeds contradict it. The accelerations are bounds
+//! for every car, and a fall at low speed, where sensors of toothed wheels rightly read zero, is none.
+
+use crate::Role;
+
+/// A fault that the other speeds do not contradict ends after so long, s \[chosen\].
+pub const LONGEST_S: f64 = 2.5;
+/// A reading older than this is no evidence against another, s.
+const FRESH_S: f64 = 0.25;
+/// A table holds a slow channel for up to so long: the shaft may have changed since the value came, s.
+const HELD_S: f64 = 0.1;
+/// A speed that another one contradicts falls at once if it does so within this time, s: rows at 10 Hz.
+const AT_ONCE_S: f64 = 0.15;
+/// Fraction of the last believed speed below which a speed fell, and size below which it is zero, rad/s.
+const FELL: f64 = 0.1;
+const ZERO_RAD_S: f64 = 1.0;
+/// Relative difference within which a reading is that of another speed: both channels may be one row apart.
+const ANOTHER: f64 = 0.01;
+/// Change by which a speed jumps to the value of another one: by rate, rad/s^2, and at once, rad/s \[chosen\]. A turbine that a clutch
+/// brings to the speed of the output does so by some 1000 rad/s^2.
+const TO_ANOTHER: (f64, f64) = (1000.0, 5.0);
+/// Factors beyond which output over wheel speed has parted from what it was: readings that are 50 ms apart differ by less.
+const PARTED: std::ops::Range<f64> = 0.6..1.6;
+/// Faster than any shaft of a car, rad/s: not taken as a speed at all.
+const MOST_RAD_S: f64 = 1500.0;
+/// Speed of an engine that runs, rad/s.
+const RUNS_RAD_S: f64 = 50.0;
+
+const ENGINE: usize = Role::EngineSpeed as usize;
+const TURBINE: usize = Role::TurbineSpeed as usize;
+const OUTPUT: usize = Role::OutputSpeed as usize;
+const WHEEL: usize = Role::WheelSpeed as usize;
+const WATCHED: usize = 4;
+
+/// Largest acceleration of each shaft, rad/s^2, and speed up to which its sensor may read zero or wake up, rad/s \[chosen\]. An engine or a
+/// turbine of 0.1 kg m^2 has 3000 rad/s^2 by 300 N m; a locked brake stops a wheel of 2 kg m^2 by 1000 rad/s^2 with 2000 N m.
+const SHAFTS: [(f64, f64); WATCHED] = [(3000.0, 40.0), (3000.0, 40.0), (1000.0, 10.0), (1000.0, 4.0)];
+/// Speeds next to each, whose value its channel may show.
+const NEXT_TO: [&[usize]; WATCHED] = [&[TURBINE, OUTPUT], &[ENGINE, OUTPUT], &[ENGINE, TURBINE, WHEEL], &[OUTPUT]];
+
+/// Watches engine, turbine, output and wheel speed.
+#[derive(Debug, Clone, Copy)]
+pub struct SpeedFaults {
+    believed: [Option<Believed>; WATCHED],
+    faults: [Option<Fault>; WATCHED],
+    /// Output over wheel speed when both were last believed; not a number before.
+    output_over_wheel: f64,
+}
+
+/// A fault of a speed.
+#[derive(Debug, Clone, Copy)]
+struct Fault {
+    since_s: f64,
+    /// The speed whose value it began with, if it did.
+    another: Option<usize>,
+}
+
+/// The last reading of a speed that was believed.
+#[derive(Debug, Clone, Copy)]
+struct Believed {
+    rad_s: f64,
+    /// When it came last, and when it came first with this value, s.
+    time_s: f64,
+    first_s: f64,
+}
+
+impl SpeedFaults {
+    /// Before the first readings.
+    pub fn new() -> Self {
+        Self { believed: [None; WATCHED], faults: [None; WATCHED], output_over_wheel: f64::NAN }
+    }
+
+    /// Whether the next reading of a speed, in rad/s, is a fault; never of a role that is not watched.
+    pub fn is_fault(&mut self, role: Role, rad_s: f64, time_s: f64) -> bool {
+        let at = role as usize;
+        // What is no number, or no speed at all, is refused elsewhere.
+        if at >= WATCHED || rad_s.is_nan() || rad_s.abs() > MOST_RAD_S {
+            return false;
+        }
+        if self.believed.iter().flatten().any(|believed| time_s < believed.time_s - FRESH_S) {
+            // The clock began anew.
+            *self = Self::new();
+        }
+        let is_fault = self.believed[at].is_some_and(|before| match self.faults[at] {
+            None => self.begins(at, before, rad_s, time_s),
+            Some(fault) => self.lasts(at, before, rad_s, (fault, time_s)),
+        });
+        if is_fault {
+            let another = self.another(at, rad_s, time_s);
+            self.faults[at].get_or_insert(Fault { since_s: time_s, another });
+        } else {
+            self.believe(at, rad_s, time_s);
+        }
+        is_fault
+    }
+
+    fn believe(&mut self, at: usize, rad_s: f64, time_s: f64) {
+        let before = self.believed[at].filter(|before| before.rad_s == rad_s);
+        let first_s = before.map_or(time_s, |before| before.first_s);
+        self.believed[at] = Some(Believed { rad_s, time_s, first_s });
+        self.faults[at] = None;
+        if let (OUTPUT | WHEEL, Some(output), Some(wheel)) =
+            (at, self.turning(OUTPUT, time_s), self.turning(WHEEL, time_s))
+        {
+            self.output_over_wheel = output / wheel;
+        }
+    }
+
+    /// Whether a fault begins with a reading.
+    fn begins(&self, at: usize, before: Believed, rad_s: f64, time_s: f64) -> bool {
+        let change = (rad_s - before.rad_s).abs();
+        let (_, least_rad_s) = SHAFTS[at];
+        let fell = rad_s.abs() <= FELL * before.rad_s.abs() && before.rad_s.abs() > least_rad_s;
+        let is_sudden = time_s - before.time_s <= AT_ONCE_S && fell;
+        let (rate, at_once) = TO_ANOTHER;
+        let to_another = change > rate * before.passed_s(time_s) + at_once && self.another(at, rad_s, time_s).is_some();
+        jumps(at, before, rad_s, time_s)
+            || (is_sudden && self.is_contradicted(at, before, time_s))
+            || to_another
+            || self.parts(at, rad_s, time_s)
+    }
+
+    /// Whether a fault goes on with a reading.
+    fn lasts(&self, at: usize, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
+        let fell = rad_s.abs() <= FELL * before.rad_s.abs();
+        let is_short = time_s - fault.since_s <= LONGEST_S;
+        let is_wrong = || {
+            jumps(at, before, rad_s, time_s)
+                || fell
+                || fault.another.is_some_and(|another| self.shows(another, rad_s, time_s))
+                || self.parts(at, rad_s, time_s)
+        };
+        let is_dead = || rad_s.abs() <= ZERO_RAD_S && fell && self.is_contradicted(at, before, time_s);
+        (is_short && is_wrong()) || is_dead()
+    }
+
+    /// A speed that was believed of late and is away from zero, rad/s.
+    fn turning(&self, at: usize, time_s: f64) -> Option<f64> {
+        let (_, least_rad_s) = SHAFTS[at];
+        let fresh = self.believed[at].filter(|believed| time_s - believed.time_s <= FRESH_S)?;
+        Some(fresh.rad_s).filter(|rad_s| rad_s.abs() > least_rad_s)
+    }
+
+    /// Whether the other speeds show that this shaft turns.
+    fn is_contradicted(&self, at: usize, before: Believed, time_s: f64) -> bool {
+        let turns =
+            |other: usize, from_rad_s: f64| self.turning(other, time_s).is_some_and(|speed| speed.abs() >= from_rad_s);
+        match at {
+            // The converter takes it along.
+            ENGINE => turns(TURBINE, 0.5 * before.rad_s.abs()),
+            // In a gear the car turns it, in neutral the engine.
+            TURBINE => turns(OUTPUT, 0.0) && turns(ENGINE, RUNS_RAD_S),
+            OUTPUT => turns(WHEEL, 0.0),
+            _ => turns(OUTPUT, 0.0),
+        }
+    }
+
+    /// The speed next to it whose value a reading has.
+    fn another(&self, at: usize, rad_s: f64, time_s: f64) -> Option<usize> {
+        NEXT_TO[at].iter().copied().find(|other| self.shows(*other, rad_s, time_s))
+    }
+
+    /// Whether a reading has the value of this speed.
+    fn shows(&self, other: usize, rad_s: f64, time_s: f64) -> bool {
+        self.turning(other, time_s).is_some_and(|other| (rad_s - other).abs() <= ANOTHER * other.abs())
+    }
+
+    /// Whether output and wheel speed part by a reading of one of them.
+    fn parts(&self, at: usize, rad_s: f64, time_s: f64) -> bool {
+        let ratio = match at {
+            OUTPUT => self.turning(WHEEL, time_s).map(|wheel| rad_s / wheel),
+            WHEEL => self.turning(OUTPUT, time_s).map(|output| output / rad_s),
+            _ => None,
+        };
+        ratio.is_some_and(|ratio| {
+            let change = ratio / self.output_over_wheel;
+            !change.is_nan() && !PARTED.contains(&change)
+        })
+    }
+}
+
+impl Default for SpeedFaults {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Believed {
+    /// Time in which the shaft may have changed, s.
+    fn passed_s(&self, time_s: f64) -> f64 {
+        (time_s - self.first_s.max(self.time_s - HELD_S)).max(0.0)
+    }
+}
+
+/// Whether a reading is further from the believed one before than its shaft can have come.
+fn jumps(at: usize, before: Believed, rad_s: f64, time_s: f64) -> bool {
+    let (rate, at_once) = SHAFTS[at];
+    (rad_s - before.rad_s).abs() > rate * before.passed_s(time_s) + at_once
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROLES: [Role; WATCHED] = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
+
+    /// The speeds of a car that accelerates in a gear of ratio 1.6, with a slipping converter and a final ratio of 3.5.
+    fn in_gear(time_s: f64) -> [f64; WATCHED] {
+        let output = 100.0 + 8.0 * time_s;
+        [1.7 * output, 1.6 * output, output, output / 3.5]
+    }
+
+    /// Times of the rows in which a speed is a fault, by speed, of six seconds with this time between rows.
+    fn faults(step_s: f64, speeds: impl Fn(f64) -> [f64; WATCHED]) -> [Vec<f64>; WATCHED] {
+        let mut watch = SpeedFaults::new();
+        let mut rows: [Vec<f64>; WATCHED] = Default::default();
+        for row in (0_u32..).take_while(|row| f64::from(*row) * step_s < 6.0) {
+            let time_s = f64::from(row) * step_s;
+            for (at, speed) in speeds(time_s).into_iter().enumerate() {
+                if watch.is_fault(ROLES[at], speed, time_s) {
+                    rows[at].push(time_s);
+                }
+            }
+        }
+        rows
+    }
+
+    #[test]
+    fn a_speed_that_reads_zero_while_the_car_drives_is_a_fault_until_it_is_back() {
+        for step_s in [0.001, 0.01, 0.02, 0.05, 0.1] {
+            for (at, length_s) in (0..WATCHED).flat_map(|at| [0.1, 0.5, 2.0].map(|length_s| (at, length_s))) {
+                let is_out = |time_s: f64| time_s > 1.0 && time_s < 1.0 + length_s;
+                for zero in [0.0, 0.5, -0.3] {
+                    let found = faults(step_s, |time_s| {
+                        let mut speeds = in_gear(time_s);
+                        if is_out(time_s) {
+                            speeds[at] = zero;
+                        }
+                        speeds
+                    });
+                    for (other, rows) in found.iter().enumerate() {
+                        assert!(
+                            rows.iter().all(|time_s| other == at && is_out(*time_s)),
+                            "{at} {other} {step_s}: {rows:?}"
+                        );
+                    }
+                    let all = (0..).map(|i| step_s * f64::from(i)).take_while(|time_s| *time_s < 6.0);
+                    let all = all.filter(|time_s| is_out(*time_s)).count();
+                    assert_eq!(found[at].len(), all, "{at} {step_s} {length_s}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_speed_that_was_zero_is_believed_again_in_the_direct_gear() {
+        for at in [TURBINE, OUTPUT] {
+            let found = faults(0.01, |time_s| {
+                let mut speeds = in_gear(time_s);
+                if time_s > 2.0 {
+                    speeds[TURBINE] = speeds[OUTPUT];
+                }
+                if time_s > 1.0 && time_s < 2.5 {
+                    speeds[at] = 0.0;
+                }
+                speeds
+            });
+            assert!(
+                found[at].len() >= 149 && found[at].iter().all(|time_s| *time_s < 2.5),
+                "{at}: {:?}",
+                found[at].last()
+            );
+        }
+    }
+
+    #[test]
+    fn a_turbine_that_showed_the_output_is_believed_where_it_turns_with_the_engine() {
+        let found = faults(0.01, |time_s| {
+            let [_, turbine, output, wheel] = in_gear(time_s);
+            // The converter is locked, or there is none.
+            [turbine, if time_s > 1.0 && time_s < 1.5 { output } else { turbine }, output, wheel]
+        });
+        assert!((48..=50).contains(&found[TURBINE].len()), "{:?}", found[TURBINE].last());
+    }
+
+    #[test]
+    fn a_fall_over_some_rows_is_a_fault_as_a_fall_at_once() {
+        for at in 0..WATCHED {
+            let found = faults(0.01, |time_s| {
+                let mut speeds = in_gear(time_s);
+                let rows = ((time_s - 1.0) / 0.01).round();
+                speeds[at] *= match rows {
+                    0.0 => 0.5,
+                    1.0 => 0.2,
+                    rows if (2.0..100.0).contains(&rows) => 0.0,
+                    _ => 1.0,
+                };
+                speeds
+            });
+            assert!(found[at].len() >= 100, "{at}: {}", found[at].len());
+        }
+    }
+
+    #[test]
+    fn a_channel_that_shows_the_speed_next_to_it_is_a_fault() {
+        for (at, other) in [(ENGINE, OUTPUT), (TURBINE, OUTPUT), (OUTPUT, TURBINE), (OUTPUT, WHEEL), (WHEEL, OUTPUT)] {
+            for step_s in [0.001, 0.01, 0.02] {
+                let found = faults(step_s, |time_s| {
+                    let mut speeds = in_gear(time_s);
+                    if time_s > 1.0 && time_s < 2.5 {
+                        speeds[at] = speeds[other];
+                    }
+                    speeds
+                });
+                let rows = 1.5 / step_s;
+                #[expect(clippy::cast_precision_loss, reason = "small")]
+                let count = found[at].len() as f64;
+                assert!(count >= rows - 2.0 && count <= rows, "{at} {other} {step_s}: {count}");
+                assert!((0..WATCHED).all(|speed| speed == at || found[speed].is_empty()), "{at} {other}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_zero_without_end_is_a_fault_while_the_other_speeds_contradict_it() {
+        for at in [TURBINE, OUTPUT, WHEEL] {
+            let found = faults(0.01, |time_s| {
+                let mut speeds = in_gear(time_s);
+                if time_s > 1.0 {
+                    speeds[at] = 0.0;
+                }
+                speeds
+            });
+            assert!(found[at].len() >= 498, "{at}: {}", found[at].len());
+        }
+    }
+
+    #[test]
+    fn a_car_that_stops_an_engine_that_stalls_and_a_hard_shift_are_no_faults() {
+        let stops = |time_s: f64| {
+            // 11 m/s^2 on the wheels of 0.3 m; sensors read zero below 2 rad/s of the wheel.
+            let wheel = (70.0 - 37.0 * time_s).max(0.0);
+            let wheel = if wheel < 2.0 { 0.0 } else { wheel };
+            let turbine = 3.5 * 4.7 * wheel;
+            [turbine.max(80.0), turbine, 3.5 * wheel, wheel]
+        };
+        let stalls = |time_s: f64| {
+            let engine = (90.0 - 900.0 * (time_s - 1.0).max(0.0)).max(0.0);
+            [engine, 0.0, 0.0, 0.0]
+        };
+        // Down in 60 ms, with slip zero in one row.
+        let grips = |time_s: f64| {
+            let output = 100.0 + 5.0 * time_s;
+            let slip = (1.6 * output - output) * (1.0 - (time_s - 1.0).clamp(0.0, 0.06) / 0.06);
+            [1.7 * output, output + slip, output, output / 3.5]
+        };
+        let locks = |time_s: f64| {
+            let locked = (time_s - 1.0).clamp(0.0, 0.07) / 0.07;
+            let wheel = if time_s < 2.0 { 60.0 * (1.0 - locked) } else { 60.0 };
+            [200.0, 200.0, 3.5 * wheel, wheel]
+        };
+        let neutral = |time_s: f64| [80.0, if time_s > 1.0 { 80.0 } else { 0.0_f64.max(80.0 * time_s) }, 0.0, 0.0];
+        for step_s in [0.001, 0.005, 0.01, 0.02] {
+            assert!(faults(step_s, stops).iter().all(Vec::is_empty), "stops {step_s}");
+            assert!(faults(step_s, stalls).iter().all(Vec::is_empty), "stalls {step_s}");
+            assert!(faults(step_s, grips).iter().all(Vec::is_empty), "grips {step_s}");
+            assert!(faults(step_s, neutral).iter().all(Vec::is_empty), "neutral {step_s}");
+            let [engine, turbine, ..] = faults(step_s, locks);
+            assert!(engine.is_empty() && turbine.is_empty(), "locks {step_s}");
+        }
+    }
+
+    #[test]
+    fn two_recordings_that_are_joined_go_on_after_the_longest_fault() {
+        let joined = |time_s: f64| if time_s < 1.0 { in_gear(time_s) } else { [80.0, 0.0, 0.0, 0.0] };
+        for (at, rows) in faults(0.01, joined).iter().enumerate() {
+            assert!(rows.last().is_none_or(|last_s| *last_s < 1.0 + LONGEST_S + 0.02), "{at}: {:?}", rows.last());
+        }
+        // A clock that begins anew is another log.
+        let mut watch = SpeedFaults::new();
+        assert!(!watch.is_fault(Role::OutputSpeed, 100.0, 10.0));
+        assert!(!watch.is_fault(Role::OutputSpeed, 0.0, 0.0));
+    }
+
+    #[test]
+    fn what_is_no_speed_is_left_to_others_and_believed_by_none() {
+        let mut watch = SpeedFaults::new();
+        for (row, value) in (0_u32..).zip([16_383.75, f64::NAN, f64::INFINITY, 100.0, 100.5, 16_383.75, 101.0]) {
+            assert!(!watch.is_fault(Role::TurbineSpeed, value, 0.01 * f64::from(row)), "{value}");
+        }
+        assert!(!watch.is_fault(Role::VehicleSpeed, 0.0, 0.1) && !watch.is_fault(Role::Gear, 5.0, 0.1));
+    }
+}
