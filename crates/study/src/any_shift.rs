@@ -15,6 +15,7 @@ mod gear_signal;
 mod in_gear;
 pub mod influence;
 pub mod learning_count;
+pub mod learnt_coverage;
 mod lock_up_check;
 mod log_beside;
 pub mod logged;
