@@ -44,7 +44,7 @@ use drivetrain::Real;
 
 use super::elements::ValveTiming;
 use super::powertrain::dot;
-use super::shown::{Matrix, Shown, around, cholesky, lower_inverse};
+use super::shown::{Matrix, Shown, around, cholesky, is_positive, lower_inverse};
 use super::systematic::is_considered;
 use super::tables::MAX_ELEMENTS;
 
@@ -585,23 +585,6 @@ impl<T: Real> Innovation<T> {
         let spread = (0..ACTING).fold(T::zero(), |sum, k| sum + lower[k][k].ln());
         Some(Self { innovation, with, distance, likelihood: -T::of(0.5) * distance - spread })
     }
-}
-
-/// Whether a symmetric matrix is that of a covariance: all pivots are positive.
-fn is_positive<T: Real>(mut of: [[T; LEARNT]; LEARNT]) -> bool {
-    for k in 0..LEARNT {
-        let row = of[k];
-        if row[k] <= T::zero() || row[k].is_nan() {
-            return false;
-        }
-        for below in of.iter_mut().skip(k + 1) {
-            let factor = below[k] / row[k];
-            for (x, above) in below.iter_mut().zip(&row) {
-                *x = *x - factor * *above;
-            }
-        }
-    }
-    true
 }
 
 #[cfg(test)]
