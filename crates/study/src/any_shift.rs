@@ -16,6 +16,7 @@ mod held_commands;
 mod in_gear;
 pub mod influence;
 pub mod learning_count;
+pub mod learnt_coverage;
 mod lock_up_check;
 mod log_beside;
 pub mod logged;

@@ -204,7 +204,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         x.add(TURBINE, TURBINE, ratio * ratio * output_variance);
         x.add(TURBINE, OUTPUT, ratio * output_variance);
         // An error of the turbine torque is one of the shaft torque in balance with it.
-        for (share, per) in [(SHARE, shaft), (SLOW_SHARE, u.slow_share(torque.share) * shaft)] {
+        for (share, per) in [(SHARE, shaft), (SLOW_SHARE, torque.share * shaft)] {
             let variance = x.covariance[share][share];
             x.add(SPRING, SPRING, variance * per * per);
             x.add(SPRING, share, variance * per);

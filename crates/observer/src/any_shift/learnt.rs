@@ -21,7 +21,7 @@
 //!
 //! **Stiffness.** The scale of all torques that the speeds show is that of the twist of the drive shafts. A shaft that is
 //! softer by a share shows turbine torque, torque factors and inertia larger by that share, in each shift alike: the
-//! direction `s`. Without `e` the shifts together would find the turbine torque with a certainty that they do not have.
+//! direction `s`. Without `e` the shifts together would find the torque factors and inertias with a certainty that they do not have.
 //!
 //! **Another car, or a bad log.** What is learnt is one of two hypotheses; the other is that the car is any of the budget.
 //! Each shift is held against both, and the logarithm of their odds is summed. Before a shift the filter is given the mean
@@ -31,6 +31,8 @@
 //!
 //! **Wheel speed.** Its scale shows in a gear, because the twist of the drive shafts is bounded. It acts in no shift's measurements:
 //! the filter goes on with its own state of it from gear to gear, and what is kept here is where another run begins.
+//!
+//! **What many shifts have wrong alike** does not average out: [`super::systematic`].
 //!
 //! **Reported torque.** It acts in no shift either. In a gear it shows the sum of its error and that of the converter
 //! ([`super::reported`]).
@@ -42,21 +44,22 @@ use drivetrain::Real;
 
 use super::elements::ValveTiming;
 use super::powertrain::dot;
-use super::shown::{Matrix, Shown, around, cholesky, lower_inverse};
+use super::shown::{Matrix, Shown, around, cholesky, is_positive, lower_inverse};
+use super::systematic::is_considered;
 use super::tables::MAX_ELEMENTS;
 
 /// Most pairs of gears whose inertia is learnt.
 pub const MAX_PAIRS: usize = 16;
 /// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed,
 /// reported engine torque, lags, delays.
-const KISS_AT: usize = MAX_ELEMENTS;
-const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
-const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;
-const STIFFNESS_AT: usize = TURBINE_AT + 1;
+pub(super) const KISS_AT: usize = MAX_ELEMENTS;
+pub(super) const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
+pub(super) const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;
+pub(super) const STIFFNESS_AT: usize = TURBINE_AT + 1;
 const WHEEL_AT: usize = STIFFNESS_AT + 1;
-const REPORTED_AT: usize = WHEEL_AT + 1;
-const LAG_AT: usize = REPORTED_AT + 1;
-const DELAY_AT: usize = LAG_AT + MAX_ELEMENTS;
+pub(super) const REPORTED_AT: usize = WHEEL_AT + 1;
+pub(super) const LAG_AT: usize = REPORTED_AT + 1;
+pub(super) const DELAY_AT: usize = LAG_AT + MAX_ELEMENTS;
 /// How many quantities are learnt.
 pub const LEARNT: usize = DELAY_AT + MAX_ELEMENTS;
 /// How many of them act in a shift: so many states, and lag and delay of both valves.
@@ -72,9 +75,14 @@ const REFUSED_MOST: u8 = 8;
 /// Variance by which each quantity is another in the next shift, in that of the budget \[chosen\]: 9 % of its deviation in 30
 /// shifts. What is well known stays open to what comes, also in single precision.
 const PER_SHIFT: f64 = 2.5e-4;
+/// Least variance of the scale of the wheel speed, in that of the budget \[chosen\]: the filter's own changes by a tenth of its deviation
+/// with what the car does, as the timing of the readings shows as a scale.
+const WHEEL_LEAST: f64 = 0.01;
 /// Bound of a quantity in its deviations: the edge of a uniform distribution, and of the sum of two.
 pub(super) const EDGE: f64 = 1.732;
 const EDGE_OF_TWO: f64 = 2.449;
+/// The same of lag and delay, in deviations of the part that lasts, three quarters of the variance: all of it may last.
+const EDGE_OF_TIMING: f64 = 2.0;
 /// Correlation of the torque factors of two elements unlearnt \[chosen\]: half of the variance of the friction is that of the oil,
 /// which all of them share, and friction is two thirds of that of the factor. Without it a friction that is wrong in all
 /// elements alike would be taken for an error of the converter, of which there is one.
@@ -147,6 +155,8 @@ pub(super) struct Acting<T> {
     slow: T,
     /// How an error of the stiffness shows in each, per deviation of it.
     by_stiffness: [T; ACTING],
+    /// Whether they act in a shift, and not in a gear.
+    in_shift: bool,
 }
 
 /// Means and covariance of the acting quantities, as the filter has them.
@@ -167,14 +177,14 @@ impl<T: Real> Acting<T> {
         let states = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
         let timings = [lag(off), delay(off), lag(on), delay(on)];
         let places = core::array::from_fn(|a| states.iter().chain(&timings).nth(a).copied().flatten());
-        Self { places, slow_part, slow: slow_part.sqrt(), by_stiffness }
+        Self { places, slow_part, slow: slow_part.sqrt(), by_stiffness, in_shift: true }
     }
 
     /// Only the torque at the gearbox input, as in a gear.
     pub(super) fn turbine(by_stiffness: [T; ACTING]) -> Self {
         let mut places = [None; ACTING];
         places[STATES_ACTING - 1] = Some(TURBINE_AT);
-        Self { places, slow_part: T::one(), slow: T::one(), by_stiffness }
+        Self { places, slow_part: T::one(), slow: T::one(), by_stiffness, in_shift: false }
     }
 
     /// Place of a quantity among all.
@@ -232,20 +242,21 @@ impl<T: Real> Learnt<T> {
     /// Mean and covariance of torque factor and kiss point of an element.
     pub(super) fn of_element(&self, at: usize) -> Option<([T; 2], [[T; 2]; 2])> {
         let places = [at, KISS_AT + at].map(|place| place.min(LEARNT - 1));
-        let covariance = places.map(|a| places.map(|b| self.covariance[a][b]));
-        (at < MAX_ELEMENTS).then_some((places.map(|place| self.mean[place]), covariance))
+        let covariance = places.map(|a| places.map(|b| self.covariance_of(a, b)));
+        (at < MAX_ELEMENTS).then_some((places.map(|place| self.mean_of(place)), covariance))
     }
 
     /// Mean and variance of lag and delay of the valve of an element.
     pub(super) fn of_timing(&self, at: usize) -> Option<([T; 2], [T; 2])> {
-        let places = [LAG_AT, DELAY_AT].map(|first| (first + at.min(MAX_ELEMENTS - 1)).min(LEARNT - 1));
-        (at < MAX_ELEMENTS).then_some((places.map(|k| self.mean[k]), places.map(|k| self.covariance[k][k])))
+        let places = timing_places(at)?;
+        Some((places.map(|k| self.mean_of(k)), places.map(|k| self.covariance_of(k, k))))
     }
 
     /// Lag and delay of the valve of an element in its next shift by what is learnt and the budget together. `slow_part` is the
     /// part of their variance that lasts.
     pub(super) fn known_timing(&self, at: usize, slow_part: T) -> ValveTiming<T> {
-        let Some((mean, variance)) = self.of_timing(at) else { return ValveTiming::unlearnt() };
+        let Some(places) = timing_places(at) else { return ValveTiming::unlearnt() };
+        let (mean, variance) = (places.map(|k| self.mean[k]), places.map(|k| self.covariance[k][k]));
         let (car, one) = (self.probability(), T::one());
         let both = |k: usize| car * variance[k] + (one - car) * (one + car * mean[k] * mean[k]);
         ValveTiming {
@@ -257,12 +268,12 @@ impl<T: Real> Learnt<T> {
     /// Mean and deviation of the inertia of a pair of gears.
     pub(super) fn of_pair(&self, pair: usize) -> Option<[T; 2]> {
         let place = INERTIA_AT + pair.min(MAX_PAIRS - 1);
-        (pair < MAX_PAIRS).then_some([self.mean[place], self.covariance[place][place].sqrt()])
+        (pair < MAX_PAIRS).then_some([self.mean_of(place), self.covariance_of(place, place).sqrt()])
     }
 
     /// Mean and deviation of the torque at the gearbox input, and of the reported engine torque.
     pub(super) fn of_sources(&self) -> [[T; 2]; 2] {
-        [TURBINE_AT, REPORTED_AT].map(|at| [self.mean[at], self.covariance[at][at].sqrt()])
+        [TURBINE_AT, REPORTED_AT].map(|at| [self.mean_of(at), self.covariance_of(at, at).sqrt()])
     }
 
     /// Mean and variance of the scale of the wheel speed.
@@ -282,7 +293,7 @@ impl<T: Real> Learnt<T> {
         if mean.is_finite() && variance.is_finite() {
             let edge = T::of(EDGE);
             self.mean[WHEEL_AT] = mean.max(-edge).min(edge);
-            self.covariance[WHEEL_AT][WHEEL_AT] = variance.max(T::of(PER_SHIFT)).min(T::one());
+            self.covariance[WHEEL_AT][WHEEL_AT] = variance.max(T::of(WHEEL_LEAST)).min(T::one());
         }
     }
 
@@ -393,29 +404,34 @@ impl<T: Real> Learnt<T> {
         if !by_car.is_possible() {
             return false;
         }
-        self.correct(&by_car);
+        self.correct(&by_car, acting.in_shift);
         true
     }
 
     /// Corrects all quantities: `theta + W e`, `P - w W W'`. The product is made of two equal factors, so that `P` stays
-    /// symmetric to the last digit. A shift that says more than is likely counts for less, by `w`.
-    fn correct(&mut self, by: &Innovation<T>) {
+    /// symmetric to the last digit. A shift that says more than is likely counts for less, by `w`. What a shift does not correct keeps its
+    /// mean and its covariance.
+    fn correct(&mut self, by: &Innovation<T>, in_shift: bool) {
+        let is_kept = |k: usize| in_shift && is_considered(k);
         let weight = (T::of(LIKELY) / by.distance.max(T::of(LIKELY))).sqrt();
         let root = weight.sqrt();
-        for (k, mean) in self.mean.iter_mut().enumerate() {
+        for (k, mean) in self.mean.iter_mut().enumerate().filter(|(k, _)| !is_kept(*k)) {
             let edge = T::of(edge(k));
             *mean = (*mean + weight * dot(&by.with[k], &by.innovation)).max(-edge).min(edge);
         }
         // In a gear one direction is seen, in a shift some.
         for direction in 0..ACTING {
             let with = by.with.each_ref().map(|row| root * row[direction]);
-            for (row, own) in self.covariance.iter_mut().zip(&with).filter(|(_, own)| **own != T::zero()) {
-                for (p, other) in row.iter_mut().zip(&with) {
-                    *p = *p - *own * *other;
+            for (i, row) in self.covariance.iter_mut().enumerate().filter(|(i, _)| with[*i] != T::zero()) {
+                for (j, (p, other)) in row.iter_mut().zip(&with).enumerate() {
+                    if !(is_kept(i) && is_kept(j)) {
+                        *p = *p - with[i] * *other;
+                    }
                 }
             }
         }
-        for (i, row) in self.covariance.iter_mut().enumerate().filter(|(i, row)| row[*i] < T::one()) {
+        let is_open = |i: usize, row: &[T; LEARNT]| row[i] < T::one() && !is_kept(i);
+        for (i, row) in self.covariance.iter_mut().enumerate().filter(|(i, row)| is_open(*i, row)) {
             row[i] = row[i] + T::of(PER_SHIFT);
         }
     }
@@ -491,6 +507,11 @@ impl<T: Real> Learnt<T> {
     }
 }
 
+/// Places of lag and delay of the valve of an element.
+fn timing_places(at: usize) -> Option<[usize; 2]> {
+    (at < MAX_ELEMENTS).then(|| [LAG_AT, DELAY_AT].map(|first| (first + at).min(LEARNT - 1)))
+}
+
 /// Whether oil can have this temperature, degC.
 fn is_oil<T: Real>(degc: T) -> bool {
     let [least, greatest] = OIL_DEGC.map(T::of);
@@ -499,7 +520,11 @@ fn is_oil<T: Real>(degc: T) -> bool {
 
 /// Bound of a quantity in its deviations.
 fn edge(k: usize) -> f64 {
-    if k < INERTIA_AT { EDGE_OF_TWO } else { EDGE }
+    match k {
+        0..INERTIA_AT => EDGE_OF_TWO,
+        LAG_AT.. => EDGE_OF_TIMING,
+        _ => EDGE,
+    }
 }
 
 /// Covariance of two quantities unlearnt.
@@ -560,23 +585,6 @@ impl<T: Real> Innovation<T> {
         let spread = (0..ACTING).fold(T::zero(), |sum, k| sum + lower[k][k].ln());
         Some(Self { innovation, with, distance, likelihood: -T::of(0.5) * distance - spread })
     }
-}
-
-/// Whether a symmetric matrix is that of a covariance: all pivots are positive.
-fn is_positive<T: Real>(mut of: [[T; LEARNT]; LEARNT]) -> bool {
-    for k in 0..LEARNT {
-        let row = of[k];
-        if row[k] <= T::zero() || row[k].is_nan() {
-            return false;
-        }
-        for below in of.iter_mut().skip(k + 1) {
-            let factor = below[k] / row[k];
-            for (x, above) in below.iter_mut().zip(&row) {
-                *x = *x - factor * *above;
-            }
-        }
-    }
-    true
 }
 
 #[cfg(test)]

@@ -43,6 +43,7 @@ mod readings;
 mod reported;
 mod running;
 mod shown;
+mod systematic;
 mod tables;
 mod timing;
 mod turbine;

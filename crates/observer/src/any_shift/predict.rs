@@ -46,7 +46,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
         }
         let share_n_m = running.slow_n_m;
-        let slow_share_n_m = u.slow_share(found.share) * share_n_m;
+        let slow_share_n_m = found.share * share_n_m;
         Torques { turbine_n_m: found.turbine_n_m, share_n_m, slow_share_n_m, inertia_n_m, clutches }
     }
 

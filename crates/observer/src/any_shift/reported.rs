@@ -88,7 +88,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn learn_capacity(&self, running: &Running<T>, learnt: &mut Learnt<T>) {
         let Some((share, time_s)) = running.compared.errors() else { return };
         let u = &self.uncertainty;
-        let lasting = [self.turbine.converter_share, self.turbine.engine_share].map(|share| u.slow_share(share));
+        let lasting = [self.turbine.converter_share, self.turbine.engine_share];
         let two = T::of(2.0);
         let noise = two * square(u.turbine_share) / (T::one() + time_s / (two * u.turbine_share_s));
         learnt.take_capacity(share, lasting, noise);

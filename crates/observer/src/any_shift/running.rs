@@ -14,11 +14,6 @@ pub(super) const TURBINE_ACTS: usize = STATES_ACTING - 1;
 const INERTIA_ACTS: usize = 4;
 
 impl<T: Real> ShiftUncertainty<T> {
-    /// Deviation of the part of the turbine torque's error that lasts, from that of the whole, as shares.
-    pub fn slow_share(&self, share: T) -> T {
-        (share * share - self.turbine_share * self.turbine_share).max(T::zero()).sqrt()
-    }
-
     /// Variance by which the error of a clutch's torque walks: after [`ShiftUncertainty::torque_share_s`] the part that
     /// does not last is another.
     pub(super) fn friction_walk(&self, dt_s: T) -> T {
@@ -122,7 +117,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub fn learnt_sources(&self, learnt: &Learnt<T>) -> [[T; 2]; 2] {
         let (of, turbine) = (learnt.of_sources(), &self.turbine);
         let first = if turbine.converter.is_some() { turbine.converter_share } else { turbine.engine_share };
-        let shares = [first, turbine.engine_share].map(|share| self.uncertainty.slow_share(share));
+        let shares = [first, turbine.engine_share];
         [of[0].map(|x| shares[0] * x), of[1].map(|x| shares[1] * x)]
     }
 
@@ -168,8 +163,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let u = &self.uncertainty;
         let source =
             if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share };
-        let in_shares =
-            [u.torque_share, u.torque_share, T::infinity(), T::infinity(), u.inertia_share, u.slow_share(source)];
+        let in_shares = [u.torque_share, u.torque_share, T::infinity(), T::infinity(), u.inertia_share, source];
         let mut by = [T::zero(); ACTING];
         for (by, share) in by.iter_mut().zip(in_shares).filter(|(_, share)| *share > T::zero()) {
             *by = u.stiffness_share / share;

@@ -100,6 +100,23 @@ pub(super) fn lower_inverse<T: Real, const L: usize>(of: &[[T; L]; L]) -> [[T; L
     inverse
 }
 
+/// Whether a symmetric matrix is that of a covariance: all pivots are positive.
+pub(super) fn is_positive<T: Real, const L: usize>(mut of: [[T; L]; L]) -> bool {
+    for k in 0..L {
+        let row = of[k];
+        if row[k] <= T::zero() || row[k].is_nan() {
+            return false;
+        }
+        for below in of.iter_mut().skip(k + 1) {
+            let factor = below[k] / row[k];
+            for (x, above) in below.iter_mut().zip(&row) {
+                *x = *x - factor * *above;
+            }
+        }
+    }
+    true
+}
+
 /// Eigenvalues and, as rows, eigenvectors of a symmetric matrix, by Jacobi's rotations.
 fn directions<T: Real>(mut of: Matrix<T>) -> ([T; ACTING], Matrix<T>) {
     let mut rows = [[T::zero(); ACTING]; ACTING];

@@ -1,8 +1,9 @@
 //! From neutral to a gear at rest, and from one direction to the other.
 
+use config::Car;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, Driver};
 
-use crate::{cars, with_stroke};
+use crate::{HeldGear, cars, with_stroke};
 
 const STANDING: Driver = Driver { throttle: 0.0, brake: 0.6, grade_rad: 0.0 };
 
@@ -13,11 +14,16 @@ struct Engaged {
 }
 
 impl Engaged {
-    fn after(run: &mut CarRun<'_>, duration_s: f64) -> Self {
+    fn after(car: &Car, run: &mut CarRun<'_>, duration_s: f64) -> Self {
         let begun_s = run.time_s();
+        let mut held = HeldGear::default();
         let mut result = Self { complete_s: None, samples: Vec::new() };
         while run.time_s() < begun_s + duration_s {
-            run.advance(STANDING, |_| {}, |sample| result.samples.push(*sample)).unwrap();
+            let record = |sample: &CarSample| {
+                held.check(car, sample, "at rest");
+                result.samples.push(*sample);
+            };
+            run.advance(STANDING, |_| {}, record).unwrap();
             if run.controller().shift().is_none() && run.time_s() > begun_s + 0.05 {
                 result.complete_s = result.complete_s.or(Some(run.time_s() - begun_s));
             }
@@ -50,7 +56,7 @@ fn a_gear_is_engaged_from_neutral_and_from_the_other_direction() {
         let start = (STANDING, 0.01);
         let mut run = CarRun::new(&model, &car, CarCalibration::STANDARD, first, state, start).unwrap();
         run.request_neutral().unwrap();
-        let neutral = Engaged::after(&mut run, 3.0);
+        let neutral = Engaged::after(&car, &mut run, 3.0);
         let last = neutral.samples.last().unwrap();
         // The open clutches drag.
         assert!(last.is_neutral && last.output_n_m.abs() < 15.0, "{}: {}", car.gearbox.name, last.output_n_m);
@@ -59,7 +65,7 @@ fn a_gear_is_engaged_from_neutral_and_from_the_other_direction() {
         // N-D, D-R, R-D.
         for (turns, gear, sign) in [(0, first, 1.0), (1, reverse, -1.0), (1, first, 1.0)] {
             run.request(gear).unwrap();
-            let engaged = Engaged::after(&mut run, 4.0);
+            let engaged = Engaged::after(&car, &mut run, 4.0);
             let label = format!("{} to gear {}", car.gearbox.name, car.gearbox.gears[gear].name);
             assert_eq!(run.controller().gear(), gear, "{label}");
             let last = engaged.samples.last().unwrap();
@@ -70,7 +76,7 @@ fn a_gear_is_engaged_from_neutral_and_from_the_other_direction() {
             jolt[turns] = f64::max(jolt[turns], engaged.jolt());
         }
         run.request_neutral().unwrap();
-        assert!(Engaged::after(&mut run, 2.0).samples.last().unwrap().output_n_m.abs() < 15.0);
+        assert!(Engaged::after(&car, &mut run, 2.0).samples.last().unwrap().output_n_m.abs() < 15.0);
     }
     println!(
         "engaged at rest: longest {longest:.2} s, overshoot {overshoot:.2}, largest change in 10 ms {jolt:.3?} of the end"

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 use config::{Car, Source};
+use plant::car::{CarCalibration, CarSample};
 
 /// A vehicle file of two or three lines with a gearbox that ships with the program.
 macro_rules! car {
@@ -57,6 +58,42 @@ fn with_stroke(mut car: Car) -> Car {
 /// Of many runs all in an optimised build, every fifth one in a debug build, which is too slow for them.
 fn runs<T>(all: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
     all.into_iter().step_by(if cfg!(debug_assertions) { 5 } else { 1 })
+}
+
+/// Where no shift is under way, the elements of the gear are commanded to line pressure, and no other command rises. Without a
+/// converter the clutch of the gear opens at low speed.
+#[derive(Default)]
+struct HeldGear {
+    /// Pressures at which the valves settled in the sample before, Pa.
+    before_pa: Option<Vec<f64>>,
+}
+
+impl HeldGear {
+    fn check(&mut self, car: &Car, sample: &CarSample, label: &str) {
+        let settled = |(at, clutch): (usize, &Option<config::ShiftClutch>)| {
+            clutch.map_or(0.0, |clutch| clutch.valve.settled_pressure(sample.commands[at]))
+        };
+        let settled_pa: Vec<f64> = car.clutches.iter().enumerate().map(settled).collect();
+        let before_pa = self.before_pa.replace(settled_pa.clone()).unwrap_or_else(|| settled_pa.clone());
+        if sample.shift.is_some() || sample.is_neutral {
+            return;
+        }
+        let gear = &car.gearbox.gears[sample.gear];
+        let input_rad_s = gear.ratio * car.driveline.final_ratio * sample.wheel_rad_s;
+        // The gearbox output swings about the speed of the wheels by a few per cent.
+        let may_open = car.converter.is_none() && input_rad_s < 1.1 * CarCalibration::STANDARD.launch_open_rad_s;
+        for (at, element) in car.gearbox.elements.iter().enumerate() {
+            let holds = gear.holding.iter().any(|holding| holding.element == at);
+            if car.clutches[at].is_none() || (holds && may_open) {
+                continue;
+            }
+            let is_kept =
+                if holds { settled_pa[at] > 0.999 * car.line_pressure_pa } else { settled_pa[at] <= before_pa[at] };
+            let (name, time_s, gear, now_pa, before_pa) =
+                (&element.name, sample.time_s, &gear.name, settled_pa[at], before_pa[at]);
+            assert!(is_kept, "{label}, {time_s:.2} s: {name} in gear {gear} from {before_pa:.0} to {now_pa:.0} Pa");
+        }
+    }
 }
 
 /// Neighbouring gears in both directions.

@@ -3,7 +3,7 @@
 use drivetrain::PeakJerk;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, CarShiftQuality, Driver, simulate_car_shift};
 
-use crate::{one_way, with_stroke};
+use crate::{HeldGear, one_way, with_stroke};
 
 /// Simulates a shift; each sample with the slip of the one-way clutch, rad/s, and its torque, N m.
 fn shift(model: &CarModel, names: [&str; 2], throttle: f64) -> (CarShiftQuality, Vec<(CarSample, [f64; 2])>) {
@@ -11,8 +11,9 @@ fn shift(model: &CarModel, names: [&str; 2], throttle: f64) -> (CarShiftQuality,
     let [from, to] = names.map(|name| gearbox.gear(name).unwrap());
     let one_way = gearbox.one_way_clutch_of(gearbox.gear("1").unwrap()).unwrap();
     let shift = CarShift::usual(&model.car, from, to, throttle);
-    let mut samples = Vec::new();
+    let (mut samples, mut held) = (Vec::new(), HeldGear::default());
     let quality = simulate_car_shift(model, &model.car, CarCalibration::STANDARD, &shift, |sample| {
+        held.check(&model.car, sample, &format!("{names:?}, throttle {throttle}"));
         samples.push((*sample, [sample.slips_rad_s[one_way], sample.torques.elements_n_m[one_way]]));
     });
     (quality.unwrap(), samples)
@@ -132,12 +133,13 @@ fn a_change_of_mind_at_any_time_ends_well() {
             let state = model.in_gear(gear(from), None, shift.vehicle_m_s, throttle).unwrap();
             let start = (driver(throttle), 0.01);
             let mut run = CarRun::new(&model, &model.car, CarCalibration::STANDARD, gear(from), state, start).unwrap();
-            let mut jerk = PeakJerk::default();
+            let (mut jerk, mut held) = (PeakJerk::default(), HeldGear::default());
             while run.time_s() < 5.0 {
                 if run.time_s() > 1.0 {
                     run.request(gear(if run.time_s() < 1.0 + back_s { to } else { from })).unwrap();
                 }
                 let record = |sample: &CarSample| {
+                    held.check(&model.car, sample, &label);
                     if sample.time_s > 1.0 {
                         jerk.acceleration(sample.time_s, sample.vehicle_m_s2)
                     }

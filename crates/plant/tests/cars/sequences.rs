@@ -1,9 +1,9 @@
 //! Skip shifts, requests that are withdrawn, and the throttle moved in mid-shift.
 
 use config::Car;
-use plant::car::{CarCalibration, CarModel, CarRun, CarShift, Driver};
+use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 
-use crate::{cars, neighbours, runs, with_stroke};
+use crate::{HeldGear, cars, neighbours, runs, with_stroke};
 
 /// Time of the request, s.
 const REQUEST_S: f64 = 1.0;
@@ -34,7 +34,7 @@ fn run(model: &CarModel, shift: &CarShift, asked: impl Fn(f64) -> usize, throttl
     run.preselect(Some(shift.to));
     let ratios = [shift.from, shift.to].map(|gear| car.gearbox.gears[gear].ratio);
     let (low, high) = (ratios[0].min(ratios[1]), ratios[0].max(ratios[1]));
-    let mut active_s = REQUEST_S;
+    let (mut active_s, mut held) = (REQUEST_S, HeldGear::default());
     let (mut result, mut before) = (Run { complete_s: None, outside_rad_s: 0.0, jerk_m_s3: 0.0 }, None);
     while run.time_s() < 6.0 {
         let now_s = run.time_s();
@@ -48,6 +48,7 @@ fn run(model: &CarModel, shift: &CarShift, asked: impl Fn(f64) -> usize, throttl
             driver(now_s),
             |_| {},
             |sample| {
+                held.check(car, sample, "");
                 if !is_rated {
                     return;
                 }
@@ -158,6 +159,49 @@ fn a_request_that_is_withdrawn_ends_in_the_old_gear() {
         }
         worst.print(title);
         assert!(worst.longest.0 < 3.0 && worst.outside.0 < 15.0 && worst.jerk.0 < 90.0);
+    }
+}
+
+/// It goes back to line pressure from where it is, and not from the pressure at which a clutch closes.
+#[test]
+fn a_request_that_is_withdrawn_in_the_fill_lets_no_command_of_the_old_gear_drop() {
+    for car in cars() {
+        let model = CarModel::new(car).unwrap();
+        let line_pa = model.car.line_pressure_pa;
+        for (from, to) in runs(neighbours(&model.car)) {
+            for (throttle, after_s) in [0.0, 0.25].into_iter().flat_map(|t| [0.02, 0.05, 0.1, 0.15].map(|s| (t, s))) {
+                let shift = CarShift::usual(&model.car, from, to, throttle);
+                let driver = Driver { throttle, brake: 0.0, grade_rad: 0.0 };
+                let state = model.in_gear(from, Some(to), shift.vehicle_m_s, throttle).unwrap();
+                let nominal = CarCalibration::STANDARD;
+                let mut run = CarRun::new(&model, &model.car, nominal, from, state, (driver, 0.01)).unwrap();
+                // Pressures at which the valves of the old gear's elements settle, Pa.
+                let mut before: Option<Vec<f64>> = None;
+                while run.time_s() < REQUEST_S + after_s + 0.4 {
+                    if run.time_s() > REQUEST_S - 1e-9 {
+                        run.request(if run.time_s() < REQUEST_S + after_s - 1e-9 { to } else { from }).unwrap();
+                    }
+                    let settled = |sample: &CarSample| {
+                        let held = model.car.gearbox.gears[from].holding.iter().map(|holding| holding.element);
+                        let settled = |at: usize| {
+                            model.car.clutches[at].map(|clutch| clutch.valve.settled_pressure(sample.commands[at]))
+                        };
+                        held.filter_map(settled).collect::<Vec<_>>()
+                    };
+                    let mut now = Vec::new();
+                    run.advance(driver, |_| {}, |sample| now = settled(sample)).unwrap();
+                    if run.time_s() > REQUEST_S + after_s + 0.005 {
+                        for (now, before) in now.iter().zip(before.iter().flatten()) {
+                            let more = format!("throttle {throttle}, after {after_s} s, at {:.2} s", run.time_s());
+                            let label = label(&model.car, (from, to), &more);
+                            // The torque that the clutch must hold changes by some N m in 10 ms.
+                            assert!(*now > before - 0.01 * line_pa, "{label}: {before:.0} to {now:.0} Pa");
+                        }
+                    }
+                    before = Some(now);
+                }
+            }
+        }
     }
 }
 

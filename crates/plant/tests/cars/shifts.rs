@@ -3,7 +3,7 @@
 use config::{Car, Source};
 use plant::car::{CarCalibration, CarModel, CarShift, CarShiftQuality, simulate_car_shift};
 
-use crate::{cars, neighbours, runs};
+use crate::{HeldGear, cars, neighbours, runs};
 
 /// Without power, and from little to much.
 const THROTTLES: [f64; 5] = [0.0, 0.1, 0.2, 0.4, 0.7];
@@ -33,7 +33,10 @@ fn each_shift(title: &str, cars: Vec<Car>, friction: f64, limits: Limits) {
                 let shift = CarShift::usual(&nominal, from, to, throttle);
                 let name = |gear: usize| nominal.gearbox.gears[gear].name.as_str();
                 let label = format!("{} {}-{}, throttle {throttle}", nominal.gearbox.name, name(from), name(to));
-                let quality = simulate_car_shift(&model, &nominal, CarCalibration::STANDARD, &shift, |_| {});
+                let mut held = HeldGear::default();
+                let quality = simulate_car_shift(&model, &nominal, CarCalibration::STANDARD, &shift, |sample| {
+                    held.check(&nominal, sample, &label);
+                });
                 let quality = quality.unwrap_or_else(|error| panic!("{label}: {error}"));
                 for (worst, number) in worst.iter_mut().zip(numbers(&quality)) {
                     if number > worst.0 {

@@ -12,6 +12,7 @@ mod engine_torque;
 mod holes;
 mod input_clutch;
 mod learning;
+mod learnt_coverage;
 mod limits;
 mod one_way;
 mod ratios_alone;

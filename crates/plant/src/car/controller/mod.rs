@@ -371,7 +371,9 @@ impl CarShiftController {
         let turbine_n_m = self.engine.turbine_n_m(&self.car, measured);
         let (mut elements, dogs) = self.held();
         let line_pa = self.car.line_pressure_pa;
-        self.open_at_low_speed(measured);
+        for opened in self.open_at_low_speed(measured).into_iter().flatten() {
+            elements[opened] = self.open_command(opened);
+        }
         let c = &self.calibration;
         if let Some(launch) = &mut self.launch {
             let piston = self.strokes.of(launch.element());
@@ -402,9 +404,7 @@ impl CarShiftController {
 
     /// Commands of the elements that the gear holds, and the dogs that are in; the clutches of a shift are open.
     fn held(&self) -> ([f64; MAX_ELEMENTS], [bool; MAX_ELEMENTS]) {
-        let open = |element: usize| self.car.clutches.get(element).and_then(Option::as_ref);
-        let mut elements: [f64; MAX_ELEMENTS] =
-            std::array::from_fn(|element| open(element).map_or(0.0, |clutch| clutch.valve.command_for(0.0)));
+        let mut elements: [f64; MAX_ELEMENTS] = std::array::from_fn(|element| self.open_command(element));
         let mut dogs = [false; MAX_ELEMENTS];
         let line_pa = self.car.line_pressure_pa;
         let partner = self.partner(self.gear).filter(|_| self.is_neutral);
@@ -436,18 +436,25 @@ impl CarShiftController {
         (elements, dogs)
     }
 
-    /// Without a converter the clutch opens before the engine turns too slowly, in a shift too.
-    fn open_at_low_speed(&mut self, measured: &CarMeasured) {
+    /// Command of an element that is open; zero without a valve.
+    fn open_command(&self, element: usize) -> f64 {
+        self.car.clutches.get(element).and_then(Option::as_ref).map_or(0.0, |clutch| clutch.valve.command_for(0.0))
+    }
+
+    /// Without a converter the clutch opens before the engine turns too slowly, in a shift too. The clutches of the shift that it ends.
+    fn open_at_low_speed(&mut self, measured: &CarMeasured) -> Option<[usize; 2]> {
         if self.car.converter.is_some() || self.launch.is_some() {
-            return;
+            return None;
         }
         let gears = &self.car.gearbox.gears;
         let slow = |gear: usize| gears[gear].ratio * measured.output_rad_s < self.calibration.launch_open_rad_s;
         let to = self.active.as_ref().map_or(self.gear, |shift| shift.to);
-        if slow(self.gear) && slow(to) {
-            self.launch = Launch::of(&self.car, to);
-            (self.gear, self.active) = (to, None);
-            self.route.clear();
+        if !(slow(self.gear) && slow(to)) {
+            return None;
         }
+        self.launch = Launch::of(&self.car, to);
+        self.gear = to;
+        self.route.clear();
+        self.active.take().map(|shift| [shift.offgoing.element, shift.oncoming.element])
     }
 }

@@ -158,7 +158,13 @@ impl ActiveShift {
                 back.taken_over_n_m = Some(self.controlled_n_m);
                 back.slips_before_rad_s = self.slips_before_rad_s.map(|[y, z]| [z, y]);
             }
-            ShiftStage::Fill | ShiftStage::InertiaPhase => back.stage = ShiftStage::Lock,
+            ShiftStage::Fill => {
+                // The clutch that was to open goes back to line pressure from where it is.
+                back.stage = ShiftStage::Lock;
+                let opened = ((time_s - self.since_s) / self.fill_s(c)).clamp(0.0, 1.0);
+                back.since_s = time_s - (1.0 - opened) * c.lock_ramp_s;
+            }
+            ShiftStage::InertiaPhase => back.stage = ShiftStage::Lock,
             ShiftStage::HandOver | ShiftStage::Lock | ShiftStage::Done => return None,
         }
         Some(back)
@@ -197,7 +203,9 @@ impl ActiveShift {
             ShiftStage::TorquePhase => self.transfer(c, &now),
             ShiftStage::InertiaPhase => self.slip_control(c, &now),
             ShiftStage::HandOver => self.hand_over(c, &now),
-            ShiftStage::Lock | ShiftStage::Done => [0.0, self.locked_pa(c, &now)],
+            ShiftStage::Lock => [0.0, self.locked_pa(c, &now)],
+            // The ramp of the lock has ended.
+            ShiftStage::Done => [0.0, self.line_pa],
         };
         let y_wheels = self.offgoing.slip_at_turbine(turbine, output.speed_rad_s());
         self.slips_before_rad_s = Some([y_wheels, now.z_wheels]);

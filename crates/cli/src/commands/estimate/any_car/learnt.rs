@@ -125,7 +125,7 @@ fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> V
         "learnt torque at the gearbox input: {:+.1} +-{:.1} % above the one {source}",
         input[0], input[1]
     ));
-    let unlearnt = 100.0 * filter.uncertainty.slow_share(filter.turbine.engine_share);
+    let unlearnt = 100.0 * filter.turbine.engine_share;
     if car.converter.is_some() && reported[1] < SHOWN * unlearnt {
         said.push(format!(
             "learnt reported engine torque: {:+.1} +-{:.1} % above the true one",
