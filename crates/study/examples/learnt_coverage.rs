@@ -15,7 +15,7 @@ use std::error::Error;
 use std::path::Path;
 
 use config::{Car, Drive, Sensors};
-use design::ShiftErrors;
+use design::ErrorBudget;
 use study::any_shift::learnt_coverage::{Coverage, LearntDrive, Quantity, Sampled, SampledCar, TorqueErrors, learn};
 
 const CARS: [&str; 5] = ["eight_speed", "six_speed", "four_speed", "ten_speed", "dual_clutch"];
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for name in names {
         let car = Car::read(&root.join(format!("vehicles/{name}.toml")))?;
         let drives = (1..=u64::from(cars.max(1))).map(|seed| {
-            let sampled = SampledCar::new(&car, &ShiftErrors::STANDARD, what, seed);
+            let sampled = SampledCar::new(&car, &ErrorBudget::of_car(&car), what, seed);
             learn(&car, &sampled, &drive, &sensors, (parts, seed))
         });
         print(&name, &drives.collect::<Result<Vec<_>, _>>()?, parts);

@@ -4,7 +4,7 @@
 //! learnt quantity there are the error and the standard deviation that the filter states.
 
 use config::{Car, Drive, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
@@ -156,25 +156,25 @@ pub struct SampledCar {
 
 impl SampledCar {
     /// A car within the bounds.
-    pub fn new(known: &Car, errors: &ShiftErrors, what: Sampled, seed: u64) -> Self {
+    pub fn new(known: &Car, budget: &ErrorBudget, what: Sampled, seed: u64) -> Self {
         let mut random = Random(seed.wrapping_mul(7919));
         let mut draw = ShiftDraw::none(known);
         if what != Sampled::Nothing {
-            draw = ShiftDraw::within(known, errors, || random.uniform());
+            draw = ShiftDraw::within(known, budget, || random.uniform());
         }
         if what == Sampled::Budget {
-            draw = draw.with_timing(known, errors, || random.uniform());
+            draw = draw.with_timing(budget, || random.uniform());
         }
         let mut car = draw.car(known);
         let mut sampled = |bound: f64| 1.0 + bound * (2.0 * random.uniform() - 1.0);
         let [mut engine, mut inertia, mut wheel] = [1.0; 3];
         if what != Sampled::Nothing {
-            engine = sampled(errors.engine);
+            engine = sampled(budget.engine);
         }
         if what == Sampled::Budget {
-            inertia = sampled(errors.inertia);
-            wheel = sampled(errors.wheel_scale);
-            car.driveline.shaft_stiffness_n_m_rad *= sampled(errors.stiffness);
+            inertia = sampled(budget.inertia);
+            wheel = sampled(budget.wheel_scale);
+            car.driveline.shaft_stiffness_n_m_rad *= sampled(budget.stiffness);
         }
         Self { car, draw, engine, inertia, wheel }
     }
@@ -279,10 +279,10 @@ pub fn learn(
     sensors: &Sensors,
     (parts, seed): (usize, u64),
 ) -> Result<LearntDrive, AnyShiftError> {
-    let errors = ShiftErrors::STANDARD;
-    let mut tables = ShiftTables::of_car(known, &errors).map_err(AnyShiftError::TooManyElements)?;
+    let budget = ErrorBudget::of_car(known).read_by(known, Some(sensors));
+    let mut tables = ShiftTables::of_car(known, &budget).map_err(AnyShiftError::TooManyElements)?;
     tables.scale_inertia(sampled.inertia);
-    let filter = any_shift_filter(known, &tables, &errors, Some(sensors));
+    let filter = any_shift_filter(known, &tables, &budget, Some(sensors));
     let recording = record(known, sampled, drive)?;
     let mut state = filter.start();
     let mut result = LearntDrive::default();

@@ -1,7 +1,7 @@
 //! What is learnt lies within its stated intervals, and does not make the torques worse with the hours.
 
 use config::{Car, Drive};
-use design::ShiftErrors;
+use design::ErrorBudget;
 use std::path::Path;
 use study::any_shift::learnt_coverage::{Coverage, LearntDrive, Quantity, Sampled, SampledCar, learn};
 
@@ -10,7 +10,7 @@ use crate::cars::{cars, sensors};
 /// So many times three minutes in town by a sampled car.
 fn town(car: &Car, what: Sampled, (repetitions, parts): (u32, usize), seed: u64) -> LearntDrive {
     let town = Drive::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml")).unwrap();
-    let sampled = SampledCar::new(car, &ShiftErrors::STANDARD, what, seed);
+    let sampled = SampledCar::new(car, &ErrorBudget::of_car(car), what, seed);
     learn(car, &sampled, &Drive { repetitions, ..town }, &sensors(), (parts, seed)).unwrap()
 }
 

@@ -81,9 +81,9 @@ impl Messages {
     /// Shows what was held, of the log with this name.
     fn show(self, log: &Path) -> Result<(), Failure> {
         let Held { notes, lines } = self.held.unwrap_or_default();
-        output::note(&format!("log: {}\n{}\n", log.display(), notes.join("\n")));
+        output::note(&format!("log: {}\n{}\n", log.shown(), notes.join("\n")));
         if !lines.is_empty() {
-            output::line(&format!("{}:\n{}\n", log.display(), lines.join("\n")))?;
+            output::line(&format!("{}:\n{}\n", log.shown(), lines.join("\n")))?;
         }
         Ok(())
     }
