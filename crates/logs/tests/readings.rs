@@ -280,7 +280,7 @@ fn a_wrong_map_is_refused_with_its_key() {
         ("[chanel.gear]\nname = \"a\"\n", "unknown field `chanel`"),
     ] {
         let error = ChannelMap::read(&folder.write("map.toml", text)).unwrap_err().to_string();
-        assert!(error.contains("map.toml: ") && error.contains(message), "{error} | {message}");
+        assert!(error.contains("map.toml:") && error.contains(message), "{error} | {message}");
     }
 }
 

@@ -64,7 +64,7 @@ fn good_rows(
             let missing = Damage { line, message: "the names of the columns are missing".to_owned() };
             return Ok((good, (line == 1).then_some(missing)));
         }
-        let cut = if bytes.len() < LONGEST_ROW { "the line is incomplete" } else { "the line is too long for a row" };
+        let cut = if bytes.len() < LONGEST_ROW { "the line is incomplete" } else { "the line is longer than 32 MiB" };
         let text = bytes.strip_suffix(b"\n").ok_or(cut).map(std::str::from_utf8);
         let taken = match text {
             Err(cut) => Err(cut.to_owned()),

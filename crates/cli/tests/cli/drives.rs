@@ -103,7 +103,7 @@ fn a_file_of_another_kind_is_named() {
         (&["simulate", &drive, "--vehicle", &study, "-o", &out], "this looks like a study file"),
         (&["study", EXPERIMENT, "-o", &out], "this looks like an experiment file, expected a study file"),
         (&["estimate", &table, "--vehicle", &drive], "this looks like a drive file, expected a vehicle file"),
-        (&["estimate", &table, "--vehicle", &map], "this looks like a channel map\nhint: "),
+        (&["estimate", &table, "--vehicle", &map], "this looks like a channel map, expected a vehicle file\nhint: "),
         (&["estimate", &table, "--vehicle", &table], "this looks like a table, expected TOML"),
         (&["estimate", &car, "--vehicle", &car], "this is a TOML file, expected a log"),
         (&["estimate", &table, "--vehicle", VEHICLE, "--map", &car], "a gearbox, expected a channel map\nhint: "),

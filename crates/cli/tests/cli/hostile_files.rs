@@ -241,7 +241,7 @@ fn an_output_does_not_replace_what_it_is_made_from_or_another_kind_of_file() {
     let error = refused(&wetclutch(&["fit", "log.csv", "--vehicle", VEHICLE, "-o", &learnt]));
     assert!(error.contains("learnt.toml: exists and is no vehicle file"), "{error}");
     let shown = printed(&wetclutch(&["check", &learnt]));
-    assert!(shown.contains("use: wetclutch estimate LOG --vehicle CAR --learnt"), "{shown}");
+    assert!(shown.contains("use: wetclutch estimate LOG --vehicle VEHICLE --learnt"), "{shown}");
 }
 
 #[test]

@@ -295,7 +295,7 @@ fn the_ranges_of_a_fitted_file_hold_and_are_narrower() {
             let table = format!("[clutch.{name}.error_bounds]");
             assert_eq!(file.source.text.contains(&table), fit.elements_seen[place], "{name}");
         }
-        let bounds = [&drawn.file, &file].map(|car| ErrorBudget::of_car(car));
+        let bounds = [&drawn.file, &file].map(ErrorBudget::of_car);
         assert!(bounds[1].converter <= bounds[0].converter && bounds[1].inertia <= bounds[0].inertia, "{bounds:?}");
         let found = estimated::estimated(&drawn, &city(1), &[drawn.file.clone(), file, unchecked]);
         // Where held-out shifts say that the valves err less than the bounds, the filter is better for it.

@@ -134,7 +134,8 @@ impl CarCampaign {
         let mut exceeded = Vec::new();
         for (at, element) in self.study.car.gearbox.elements.iter().enumerate() {
             let (Some(bounds), Some(sampled)) = (self.budget.element(at), self.sampled.element(at)) else { continue };
-            let of: [(&str, fn(&ElementErrors) -> [f64; 2]); 2] =
+            type Factor = fn(&ElementErrors) -> [f64; 2];
+            let of: [(&str, Factor); 2] =
                 [("friction", |element| element.friction_factor), ("valve gain", |element| element.valve_gain_factor)];
             for (what, of) in of {
                 let ([low, high], [from, to]) = (of(bounds), of(sampled));
