@@ -415,24 +415,26 @@ impl<T: Real> Learnt<T> {
         let is_kept = |k: usize| in_shift && is_considered(k);
         let weight = (T::of(LIKELY) / by.distance.max(T::of(LIKELY))).sqrt();
         let root = weight.sqrt();
-        for (k, mean) in self.mean.iter_mut().enumerate().filter(|(k, _)| !is_kept(*k)) {
+        for (k, (mean, with)) in self.mean.iter_mut().zip(&by.with).enumerate().filter(|(k, _)| !is_kept(*k)) {
             let edge = T::of(edge(k));
-            *mean = (*mean + weight * dot(&by.with[k], &by.innovation)).max(-edge).min(edge);
+            *mean = (*mean + weight * dot(with, &by.innovation)).max(-edge).min(edge);
         }
         // In a gear one direction is seen, in a shift some.
         for direction in 0..ACTING {
             let with = by.with.each_ref().map(|row| root * row[direction]);
-            for (i, row) in self.covariance.iter_mut().enumerate().filter(|(i, _)| with[*i] != T::zero()) {
+            for (i, (row, own)) in
+                self.covariance.iter_mut().zip(&with).enumerate().filter(|(_, of)| *of.1 != T::zero())
+            {
                 for (j, (p, other)) in row.iter_mut().zip(&with).enumerate() {
                     if !(is_kept(i) && is_kept(j)) {
-                        *p = *p - with[i] * *other;
+                        *p = *p - *own * *other;
                     }
                 }
             }
         }
-        let is_open = |i: usize, row: &[T; LEARNT]| row[i] < T::one() && !is_kept(i);
-        for (i, row) in self.covariance.iter_mut().enumerate().filter(|(i, row)| is_open(*i, row)) {
-            row[i] = row[i] + T::of(PER_SHIFT);
+        let variances = self.covariance.iter_mut().enumerate().filter_map(|(k, row)| Some((k, row.get_mut(k)?)));
+        for (_, variance) in variances.filter(|(k, variance)| **variance < T::one() && !is_kept(*k)) {
+            *variance = *variance + T::of(PER_SHIFT);
         }
     }
 
@@ -508,6 +510,7 @@ impl<T: Real> Learnt<T> {
 }
 
 /// Places of lag and delay of the valve of an element.
+#[inline(always)]
 fn timing_places(at: usize) -> Option<[usize; 2]> {
     (at < MAX_ELEMENTS).then(|| [LAG_AT, DELAY_AT].map(|first| (first + at).min(LEARNT - 1)))
 }
