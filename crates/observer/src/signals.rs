@@ -159,8 +159,9 @@ impl<T: Real> InputLimits<T> {
     /// zero.
     #[inline]
     pub fn possible_command(&self, command: T) -> Option<T> {
-        let possible = command >= -self.command_error && command <= self.command_max + self.command_error;
-        possible.then(|| command.at_least(T::zero()).at_most(self.command_max))
+        let possible = command.at_least(T::zero()).at_most(self.command_max);
+        // A comparison with NaN is false, so this refuses non-finite values too.
+        ((command - possible).abs() <= self.command_error).then_some(possible)
     }
 
     /// Whether a valve command can be used.
@@ -172,14 +173,8 @@ impl<T: Real> InputLimits<T> {
     /// A reading of a valve command as far as it can be used.
     #[inline]
     pub(crate) fn read_command(&self, reading: &Reading<T>) -> Option<Reading<T>> {
-        let value = self.possible_command(reading.value).filter(|_| self.usable_command(reading))?;
-        Some(Reading { value, ..*reading })
-    }
-
-    /// Whether a reading of a valve command can be used.
-    #[inline]
-    pub(crate) fn usable_command(&self, reading: &Reading<T>) -> bool {
-        self.command_valid(reading.value) && reading.age_s >= T::zero() && reading.age_s.is_finite()
+        let value = self.possible_command(reading.value)?;
+        (reading.age_s >= T::zero() && reading.age_s.is_finite()).then_some(Reading { value, ..*reading })
     }
 
     /// Whether a drive-shaft torque is a number within its limit.

@@ -53,10 +53,10 @@ impl<T: Real> ValveLimits<T> {
     #[inline]
     pub(super) fn usable(&self, reading: &Reading<T>) -> Option<Reading<T>> {
         let Reading { value, age_s } = *reading;
+        let possible = value.at_least(T::zero()).at_most(self.command_max);
         // A comparison with NaN is false, so this refuses non-finite values too.
-        let possible = value >= -self.command_error && value <= self.command_max + self.command_error;
-        (possible && age_s >= T::zero() && age_s.is_finite())
-            .then(|| Reading { value: value.at_least(T::zero()).at_most(self.command_max), age_s })
+        ((value - possible).abs() <= self.command_error && age_s >= T::zero() && age_s.is_finite())
+            .then_some(Reading { value: possible, age_s })
     }
 
     /// The nearest pressure that the valve can give, Pa.
