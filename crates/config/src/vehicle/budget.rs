@@ -8,14 +8,11 @@ use observer::FillBudget;
 use toml::Spanned;
 
 use super::car_bounds::contain_delay;
+use super::error_budget::{ENGINE, HYSTERESIS_PA, STIFFNESS, WHEEL_SCALE, around};
 use super::raw::RawErrorBounds;
 use super::{HYSTERESES_PA, ShiftClutch, fill_bounds, valves};
 use crate::check::{Check, Number, Numbers};
 use crate::{ConfigError, Sensors};
-
-/// Half-width of a valve's hysteresis where the file says nothing, Pa [chosen]: trade data sheets of proportional pressure
-/// reducers give 2 to 4 % of full scale for the whole width.
-const VALVE_HYSTERESIS_PA: f64 = 10e3;
 
 /// Age of a command where the file says nothing, s [chosen]: one time step of any log at 20 Hz or more.
 const COMMAND_AGE_S: f64 = 0.05;
@@ -96,28 +93,24 @@ pub struct ErrorBounds {
     pub backlash_rad: f64,
 }
 
-/// Error of the scale of the wheel speed, as a share: size, wear and pressure of the tyres.
-const WHEEL_SCALE: f64 = 0.02;
 /// Delay of the wheel speed, s: filter and bus of the brakes' controller.
 const WHEEL_DELAY_S: f64 = 0.03;
-/// Error of a reported engine torque [chosen].
-const ENGINE_TORQUE_SHARE: f64 = 0.08;
 /// Delay of turbine against output speed, s: one cycle of a bus.
 const CHANNEL_SKEW_S: f64 = 0.01;
-/// Factors on the stiffness of the drive shafts [chosen].
-const SHAFT_STIFFNESS_FACTOR: [f64; 2] = [0.8, 1.2];
+/// Factors on the stiffness of the drive shafts.
+const STIFFNESS_FACTOR: [f64; 2] = around(STIFFNESS);
 /// Twist without torque, rad at the wheels [chosen].
 const BACKLASH_RAD: f64 = 0.03;
 
 /// The keys of the error budget that any file may leave out, with the values that they then have.
 pub(super) const OPTIONAL: [(&str, &[f64]); 8] = [
-    ("valve_hysteresis_pa", &[VALVE_HYSTERESIS_PA]),
+    ("valve_hysteresis_pa", &[HYSTERESIS_PA]),
     ("command_age_s", &[COMMAND_AGE_S]),
     ("wheel_scale", &[WHEEL_SCALE]),
     ("wheel_delay_s", &[WHEEL_DELAY_S]),
     ("channel_skew_s", &[CHANNEL_SKEW_S]),
-    ("engine_torque_share", &[ENGINE_TORQUE_SHARE]),
-    ("shaft_stiffness_factor", &SHAFT_STIFFNESS_FACTOR),
+    ("engine_torque_share", &[ENGINE]),
+    ("shaft_stiffness_factor", &STIFFNESS_FACTOR),
     ("backlash_rad", &[BACKLASH_RAD]),
 ];
 
@@ -147,8 +140,8 @@ pub(super) fn error_bounds(
         wheel_scale: optional("wheel_scale", &raw.wheel_scale, 0.0..=0.2, WHEEL_SCALE)?,
         wheel_delay_s: optional("wheel_delay_s", &raw.wheel_delay_s, 0.0..=0.2, WHEEL_DELAY_S)?,
         channel_skew_s: optional("channel_skew_s", &raw.channel_skew_s, 0.0..=0.1, CHANNEL_SKEW_S)?,
-        engine_torque_share: optional("engine_torque_share", &raw.engine_torque_share, 0.0..=1.0, ENGINE_TORQUE_SHARE)?,
-        shaft_stiffness_factor: stiffness.transpose()?.unwrap_or(SHAFT_STIFFNESS_FACTOR),
+        engine_torque_share: optional("engine_torque_share", &raw.engine_torque_share, 0.0..=1.0, ENGINE)?,
+        shaft_stiffness_factor: stiffness.transpose()?.unwrap_or(STIFFNESS_FACTOR),
         backlash_rad: optional("backlash_rad", &raw.backlash_rad, 0.0..=0.2, BACKLASH_RAD)?,
         turbine_torque_n_m: number("turbine_torque_n_m", &raw.turbine_torque_n_m, 0.0..=1e3)?,
         inertia_torque_n_m: 0.0,
@@ -175,7 +168,7 @@ pub(super) fn error_bounds(
             "valve_hysteresis_pa",
             &raw.valve_hysteresis_pa,
             oncoming.hysteresis_pa..=*HYSTERESES_PA.end(),
-            VALVE_HYSTERESIS_PA.max(oncoming.hysteresis_pa),
+            HYSTERESIS_PA.max(oncoming.hysteresis_pa),
         )?,
         command_age_s: optional("command_age_s", &raw.command_age_s, 0.0..=1.0, COMMAND_AGE_S)?,
         line_pressure_pa: line_pressure_pa.unwrap_or([pressure_max_pa; 2]),

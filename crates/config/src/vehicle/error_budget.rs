@@ -16,15 +16,16 @@ const VALVE_LAG: f64 = 0.5;
 /// Of the converter's capacity.
 const CONVERTER: f64 = 0.10;
 /// Of the engine torque that the engine's controller reports.
-const ENGINE: f64 = 0.08;
+pub(super) const ENGINE: f64 = 0.08;
 /// Of the turbine-side inertia `M11` of a shift.
 const INERTIA: f64 = 0.20;
 /// Of the stiffness of the drive shafts.
-const STIFFNESS: f64 = 0.20;
+pub(super) const STIFFNESS: f64 = 0.20;
 /// Of the scale of the wheel speed: size, wear and pressure of the tyres.
-const WHEEL_SCALE: f64 = 0.02;
-/// Half-width of the hysteresis of a valve, Pa.
-const HYSTERESIS_PA: f64 = 10e3;
+pub(super) const WHEEL_SCALE: f64 = 0.02;
+/// Half-width of the hysteresis of a valve, Pa: trade data sheets of proportional pressure reducers give 2 to 4 % of full scale for the whole
+/// width.
+pub(super) const HYSTERESIS_PA: f64 = 10e3;
 /// Delay of a valve, s.
 const VALVE_DELAY_S: [f64; 2] = [0.0, 0.03];
 /// What the delay of a valve may differ from that of its file by, where that is outside [`VALVE_DELAY_S`], s.
@@ -192,7 +193,7 @@ pub(super) fn command_limits(valve: &ClutchValve<f64>, line_pressure_pa: f64, ga
 }
 
 /// Factors up to a relative error.
-const fn around(relative: f64) -> [f64; 2] {
+pub(super) const fn around(relative: f64) -> [f64; 2] {
     [1.0 - relative, 1.0 + relative]
 }
 
