@@ -477,7 +477,7 @@ fn each_table(tables: &str, value: &Spanned<DeValue<'_>>, entries: &mut Vec<Entr
 }
 
 /// Whether a key may be another one with one or two letters wrong, missing or too many: not where the digits alone differ.
-fn is_near(written: &str, key: &str) -> bool {
+pub(crate) fn is_near(written: &str, key: &str) -> bool {
     const LETTERS: usize = 2;
     let without_digits = |name: &str| name.chars().filter(|c| !c.is_ascii_digit()).collect::<String>();
     let (written_letters, key_letters) = (without_digits(written), without_digits(key));

@@ -12,6 +12,7 @@ use toml::de::{DeTable, DeValue, Deserializer};
 use trace::text_file::{LARGEST_LIST, LARGEST_TEXT, read_text_of};
 
 use crate::ConfigError;
+use crate::all_errors::is_near;
 
 /// What a configuration file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -181,16 +182,38 @@ impl Source {
             (false, false, false) if has("sensors") => Ok(Kind::Sensors),
             (false, false, false) if !tables.is_empty() && tables.iter().all(of_a_vehicle) => Ok(Kind::Overlay),
             _ if has("channel") => Ok(Kind::ChannelMap),
-            _ => Err(ConfigError::Syntax {
-                path: self.path.clone(),
-                line: 1,
-                message:
-                    "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
-                          file (with [[segment]] or [trace]), study file (with [[factor]], or with `runs` for a car with a gearbox), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
-                          with tables of a vehicle file)"
-                        .to_owned(),
-            }),
+            _ => Err(self.of_no_kind(&tables)),
         }
+    }
+
+    /// What is wrong with a file that is none of those that are known.
+    fn of_no_kind(&self, tables: &toml::Table) -> ConfigError {
+        /// Keys by which the kinds are known.
+        const KEYS: [&str; 11] = [
+            "gearbox",
+            "gear_train",
+            "shift",
+            "segment",
+            "trace",
+            "factor",
+            "runs",
+            "vehicle",
+            "gear",
+            "sensors",
+            "channel",
+        ];
+        let expected = "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
+                        file (with [[segment]] or [trace]), study file (with [[factor]], or with `runs` for a car with a gearbox), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
+                        with tables of a vehicle file)";
+        let unknown = tables.keys().filter(|key| !KEYS.contains(&key.as_str()));
+        let near = unknown.flat_map(|key| KEYS.map(|known| (key, known))).find(|(key, known)| is_near(key, known));
+        let (path, mut line, mut message) = (self.path.clone(), 1, expected.to_owned());
+        if let Some((key, known)) = near {
+            let begins = |text: &str| text.trim_start().trim_start_matches('[').trim_start().starts_with(key.as_str());
+            line = 1 + self.text.lines().position(begins).unwrap_or(0);
+            message = format!("unknown key `{}`, {expected}\nhint: did you mean `{known}`?", trace::printable(key));
+        }
+        ConfigError::Syntax { path, line, message }
     }
 
     /// Reads the text into raw types.

@@ -405,3 +405,16 @@ fn weak_valves_within_the_bounds_have_their_commands() {
         assert!(element.command_max > weak.command_for(car.line_pressure_pa));
     }
 }
+
+#[test]
+fn a_typo_in_the_key_that_tells_the_kind_of_a_file_is_named_with_its_line() {
+    for (text, words) in [
+        ("name = \"x\"\ngerbox = \"8hp.toml\"\n", "x.toml:2: unknown key `gerbox`, expected a vehicle file"),
+        ("name = \"x\"\n\n[[segmnt]]\nduration_s = 3\n", "x.toml:3: unknown key `segmnt`, expected a vehicle file"),
+        ("nonsense = 3\n", "x.toml:1: expected a vehicle file"),
+    ] {
+        let error = Source::built_in("x.toml", text).kind().unwrap_err().to_string();
+        assert!(error.starts_with(words), "{error}");
+        assert_eq!(error.contains("hint: did you mean `"), words.contains("unknown"), "{error}");
+    }
+}

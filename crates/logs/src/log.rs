@@ -140,6 +140,11 @@ impl Log {
         Ok(log)
     }
 
+    /// Whether its signals are those of a CAN bus, and no DBC says which they are.
+    pub fn lacks_dbc(&self) -> bool {
+        matches!(&self.source, Source::Mdf(log) if log.lacks_dbc())
+    }
+
     /// Whether there are frames of a CAN bus in it.
     fn has_frames(&self) -> bool {
         match &self.source {

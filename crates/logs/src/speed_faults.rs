@@ -5,7 +5,8 @@
 //! - if it is further from the last one that was believed than the shaft's largest acceleration allows in the time between them, or
 //! - if it fell to a tenth of that and less while another speed shows that the shaft turns, or
 //! - if it came by a jump to the value of the speed next to it: two sensors of two shafts do not agree by a jump, or
-//! - if output and wheel speed, which the final drive ties, part.
+//! - if output and wheel speed, which the final drive ties, part, or
+//! - if it stays at zero while another speed shows for some time that the shaft turns fast, as where a sensor died at a standstill.
 //!
 //! A fault lasts until the readings are those of the shaft again, and for [`LONGEST_S`] at most: what lasts longer is how the log goes on,
 //! as where two recordings are joined. Only a zero stays a fault for as long as the other speeds contradict it. The accelerations are bounds
@@ -33,6 +34,10 @@ const TO_ANOTHER: (f64, f64) = (1000.0, 5.0);
 const PARTED: std::ops::Range<f64> = 0.6..1.6;
 /// Faster than any shaft of a car, rad/s: not taken as a speed at all.
 const MOST_RAD_S: f64 = 1500.0;
+/// How long another speed contradicts one that stands at zero before it is a fault, s, and by how many times the speed up to which a sensor may
+/// read zero \[chosen\]: the sensor of a shaft that begins to turn wakes up late.
+const STANDS_S: f64 = 0.3;
+const AWAKE: f64 = 3.0;
 /// Speed of an engine that runs, rad/s.
 const RUNS_RAD_S: f64 = 50.0;
 
@@ -55,6 +60,8 @@ pub struct SpeedFaults {
     faults: [Option<Fault>; WATCHED],
     /// Output over wheel speed when both were last believed; not a number before.
     output_over_wheel: f64,
+    /// Since when a speed stands at zero against the others, s.
+    stands_since_s: [Option<f64>; WATCHED],
 }
 
 /// A fault of a speed.
@@ -77,7 +84,12 @@ struct Believed {
 impl SpeedFaults {
     /// Before the first readings.
     pub fn new() -> Self {
-        Self { believed: [None; WATCHED], faults: [None; WATCHED], output_over_wheel: f64::NAN }
+        Self {
+            believed: [None; WATCHED],
+            faults: [None; WATCHED],
+            output_over_wheel: f64::NAN,
+            stands_since_s: [None; WATCHED],
+        }
     }
 
     /// Whether the next reading of a speed, in rad/s, is a fault; never of a role that is not watched.
@@ -91,8 +103,10 @@ impl SpeedFaults {
             // The clock began anew.
             *self = Self::new();
         }
+        let stands = self.stands(at, rad_s, time_s);
         let is_fault = self.believed[at].is_some_and(|before| match self.faults[at] {
-            None => self.begins(at, before, rad_s, time_s),
+            None => stands || self.begins(at, before, rad_s, time_s),
+            Some(_) if stands => true,
             Some(fault) => self.lasts(at, before, rad_s, (fault, time_s)),
         });
         if is_fault {
@@ -142,6 +156,23 @@ impl SpeedFaults {
         };
         let is_dead = || rad_s.abs() <= ZERO_RAD_S && fell && self.is_contradicted(at, before, time_s);
         (is_short && is_wrong()) || is_dead()
+    }
+
+    /// Whether a reading is zero, as those before it, while the others have shown for some time that the shaft turns.
+    fn stands(&mut self, at: usize, rad_s: f64, time_s: f64) -> bool {
+        let turns = |other: usize| {
+            let (_, least_rad_s) = SHAFTS[other];
+            self.turning(other, time_s).is_some_and(|speed| speed.abs() > AWAKE * least_rad_s)
+        };
+        let is_contradicted = match at {
+            ENGINE => turns(TURBINE),
+            TURBINE => turns(OUTPUT) && turns(ENGINE),
+            OUTPUT => turns(WHEEL),
+            _ => turns(OUTPUT),
+        };
+        let is_zero = rad_s.abs() <= ZERO_RAD_S && is_contradicted;
+        self.stands_since_s[at] = is_zero.then(|| self.stands_since_s[at].unwrap_or(time_s));
+        self.stands_since_s[at].is_some_and(|since_s| time_s - since_s >= STANDS_S)
     }
 
     /// A speed that was believed of late and is away from zero, rad/s.
@@ -258,6 +289,28 @@ mod tests {
                     let all = all.filter(|time_s| is_out(*time_s)).count();
                     assert_eq!(found[at].len(), all, "{at} {step_s} {length_s}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn a_sensor_that_is_dead_from_a_standstill_on_is_a_fault_once_the_car_drives() {
+        for at in 0..WATCHED {
+            for step_s in [0.01, 0.05] {
+                let found = faults(step_s, |time_s| {
+                    // From rest, after half a second of idling.
+                    let output = 40.0 * (time_s - 0.5).max(0.0);
+                    let mut speeds = [80.0_f64.max(1.7 * output), 1.6 * output, output, output / 3.5];
+                    speeds[at] = 0.0;
+                    speeds
+                });
+                let first_s = found[at].first().copied().unwrap_or(f64::INFINITY);
+                assert!(first_s < 3.0, "{at} {step_s}: {first_s}");
+                // And from then on without a gap.
+                #[expect(clippy::cast_precision_loss, reason = "small")]
+                let count = found[at].len() as f64;
+                assert!((count * step_s - (6.0 - first_s)).abs() < 2.0 * step_s, "{at} {step_s}: {count}");
+                assert!((0..WATCHED).all(|speed| speed == at || found[speed].is_empty()), "{at}: {found:?}");
             }
         }
     }

@@ -158,6 +158,23 @@ fn a_channel_that_ends_in_the_drive_does_not_refuse_the_log() {
 }
 
 #[test]
+fn a_speed_that_ends_before_the_first_shift_leaves_the_open_loop() {
+    let case = Case::gearbox();
+    let [gear, target] = ["gear", "target_gear"].map(|name| column(&case.log, name));
+    let begin = (1..gear.len()).find(|row| gear[*row] != target[*row] && gear[row - 1] == target[row - 1]).unwrap();
+    let before_s = numbers(&case.log, "time_s")[begin] - 0.5;
+    for speed in ["engine_speed", "turbine_speed", "output_speed"] {
+        for value in ["", "0"] {
+            let log = case.with(&format!("{speed}_rad_s"), [before_s, f64::INFINITY], value);
+            let (note, table, _) = case.estimate(&log, &[]);
+            assert_eq!(table.lines().count(), case.log.lines().count(), "{speed} `{value}`: {note}");
+            assert!(note.contains("came no more, or was refused, in "), "{speed} `{value}`: {note}");
+            assert!(!note.contains("units of both speeds") && !note.contains("lock-up"), "{speed} `{value}`: {note}");
+        }
+    }
+}
+
+#[test]
 fn the_choice_of_the_observer_looks_at_the_values_of_the_speeds() {
     let case = Case::one_shift();
     let map = case.folder.write("map.toml", case.map(""));

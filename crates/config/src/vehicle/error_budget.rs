@@ -173,6 +173,13 @@ impl ElementErrors {
         half_width(self.valve_lag_factor)
     }
 
+    /// What an error of the reading of the command does to the pressure of the valve at this pressure, Pa.
+    pub fn by_command_pa(&self, valve: &ClutchValve<f64>, pressure_pa: f64) -> f64 {
+        let at = valve.command_for(pressure_pa);
+        let off_pa = |command: f64| (valve.settled_pressure(command) - valve.settled_pressure(at)).abs();
+        off_pa(at + self.command).max(off_pa((at - self.command).max(0.0)))
+    }
+
     /// Half of the range of its delay, s.
     pub fn valve_delay(&self) -> f64 {
         half_width(self.valve_delay_s)

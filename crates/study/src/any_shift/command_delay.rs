@@ -49,7 +49,8 @@ const LAG_S: f64 = 0.04;
 /// Share of the difference that the delay leaves at most \[chosen\].
 const LEFT: f64 = 0.9;
 
-/// Errors of the gain of the valves, over its bound, and offsets of the pressures, over the bound of the hysteresis, that are tried \[chosen\].
+/// Errors of the gain of the valves, over its bound, and offsets of the pressures, over the bound of the hysteresis or half of what the error of the
+/// commands does, whichever is larger, that are tried \[chosen\].
 const GAINS: [f64; 5] = [-2.5, -1.3, 0.0, 1.5, 3.0];
 const OFFSETS: [f64; 3] = [-4.0, 0.0, 4.0];
 /// Lowest gain that is tried.
@@ -113,10 +114,15 @@ pub(super) struct CommandDelay<'c> {
 impl<'c> CommandDelay<'c> {
     pub(super) fn new(tables: &'c ShiftTables<f64>, budget: &ErrorBudget) -> Self {
         let gain = budget.widest(ElementErrors::valve_gain);
-        let hysteresis_pa = budget.widest(|element| element.valve_hysteresis_pa);
+        let offsets = budget.elements.iter().enumerate().filter_map(|(at, errors)| {
+            let (errors, element) = (errors.as_ref()?, tables.tables().elements.get(tables.place(at)?)?);
+            let by_command_pa = errors.by_command_pa(&element.valve.valve, element.clutch.kiss_pressure());
+            Some(errors.valve_hysteresis_pa.max(0.5 * by_command_pa))
+        });
+        let offset_pa = offsets.fold(0.0, f64::max);
         let pressures = std::array::from_fn(|at| {
             let (of_gain, of_offset) = (GAINS[at / OFFSETS.len()], OFFSETS[at % OFFSETS.len()]);
-            ((1.0 + of_gain * gain).max(GAIN_MIN), of_offset * hysteresis_pa)
+            ((1.0 + of_gain * gain).max(GAIN_MIN), of_offset * offset_pa)
         });
         let more_delay_s = (budget.widest(ElementErrors::valve_delay) - DEFAULT_DELAY_S).max(0.0);
         let more_lag_s = LAG_S * (budget.widest(ElementErrors::valve_lag) - DEFAULT_LAG).max(0.0);

@@ -47,11 +47,7 @@ impl<'c> CommandCheck<'c> {
             let (Some(errors), Some(limits_pa)) = (budget.element(element), limits_pa.get_mut(place)) else { continue };
             let of_tables = &tables.tables().elements[place];
             let kiss_pa = of_tables.clutch.kiss_pressure();
-            let valve = &of_tables.valve.valve;
-            let kiss_command = valve.command_for(kiss_pa);
-            // What an error of the reading of the command does to the pressure.
-            let off_pa = |command: f64| (valve.settled_pressure(command) - valve.settled_pressure(kiss_command)).abs();
-            let by_command_pa = off_pa(kiss_command + errors.command).max(off_pa(kiss_command - errors.command));
+            let by_command_pa = errors.by_command_pa(&of_tables.valve.valve, kiss_pa);
             let ([weakest, strongest], hysteresis_pa) = (errors.valve_gain_factor, errors.valve_hysteresis_pa);
             *limits_pa = [
                 (kiss_pa - hysteresis_pa) / strongest - by_command_pa,

@@ -31,8 +31,9 @@ pub(super) struct InGear<'c> {
     car: &'c Car,
     /// All, and those whose speeds do not fit the ratio of the gear.
     rows: [u64; 2],
-    /// Rows with each health while the car moves, in the order of [`Health::ALL`].
+    /// Rows with each health while the car moves, in the order of [`Health::ALL`], and those in which engine, turbine or output speed have ended.
     health: [u64; Health::ALL.len()],
+    ended: u64,
     swapped: SwappedSpeeds,
     scale: RatioScale,
     /// Output over wheel speed in the rows that have both; how many there are, and how long they are, s.
@@ -50,6 +51,8 @@ pub(super) struct InGearRow {
     pub(super) dt_s: f64,
     /// Newest speeds of engine, turbine and output as they came, rad/s.
     pub(super) came_rad_s: [f64; 3],
+    /// Whether one of these came before, and comes no more.
+    pub(super) has_ended: bool,
     /// Output and wheel speed of this row.
     pub(super) output: Option<Reading<f64>>,
     pub(super) wheel: Option<Reading<f64>>,
@@ -63,6 +66,7 @@ impl<'c> InGear<'c> {
             car,
             rows: [0; 2],
             health: [0; Health::ALL.len()],
+            ended: 0,
             swapped: SwappedSpeeds::default(),
             scale: RatioScale::new(car),
             output_over_wheel: RatioHistogram::default(),
@@ -90,6 +94,7 @@ impl<'c> InGear<'c> {
             matches!(row.health, Health::TooSlow | Health::ClutchOpen) && turbine / ratio <= RATIO_FROM_RAD_S;
         if (is_at_speed || output > MOVES_RAD_S && turbine > RATIO_FROM_RAD_S) && !is_rightly_slow {
             self.health[row.health as usize] += 1;
+            self.ended += u64::from(row.has_ended);
         }
         if !is_at_speed {
             return;
@@ -121,7 +126,13 @@ impl<'c> InGear<'c> {
         let rows = self.health.iter().sum();
         let is_used = Health::ALL.iter().any(|health| is_usable(*health) && of(health) > 0);
         let health = Health::ALL.into_iter().max_by_key(of)?;
-        (!is_used && rows >= ENOUGH_ROWS).then_some(Unusable { rows, health })
+        let has_ended = 2 * self.ended > rows;
+        (!is_used && !has_ended && rows >= ENOUGH_ROWS).then_some(Unusable { rows, health })
+    }
+
+    /// Rows while the car moves in which engine, turbine or output speed have ended.
+    pub(super) fn ended(&self) -> u64 {
+        self.ended
     }
 
     /// Output over wheel speed in the middle; not a number where too few rows have both.

@@ -205,6 +205,7 @@ impl<'c> LoggedDrive<'c> {
                     dt_s: input.dt_s,
                     time_s: step.time_s,
                     came_rad_s,
+                    has_ended: self.has_ended(&came_rad_s),
                     output: input.output_rad_s,
                     wheel: input.wheel_rad_s,
                     health: estimate.health,
@@ -247,6 +248,11 @@ impl<'c> LoggedDrive<'c> {
     /// speed it is rightly the open loop.
     pub fn unusable(&self) -> Option<Unusable> {
         self.in_gear.unusable().filter(|_| !self.is_open_loop())
+    }
+
+    /// Whether a speed of the engine, turbine or output came before, and comes no more.
+    fn has_ended(&self, came_rad_s: &[f64; 3]) -> bool {
+        self.came.iter().zip(came_rad_s).any(|(came, now)| came.has_come() && now.is_nan())
     }
 
     /// Whether the engine speed, which the filter needs in front of a converter, has never come.
@@ -355,6 +361,13 @@ impl<'c> LoggedDrive<'c> {
         self.end(f64::NAN, usize::MAX);
         let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));
         let mut warnings: Vec<String> = swapped.into_iter().chain(self.commands.warnings()).collect();
+        let ended = self.in_gear.ended();
+        if ended > 0 {
+            warnings.push(format!(
+                "warning: engine, turbine or output speed came no more, or was refused, in {ended} rows in a gear with the car moving: pressures and torques \
+                 there are those of the valve models alone (open loop)"
+            ));
+        }
         if self.is_open_loop() {
             warnings.push(
                 "warning: there is no engine speed, which gives the turbine torque: pressures and torques are those of the valve models alone (open loop)"

@@ -88,10 +88,22 @@ impl<'a> CarSource<'a> {
         let own;
         let map = if map.channels.is_empty() {
             own = own_map(&log, car).map_err(|missing| {
+                if log.lacks_dbc() {
+                    return Failure::Input(format!(
+                        "{}: there are frames of a CAN bus, whose signals are not read\n\
+                         hint: a DBC defines the signals in them: give it with --dbc, and a channel map with --map",
+                        path.shown()
+                    ));
+                }
+                let gear = if missing.contains(&"gear") && log.channels().iter().any(|channel| channel.name == "gear") {
+                    "; text that is no number is not read from this format: write `gear` and `target_gear` as numbers, 0 for none and -1 for reverse"
+                } else {
+                    ""
+                };
                 Failure::Input(format!(
                     "{}: this log needs a channel map, because its channels have other names than those of `wetclutch simulate`: none with \
                      numbers is `{}`\n\
-                     hint: `wetclutch inspect` names the channels that hold none; with --suggest it writes a first map, for --map",
+                     hint: `wetclutch inspect` names the channels that hold none; with --suggest it writes a first map, for --map{gear}",
                     path.shown(),
                     missing.join("` or `")
                 ))
