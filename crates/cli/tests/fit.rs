@@ -1,6 +1,6 @@
 //! `fit`: from logs of shifts to a vehicle file, and to estimates with it.
 
-#[path = "../../../fit/tests/common/mod.rs"]
+#[path = "../../fit/tests/common/mod.rs"]
 pub(crate) mod common;
 
 use common::{Logs, TestCar};

@@ -215,7 +215,7 @@ fn a_valve_with_a_current_of_zero_pressure_is_normally_high() {
     assert!(weak.contains("line pressure needs 1.000 A"), "{weak}");
     let pulse = "[valve]\nkind = \"pulse-width\"\nflow_sqrt_pa_s = 2e4\nline_pressure_pa = 1.6e6\nzero_pressure_a = 1\n\
                  delay = { duty_percent = [0.0, 100.0], delay_s = [0.01, 0.01] }\n";
-    assert!(crate::car(pulse).unwrap_err().contains("another kind of valve"));
+    assert!(self::car(pulse).unwrap_err().contains("another kind of valve"));
     let single = include_str!("../../../vehicles/two_speed_at.toml")
         .replace("[clutch.b.valve]\n", "[clutch.b.valve]\nzero_pressure_a = 1.1\n");
     let error = config::Vehicle::from_source(Source::built_in("v.toml", &single)).unwrap_err().to_string();

@@ -1,7 +1,5 @@
 //! Gearbox files that are wrong: line, key, what is wrong and what to do.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{GearboxFile, Kind, Source};
 use geartrain::Change;
 

@@ -3,8 +3,6 @@
 //! Ratios are printed by the makers; holding torques, transitions, masses and capacities stand in the project's notes on
 //! gear trains, from where they are copied. None of these numbers comes from this program.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{GearboxFile, Source};
 use geartrain::{Change, Gearbox};
 

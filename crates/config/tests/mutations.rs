@@ -1,10 +1,6 @@
 //! Files with one thing wrong in them: each is refused with its reason or accepted, and none stops the program.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{EXPERIMENT, FILL, STROKE, STUDY, VEHICLE, mutations};
+use crate::common::{EXPERIMENT, FILL, STROKE, STUDY, VEHICLE, mutations};
 use config::{Car, ConfigError, Drive, Experiment, GearboxFile, Sensors, Source, Study, Vehicle};
 
 /// Every error but those of reading names a line of the file.

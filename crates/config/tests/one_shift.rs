@@ -1,7 +1,5 @@
 //! The vehicle of one shift of a car with a gearbox.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{Car, Source, Vehicle};
 use drivetrain::Valve;
 

@@ -1,7 +1,5 @@
 //! Error budgets with no entry and with one: none may panic a design.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{ErrorBounds, GainMethod, Vehicle};
 use design::{
     Model, Quantity, design_discrete_phase, extended_filter, kalman_filter, super_twisting, unscented_filter,

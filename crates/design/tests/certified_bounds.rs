@@ -1,13 +1,9 @@
 //! Certificates of the rigid observer in simulation.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
 use std::sync::Mutex;
 
-use common::sampled::{Disturbance, SampledCar, disturbance};
-use common::{Car, DISCRETISATION_PA, DT_S};
+use crate::common::sampled::{Disturbance, SampledCar, disturbance};
+use crate::common::{Car, DISCRETISATION_PA, DT_S};
 use config::{GainMethod, Vehicle};
 use design::{DiscreteDesign, Model, design_discrete, design_rigid};
 use observer::Phase;

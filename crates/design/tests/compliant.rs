@@ -1,8 +1,6 @@
 //! The compliant observer on a car that obeys its model.
 
-mod common;
-
-use common::{DT_S, ENGINE_RAD_S, input};
+use crate::common::{DT_S, ENGINE_RAD_S, input};
 use config::Vehicle;
 use design::{compliant_observer, design_compliant};
 use observer::{Health, Phase, Sample, SampleEstimator};

@@ -1,7 +1,5 @@
 //! Designs against the chapter's numbers, the closed form, and random polytopes.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{Experiment, GivenGains, ValveUncertainty, Vehicle};
 use design::compliant::{CompliantRequirement, compliant_model, design_compliant_phase};
 use design::rigid::design_phase;

@@ -1,10 +1,6 @@
 //! What the observers with designed gains make of unusable input, gaps and changes of phase.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Car, DT_S, input, observer};
+use crate::common::{Car, DT_S, input, observer};
 use config::{GainMethod, Vehicle};
 use design::{
     Model, compliant_observer, design_compliant, design_discrete, inversion, kalman_filter, rigid_observer,

@@ -1,7 +1,5 @@
 //! No input, in either precision and with any car, makes an observer panic, or say `good` of what cannot be.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use std::sync::OnceLock;
 
 use config::{GainMethod, Vehicle};

@@ -1,7 +1,5 @@
 //! The longest step over which the speeds may correct an estimate follows from the certificate of the car.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{Experiment, GainMethod, ObserverEntry, ObserverKind, SAMPLE_TIMES_S, Vehicle};
 use design::{
     Model, design_compliant, design_discrete, design_rigid, longest_stable_step_s, longest_step_of, rigid_model,

@@ -1,12 +1,8 @@
 //! Certificates for the shifts of gearboxes, in simulation: oncoming elements whose torque has the sign of the turbine's or the other one.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
 use std::sync::Mutex;
 
-use common::sampled::{Disturbance, SampledCar, disturbance};
+use crate::common::sampled::{Disturbance, SampledCar, disturbance};
 use config::{GainMethod, Vehicle};
 use design::{DiscreteDesign, Model, Quantity, design_discrete, design_discrete_phase};
 use drivetrain::Valve;

@@ -1,10 +1,6 @@
 //! Single precision beside double precision.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Car, input, observer};
+use crate::common::{Car, input, observer};
 use config::{GainMethod, Vehicle};
 use design::{
     Model, compliant_observer, design_compliant, design_discrete, inversion, kalman_filter, rigid_observer,

@@ -1,8 +1,6 @@
 //! The rigid observer of a car with pulse-width valves.
 
-mod common;
-
-use common::input;
+use crate::common::input;
 use config::{ValveUncertainty, Vehicle};
 use design::{design_rigid, rigid_observer};
 use drivetrain::{PulseWidth, Valve};

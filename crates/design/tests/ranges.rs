@@ -1,7 +1,5 @@
 //! The ranges of a vehicle: once for all observers, around estimates, and through the fill of a clutch.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{Source, Vehicle};
 use design::{bounded, design_rigid, inversion, kalman_filter, range, rigid_observer};
 use observer::{Bounds, ChannelHealth, Channels, Estimate, Estimator, Health, Input, Phase, Reading};

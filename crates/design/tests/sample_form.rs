@@ -1,8 +1,6 @@
 //! What the observers do to an error over one sample.
 
-mod common;
-
-use common::{ENGINE_RAD_S, input, observer, over_a_sample};
+use crate::common::{ENGINE_RAD_S, input, observer, over_a_sample};
 use config::Vehicle;
 use design::{compliant_observer, design_compliant};
 use observer::{Discretisation, Phase, Sample, SampleEstimator};

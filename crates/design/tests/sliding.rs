@@ -1,8 +1,6 @@
 //! The sliding-mode observer on a car that obeys its model.
 
-mod common;
-
-use common::{Car, DT_S, ENGINE_RAD_S, input};
+use crate::common::{Car, DT_S, ENGINE_RAD_S, input};
 use config::Vehicle;
 use design::{design_sliding, sliding_observer};
 use observer::{Phase, SampleEstimator};

@@ -1,8 +1,6 @@
 //! Gains with backward slip.
 
-mod common;
-
-use common::{Car, observer};
+use crate::common::{Car, observer};
 use config::{GainMethod, Vehicle};
 use design::{Model, compliant_observer, design_compliant, design_discrete, rigid_observer};
 use observer::Phase;

@@ -1,9 +1,5 @@
 //! Logs that a fit should not have to see: it says what is wrong, or its result stays one that can be used.
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Logs, TestCar};
+use crate::common::{Logs, TestCar};
 use fit::{Collected, Driving, Fit, FitError, HeldOut, Map, Parameter, Series, ShiftRecord, Verdict};
 
 fn shifts(car: &mut TestCar, count: u64, logs: Logs) -> Vec<ShiftRecord> {

@@ -1,8 +1,6 @@
 //! The backlash of a driveline from drives in which the accelerator is pressed and released.
 
-mod common;
-
-use common::{Logs, TestCar, column, fitted};
+use crate::common::{Logs, TestCar, column, fitted};
 use fit::{BacklashFit, ShiftRecord, Verdict};
 use trace::{Trace, signal};
 

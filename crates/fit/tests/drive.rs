@@ -1,7 +1,5 @@
 //! Converter and torques at the turbine from a drive whose converter is known.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use fit::Verdict;
 use fit::drive::{ConverterFit, DriveRecord, Moment, fit_converter};
 use logs::{Direction, Load, Reading, Role, Shift, ShiftQuality};

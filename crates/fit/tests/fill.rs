@@ -1,9 +1,5 @@
 //! The fill volume of a clutch whose piston has a stroke, and logs with which it is not told.
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Logs, TestCar, fitted};
+use crate::common::{Logs, TestCar, fitted};
 use config::{Source, Vehicle};
 use fit::{Parameter, Series, ShiftRecord, Verdict};
 

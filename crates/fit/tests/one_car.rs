@@ -1,9 +1,5 @@
 //! One car of the many of `draws.rs`, with few shifts: what CI has time for.
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Logs, TestCar, TestShift};
+use crate::common::{Logs, TestCar, TestShift};
 use fit::{Fit, Parameter, Series, Verdict};
 
 /// A car fitted to shifts, and the error of its torque on other shifts over that with the given file.

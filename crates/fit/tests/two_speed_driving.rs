@@ -1,9 +1,5 @@
 //! Driving between the shifts of a car whose file has one shift.
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Logs, TestCar, column, fitted};
+use crate::common::{Logs, TestCar, column, fitted};
 use fit::{Driving, Fit, Parameter, Verdict};
 use trace::{Column, Trace, Values, signal};
 

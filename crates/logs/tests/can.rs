@@ -1,10 +1,6 @@
 //! Frames of a bus that a test writes.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Folder, channel, data, read, with_dbc};
+use crate::common::{Folder, channel, data, read, with_dbc};
 use logs::{OpenOptions, Quality};
 
 /// Values of the signals of a log with one message, by name.
@@ -64,7 +60,8 @@ fn a_last_frame_without_the_end_of_its_line_is_left_out() {
             assert_eq!(read(cut), (3, vec!["the last line has no end and is left out".to_owned()]), "{name} {cut}");
         }
         let one = &text[..text.find("00\n").unwrap() + 2];
-        let error = common::read(&folder.write("bus.log", one), &with_dbc()).map(|_| ()).unwrap_err().to_string();
+        let error =
+            crate::common::read(&folder.write("bus.log", one), &with_dbc()).map(|_| ()).unwrap_err().to_string();
         assert!(error.ends_with("the only data frame stands in a last line without an end"), "{name}: {error}");
     }
 }

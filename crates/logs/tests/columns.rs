@@ -1,10 +1,6 @@
 //! A log in columns has the samples that it has in time order.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Folder, channel, data, read, with_dbc};
+use crate::common::{Folder, channel, data, read, with_dbc};
 use falcon_mdf::Mf4Writer;
 use logs::{Block, Log, OpenOptions, Quality};
 

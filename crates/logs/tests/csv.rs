@@ -1,13 +1,9 @@
 //! Tables whose numbers or names can be taken for something else.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{Folder, channel, read};
+use crate::common::{Folder, channel, read};
 use logs::{OpenOptions, Quality, TimeColumn};
 
 /// The values of a channel of a table, and what was said; the error where it cannot be read.

@@ -1,11 +1,7 @@
 //! Files that asammdf, python-can, cantools and pyarrow wrote. What must be in them follows from the formulas of
 //! `tests/data/make.py`, which are stated again here.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{Folder, channel, data, read, with_dbc};
+use crate::common::{Folder, channel, data, read, with_dbc};
 use logs::{Log, LogError, OpenOptions, Quality};
 
 const ROWS: u32 = 40;

@@ -1,11 +1,9 @@
 //! Broken files of every format: cut, with flipped bytes, with absurd lengths. Each gives an error or a readable part with a
 //! note; none a panic, a hang or a large allocation.
 
-mod common;
-
 use std::time::{Duration, Instant};
 
-use common::{Folder, data, read_on, with_dbc};
+use crate::common::{Folder, data, read_on, with_dbc};
 use logs::OpenOptions;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -80,7 +78,7 @@ fn attempt(folder: &Folder, name: &str, bytes: &[u8]) -> (usize, String) {
 #[test]
 fn broken_files_give_errors_or_what_can_be_read() {
     let folder = Folder::new("hostile");
-    // More of them where there is time: `WETCLUTCH_FLIPS=20000 WETCLUTCH_ONLY=parquet cargo test -p logs --test hostile`.
+    // More of them where there is time: `WETCLUTCH_FLIPS=20000 WETCLUTCH_ONLY=parquet cargo test -p logs --test tests hostile`.
     let flips = std::env::var("WETCLUTCH_FLIPS").ok().and_then(|flips| flips.parse().ok()).unwrap_or(100);
     let only = std::env::var("WETCLUTCH_ONLY").unwrap_or_default();
     for name in FILES.into_iter().filter(|name| name.contains(&only)) {

@@ -1,17 +1,13 @@
 //! MDF files that a test writes: every compression, and blocks that end anywhere.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use common::mdf::{HEAD, append, block, number, places, set};
-use common::{Folder, channel, data, read};
+use crate::common::mdf::{HEAD, append, block, number, places, set};
+use crate::common::{Folder, channel, data, read};
 use falcon_mdf::Mf4Writer;
 use falcon_mdf::write::WriteCodec;
 use logs::{Log, OpenOptions, Quality, Sample};

@@ -1,11 +1,7 @@
 //! MDF channels whose conversions make text of some numbers, or cannot be read.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::mdf::{HEAD, append, block, places, set};
-use common::{Folder, channel, read};
+use crate::common::mdf::{HEAD, append, block, places, set};
+use crate::common::{Folder, channel, read};
 use falcon_mdf::write::WriteCodec;
 use falcon_mdf::{Mf4Writer, SignalValues};
 use logs::{OpenOptions, Quality, TimeColumn};

@@ -1,12 +1,8 @@
 //! Readings and steps: the rules for what cannot be a reading, the map, and the input of an observer.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
 use std::fmt::Write as _;
 
-use common::{Folder, data, read, with_dbc};
+use crate::common::{Folder, data, read, with_dbc};
 use logs::{ChannelMap, Log, LogError, OpenOptions, Quality, Reading, Readings, Role, RoleSummary, Steps};
 
 /// A map of `ROLE=NAME` entries.
@@ -368,7 +364,7 @@ fn a_saturated_signal_of_a_bus_is_not_a_reading() {
     let folder = Folder::new("saturated");
     let path = folder.write("bus.log", "(1.0) can0 100#FFFF000000000000\n(1.1) can0 100#800C000000000000\n");
     let (log, samples, _) = read(&path, &with_dbc()).unwrap();
-    let found = common::channel(&log, &samples, "N_Eng");
+    let found = crate::common::channel(&log, &samples, "N_Eng");
     assert_eq!((found[0].2, found[1].2, found[1].1), (Quality::Saturated, Quality::Good, 800.0));
 }
 

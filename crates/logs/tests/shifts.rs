@@ -1,9 +1,5 @@
 //! The shift finder on drives whose shifts are known by construction, and on a public drive where it lies beside the project.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
 use std::f64::consts::PI;
 use std::io::Write as _;
 use std::path::Path;

@@ -4,8 +4,6 @@
 //! T_cb dw = w' M a`. With both clutches slipping that holds along both motions; a clutch that sticks leaves one, along
 //! which it does nothing.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use drivetrain::{Clutch, Converter, Driveline, ReducedShift, RoadLoad, Table1, Valve};
 use observer::{CompliantModel, Phase, RigidModel};
 

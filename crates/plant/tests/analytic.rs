@@ -1,10 +1,6 @@
 //! The plant against solutions known in closed form.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{bare_gear_train, e1, samples, smooth_vehicle, vehicle};
+use crate::common::{bare_gear_train, e1, samples, smooth_vehicle, vehicle};
 use drivetrain::Engagement;
 use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::{Contact, Direction, HybridIntegrator, Inputs, Mode, Powertrain, State};

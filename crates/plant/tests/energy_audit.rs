@@ -1,10 +1,6 @@
 //! What the engine gives is stored or dissipated, and the audit notices a missing term.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{e1, each_step, vehicle};
+use crate::common::{e1, each_step, vehicle};
 use config::Experiment;
 use plant::{PowerBalance, Powertrain, stored_energy};
 

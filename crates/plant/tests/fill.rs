@@ -1,10 +1,6 @@
 //! Clutches whose pistons have a stroke: fill, plateau on release, oil balance; hysteresis, backlash and drag.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{e1, smooth_vehicle, vehicle};
+use crate::common::{e1, smooth_vehicle, vehicle};
 use config::{Experiment, OffNominal, Source, Vehicle};
 use drivetrain::Cylinder;
 use plant::hybrid::RELATIVE_TOLERANCE;

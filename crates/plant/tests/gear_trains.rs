@@ -1,7 +1,5 @@
 //! The gear trains of published gearboxes in motion.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{GearboxFile, Source};
 use drivetrain::{Engagement, ShiftTorques};
 use geartrain::{Change, ElementKind, Gearbox};

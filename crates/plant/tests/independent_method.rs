@@ -1,10 +1,6 @@
 //! The smooth phases against another integrator: Dormand-Prince 8(5,3) of a library, at a tight tolerance.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{e1, samples, vehicle};
+use crate::common::{e1, samples, vehicle};
 use differential_equations::prelude::*;
 use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::state::STATES;

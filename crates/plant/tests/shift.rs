@@ -1,10 +1,6 @@
 //! The simulated launch and shift as a whole.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
-
-use common::{e1, each_step, samples, vehicle};
+use crate::common::{e1, each_step, samples, vehicle};
 use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::{Contact, Mode, Powertrain, Sample, Simulation};
 

@@ -1,7 +1,5 @@
 //! Plans, sensitivity, model errors and worst cases on real studies.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,7 +1,5 @@
 //! The default observer on cars of all sizes, as short vehicle files describe them.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use std::path::Path;
 
 use config::Study;

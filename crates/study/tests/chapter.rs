@@ -1,7 +1,5 @@
 //! The source chapter's experiments as a whole.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use std::sync::LazyLock;
 
 use config::{Experiment, Study, Vehicle};

@@ -1,7 +1,5 @@
 //! The drive of the demo: what the report claims about it, and a replay from measured signals alone.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{Experiment, Vehicle};
 use design::rigid_observer;
 use observer::{Estimate, Estimator, Phase};

@@ -1,7 +1,5 @@
 //! The Kalman filter on readings as the field gives them: wrong, late, lost, in single precision, from any moment on.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use std::path::Path;
 
 use config::{Experiment, Study, Vehicle};

@@ -1,7 +1,5 @@
 //! The files that ship, and files that are wrong.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 mod all_errors;
 mod cylinders;
 mod experiments;

@@ -6,7 +6,7 @@ use fit::{Known, ReadingAges, Verdict};
 use observer::Reading;
 use observer::any_shift::{GearCommand, ShiftInput};
 
-use crate::drawn::{Case, Drawn, car, city, hilly, with_tip_ins};
+use super::drawn::{Case, Drawn, car, city, hilly, with_tip_ins};
 
 fn drawn(seed: u64) -> Drawn {
     Drawn::of(car("eight_speed.toml"), seed, Case::Usual).with_channels()

@@ -5,7 +5,7 @@ use design::{ErrorBudget, any_shift_filter};
 use plant::car::CarModel;
 use study::any_shift::drive::{DriveScorer, ScoredDrive};
 
-use crate::drawn::{Drawn, sensors, tables};
+use super::drawn::{Drawn, sensors, tables};
 
 /// Largest drag of an open element in the drawn cars, N m; the ranges leave it out.
 const DRAG_N_M: f64 = 1.7;

@@ -1,6 +1,4 @@
 //! Fits of cars with a whole gearbox to drives behind sensors.
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 mod channels;
 mod drawn;
 mod driving;
@@ -274,7 +272,7 @@ fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     assert_eq!([half.valve_delay_s, half.pressure_pa], [0.5 * usual.valve_delay_s, 0.5 * usual.pressure_pa]);
     assert_eq!((half.slow_part, half.inertia_share), (usual.slow_part, usual.inertia_share));
     assert_eq!(shift_uncertainty(&ErrorBudget::of_car(&trusted)), usual);
-    assert_eq!(crate::tables(&trusted), tables[1]);
+    assert_eq!(drawn::tables(&trusted), tables[1]);
 }
 
 #[test]

@@ -6,8 +6,8 @@ use fit::{ReadingAges, Series};
 use observer::Reading;
 use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
 
-use crate::drawn::{self, Case, Drawn, Truth, car, city, every_fifth, hilly};
-use crate::{fitted, rows};
+use super::drawn::{self, Case, Drawn, Truth, car, city, every_fifth, hilly};
+use super::{fitted, rows};
 
 /// The quantities of the elements that lie outside of their intervals, with errors in deviations.
 fn outside(drawn: &Drawn, fit: &GearboxFit, is_asked: impl Fn(&Quantity) -> bool) -> Vec<(Quantity, f64)> {

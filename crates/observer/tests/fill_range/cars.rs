@@ -4,8 +4,8 @@ use drivetrain::cylinder::PASSAGE;
 use drivetrain::{ClutchValve, Passage, Table1, ValveMaps};
 use observer::{Budget, FillBudget};
 
-use crate::shifts::STEP_S;
-use crate::{Random, Sampling};
+use super::shifts::STEP_S;
+use super::{Random, Sampling};
 
 /// A car within its budget.
 #[derive(Debug, Clone, Copy)]

@@ -2,9 +2,9 @@
 
 use drivetrain::Passage;
 
-use crate::Random;
-use crate::cars::{Car, LINE_PA};
-use crate::shifts::{Log, STEP_S, Start};
+use super::Random;
+use super::cars::{Car, LINE_PA};
+use super::shifts::{Log, STEP_S, Start};
 
 /// A cylinder behind its valve.
 pub(crate) trait Cylinder {

@@ -2,8 +2,6 @@
 //! parameters and commands, by two plants of different structure. No sample may be outside; each deliberate defect of
 //! the budget must be found.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 mod cars;
 mod cylinders;
 mod shifts;

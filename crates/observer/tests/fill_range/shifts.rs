@@ -1,7 +1,7 @@
 //! Random commands of a controller, and the log of them.
 
-use crate::cars::Car;
-use crate::{Random, Sampling};
+use super::cars::Car;
+use super::{Random, Sampling};
 
 /// A small step of the plants, s. It is below the time constant of the cylinder, so that Euler's steps do not overshoot.
 pub(crate) const STEP_S: f64 = 0.25e-3;

@@ -17,7 +17,7 @@ fn samples(car: &Car, drive: &Drive) -> Result<Vec<CarSample>, CarError> {
 #[test]
 fn an_hour_in_town_uses_the_gears_and_shifts_more_than_200_times() {
     let drive = drive(include_str!("../../../../drives/city.toml"));
-    for car in crate::runs(crate::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)) {
+    for car in super::runs(super::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)) {
         let model = CarModel::new(car.clone()).unwrap();
         let (mut count, mut used) = (0, vec![false; car.gearbox.gears.len()]);
         let begin = std::time::Instant::now();
@@ -38,14 +38,14 @@ fn an_hour_in_town_uses_the_gears_and_shifts_more_than_200_times() {
 
 #[test]
 fn the_same_drive_gives_the_same_samples() {
-    let car = crate::cars().swap_remove(0);
+    let car = super::cars().swap_remove(0);
     let drive = drive("name = \"d\"\n[[segment]]\nduration_s = 20\nthrottle = [0.0, 0.5]\n");
     assert_eq!(samples(&car, &drive).unwrap(), samples(&car, &drive).unwrap());
 }
 
 #[test]
 fn listed_shifts_are_made_at_their_times() {
-    let car = crate::cars().swap_remove(0);
+    let car = super::cars().swap_remove(0);
     let text = "name = \"d\"\nstart = { gear = \"2\", vehicle_m_s = 8.0 }\n\
                 shift = [{ time_s = 2.0, gear = \"3\" }, { time_s = 5.0, gear = \"2\" }]\n\
                 [[segment]]\nduration_s = 8\nthrottle = 0.15\n";
@@ -61,7 +61,7 @@ fn listed_shifts_are_made_at_their_times() {
 
 #[test]
 fn a_car_that_is_braked_on_a_hill_stands() {
-    let car = crate::cars().swap_remove(0);
+    let car = super::cars().swap_remove(0);
     let last = |brake: f64| {
         let text =
             format!("name = \"d\"\n[[segment]]\nduration_s = 30\nthrottle = 0.0\nbrake = {brake}\ngrade_rad = 0.3\n");
@@ -76,7 +76,7 @@ fn a_car_that_is_braked_on_a_hill_stands() {
 
 #[test]
 fn a_dual_clutch_launches_shifts_up_comes_to_rest_and_launches_again() {
-    let car = crate::dual_clutch();
+    let car = super::dual_clutch();
     let text = "name = \"d\"\nrepetitions = 2\n[[segment]]\nduration_s = 1\nthrottle = 0.0\nbrake = 0.15\n\
                 [[segment]]\nduration_s = 1\nthrottle = 0.0\nbrake = [0.15, 0.0]\n\
                 [[segment]]\nduration_s = 1\nthrottle = [0.0, 0.1]\n\
@@ -111,7 +111,7 @@ fn a_launch_clutch_with_a_stroke_is_filled() {
         let carries = driven.iter().find(|sample| sample.time_s > 2.0 && sample.vehicle_m_s > 0.1).unwrap();
         (carries.time_s - 2.0, jerk.fold(0.0, f64::max), driven.last().unwrap().vehicle_m_s)
     };
-    let (without, with) = (launch(&crate::dual_clutch()), launch(&crate::with_stroke(crate::dual_clutch())));
+    let (without, with) = (launch(&super::dual_clutch()), launch(&super::with_stroke(super::dual_clutch())));
     println!(
         "launch: moves after {:.2} s, with stroke {:.2} s; jerk {:.0}, {:.0} m/s^3",
         without.0, with.0, without.1, with.1
@@ -122,7 +122,7 @@ fn a_launch_clutch_with_a_stroke_is_filled() {
 
 #[test]
 fn a_dual_clutch_creeps_without_throttle_and_stands_with_the_brake() {
-    let car = crate::dual_clutch();
+    let car = super::dual_clutch();
     let text = "name = \"d\"\n[[segment]]\nduration_s = 15\nthrottle = 0.0\n\
                 [[segment]]\nduration_s = 5\nthrottle = 0.0\nbrake = 0.1\n";
     let creeping = samples(&car, &drive(text)).unwrap();
@@ -134,7 +134,7 @@ fn a_dual_clutch_creeps_without_throttle_and_stands_with_the_brake() {
 
 #[test]
 fn in_reverse_the_car_goes_backwards() {
-    let car = crate::cars().swap_remove(0);
+    let car = super::cars().swap_remove(0);
     let text = "name = \"d\"\nstart = { gear = \"R\" }\n[[segment]]\nduration_s = 5\nthrottle = 0.08\n";
     let samples = samples(&car, &drive(text)).unwrap();
     let last = samples.last().unwrap();
@@ -215,7 +215,7 @@ fn a_lock_up_clutch_with_slip_control_keeps_its_slip() {
 
 #[test]
 fn wrong_requests_get_clear_errors() {
-    let car = crate::cars().swap_remove(0);
+    let car = super::cars().swap_remove(0);
     let error = |head: &str| {
         let text = format!("name = \"d\"\n{head}\n[[segment]]\nduration_s = 3\nthrottle = 0.2\n");
         samples(&car, &drive(&text)).unwrap_err().to_string()
@@ -232,7 +232,7 @@ fn wrong_requests_get_clear_errors() {
     let driver = Driver { throttle: 0.1, brake: 0.0, grade_rad: 0.0 };
     let calibration = CarCalibration::STANDARD;
     assert!(plant::car::CarRun::new(&model, &car, calibration, 1, state, (driver, 0.0)).is_err());
-    let other = crate::two_speed();
+    let other = super::two_speed();
     let error = plant::car::CarRun::new(&model, &other, calibration, 1, state, (driver, 0.01)).unwrap_err();
     assert!(error.to_string().contains("another gearbox"), "{error}");
     let mut empty = drive("name = \"d\"\n[[segment]]\nduration_s = 3\nthrottle = 0.2\n");
@@ -250,7 +250,7 @@ fn a_driver_follows_the_published_cycles() {
     for (name, duration_s, distance_m) in [("wltc_3b", 1800.0, 23_266.0), ("ftp_75", 1874.0, 17_769.0)] {
         let drive = Drive::read(format!("{folder}{name}.toml").as_ref()).unwrap();
         assert_eq!(drive.duration_s(), duration_s);
-        for car in crate::runs(crate::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)) {
+        for car in super::runs(super::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)) {
             let model = CarModel::new(car.clone()).unwrap();
             let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |_| {}).unwrap();
             let error = summary.speed_error.unwrap();

@@ -2,7 +2,7 @@
 
 use plant::car::{CarCalibration, CarModel, CarPowers, CarRun, CarShift, CarState, CarStep, Driver, stored_car_energy};
 
-use crate::{cars, neighbours, runs};
+use super::{cars, neighbours, runs};
 
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
@@ -65,7 +65,7 @@ fn audit(model: &CarModel, (from, to): (usize, usize), throttle: f64, tolerance:
 #[test]
 fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
     let mut worst = (0.0, String::new());
-    for car in cars().into_iter().chain(cars().into_iter().map(crate::with_stroke)) {
+    for car in cars().into_iter().chain(cars().into_iter().map(super::with_stroke)) {
         let model = CarModel::new(car).unwrap();
         for pair in runs(neighbours(&model.car)) {
             for throttle in [0.15, 0.0] {
@@ -84,7 +84,7 @@ fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
 /// It lets go, catches and overruns; the brake beside it takes its load and leaves it.
 #[test]
 fn power_is_accounted_for_in_shifts_of_a_one_way_clutch() {
-    let model = CarModel::new(crate::one_way()).unwrap();
+    let model = CarModel::new(super::one_way()).unwrap();
     let mut worst: f64 = 0.0;
     for names in [["1", "2"], ["2", "1"], ["3", "1"], ["1", "L"], ["L", "1"], ["2", "L"]] {
         let [from, to] = names.map(|name| model.car.gearbox.gear(name).unwrap());
@@ -99,7 +99,7 @@ fn power_is_accounted_for_in_shifts_of_a_one_way_clutch() {
 
 #[test]
 fn a_lock_up_clutch_that_closes_and_opens_loses_its_friction_only() {
-    let mut car = crate::cars().swap_remove(0);
+    let mut car = super::cars().swap_remove(0);
     car.lock_up = Some(config::LockUp {
         capacity_n_m: 300.0,
         first_gear: 3,
@@ -133,9 +133,9 @@ fn power_is_accounted_for_in_launches_garage_shifts_and_withdrawn_shifts() {
     };
     let driver = |throttle: f64, brake: f64| Driver { throttle, brake, grade_rad: 0.0 };
     for throttle in [0.0, 0.2, 0.5] {
-        run(crate::dual_clutch(), 0.0, driver(throttle, 0.0), &|_| {});
+        run(super::dual_clutch(), 0.0, driver(throttle, 0.0), &|_| {});
     }
-    for car in cars().into_iter().take(4).chain([crate::one_way()]) {
+    for car in cars().into_iter().take(4).chain([super::one_way()]) {
         let reverse = car.gearbox.gear("R").unwrap();
         run(car.clone(), 0.0, driver(0.0, 0.6), &|run| {
             if run.time_s() > 1.0 {
@@ -144,7 +144,7 @@ fn power_is_accounted_for_in_launches_garage_shifts_and_withdrawn_shifts() {
         });
         let forward = car.gearbox.forward_gears();
         let (first, second) = (forward[0], forward[1]);
-        run(crate::with_stroke(car), 6.0, driver(0.2, 0.0), &|run| {
+        run(super::with_stroke(car), 6.0, driver(0.2, 0.0), &|run| {
             let wanted = if run.time_s() > 1.0 && run.time_s() < 1.7 { second } else { first };
             run.request(wanted).unwrap();
         });
@@ -160,7 +160,7 @@ fn power_is_accounted_for_in_launches_garage_shifts_and_withdrawn_shifts() {
 
 #[test]
 fn the_audit_notices_every_missing_sink() {
-    let mut car = crate::cars().swap_remove(0);
+    let mut car = super::cars().swap_remove(0);
     car.backlash_rad = 0.03;
     let model = CarModel::new(car).unwrap();
     let audit = audit(&model, (1, 2), 0.15, 1e-8);

@@ -3,7 +3,7 @@
 use config::Car;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, Driver};
 
-use crate::{HeldGear, cars, with_stroke};
+use super::{HeldGear, cars, with_stroke};
 
 const STANDING: Driver = Driver { throttle: 0.0, brake: 0.6, grade_rad: 0.0 };
 
@@ -48,7 +48,7 @@ impl Engaged {
 #[test]
 fn a_gear_is_engaged_from_neutral_and_from_the_other_direction() {
     let (mut longest, mut overshoot, mut jolt) = (0.0_f64, 0.0_f64, [0.0_f64; 2]);
-    let automatics = || cars().into_iter().take(4).chain([crate::one_way()]);
+    let automatics = || cars().into_iter().take(4).chain([super::one_way()]);
     for car in automatics().chain(automatics().map(with_stroke)) {
         let model = CarModel::new(car.clone()).unwrap();
         let (first, reverse) = (car.gearbox.gear("1").unwrap(), car.gearbox.gear("R").unwrap());

@@ -1,6 +1,6 @@
 //! Cars with whole gearboxes.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
+#![expect(clippy::print_stdout, reason = "a test may")]
 
 use config::{Car, Source};
 use plant::car::{CarCalibration, CarSample};

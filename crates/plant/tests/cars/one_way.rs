@@ -3,7 +3,7 @@
 use drivetrain::PeakJerk;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, CarShiftQuality, Driver, simulate_car_shift};
 
-use crate::{HeldGear, one_way, with_stroke};
+use super::{HeldGear, one_way, with_stroke};
 
 /// Simulates a shift; each sample with the slip of the one-way clutch, rad/s, and its torque, N m.
 fn shift(model: &CarModel, names: [&str; 2], throttle: f64) -> (CarShiftQuality, Vec<(CarSample, [f64; 2])>) {

@@ -3,7 +3,7 @@
 use config::Car;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 
-use crate::{HeldGear, cars, neighbours, runs, with_stroke};
+use super::{HeldGear, cars, neighbours, runs, with_stroke};
 
 /// Time of the request, s.
 const REQUEST_S: f64 = 1.0;

@@ -3,7 +3,7 @@
 use config::{Car, Source};
 use plant::car::{CarCalibration, CarModel, CarShift, CarShiftQuality, simulate_car_shift};
 
-use crate::{HeldGear, cars, neighbours, runs};
+use super::{HeldGear, cars, neighbours, runs};
 
 /// Without power, and from little to much.
 const THROTTLES: [f64; 5] = [0.0, 0.1, 0.2, 0.4, 0.7];
@@ -66,7 +66,7 @@ fn every_shift_of_every_gearbox_is_good() {
 /// The pistons have a stroke: the controller fills the clutches.
 #[test]
 fn every_shift_with_pistons_that_have_a_stroke_is_good() {
-    let cars = cars().into_iter().map(crate::with_stroke).collect();
+    let cars = cars().into_iter().map(super::with_stroke).collect();
     each_shift("with stroke", cars, 1.0, [1.8, 5.0, 10.0, 50.0, 0.1, 25.0]);
 }
 
@@ -123,7 +123,7 @@ fn with_friction_15_percent_off_every_shift_is_completed_and_flares_are_caught()
 #[test]
 fn with_a_stroke_and_friction_15_percent_off_every_shift_is_completed_and_flares_are_caught() {
     for friction in [0.85, 1.15] {
-        let cars = cars().into_iter().map(crate::with_stroke).collect();
+        let cars = cars().into_iter().map(super::with_stroke).collect();
         each_shift("with stroke", cars, friction, [2.0, 5.0, 10.0, 70.0, 0.1, 25.0]);
     }
 }
@@ -135,7 +135,7 @@ fn with_cold_oil_the_fill_takes_longer_and_the_shift_is_good() {
         for clutch in car.clutches.iter_mut().flatten() {
             clutch.cylinder = clutch.cylinder.with_oil(0.0);
         }
-        crate::with_stroke(car)
+        super::with_stroke(car)
     });
     each_shift("oil of 0 degC", cars.collect(), 1.0, [2.5, 5.0, 10.0, 50.0, 0.1, 25.0]);
 }

@@ -15,7 +15,7 @@ fn as_any_car(vehicle: &Vehicle) -> Car {
         backlash_rad: vehicle.backlash_rad,
         tyre: vehicle.tyre,
         road: vehicle.road,
-        ..crate::two_speed()
+        ..super::two_speed()
     }
 }
 

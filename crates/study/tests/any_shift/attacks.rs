@@ -12,8 +12,8 @@ use study::any_shift::{
 };
 use study::shift_learning::tables_with_inertia;
 
-use crate::cars::{Random, cars, sensors, shifts};
-use crate::controlling;
+use super::cars::{Random, cars, sensors, shifts};
+use super::controlling;
 
 fn draw(car: &Car, seed: u64) -> Car {
     let mut random = Random(seed);

@@ -7,7 +7,7 @@ use observer::Health;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 use study::any_shift::{RECORD_S, ShiftDraw, ShiftScoreRow, inputs, score_samples, simulated};
 
-use crate::cars::{Random, cars, cars_with_strokes, sensors, shifts};
+use super::cars::{Random, cars, cars_with_strokes, sensors, shifts};
 
 /// Cars of the test; each makes two shifts.
 const CARS: u64 = 300;

@@ -12,7 +12,7 @@ use study::any_shift::logged::LoggedDrive;
 use study::any_shift::recording::Recording;
 use study::any_shift::tour::drive_tour;
 
-use crate::cars::{Random, cars, cars_with_strokes, one_way, sensors};
+use super::cars::{Random, cars, cars_with_strokes, one_way, sensors};
 
 /// Cars that are drawn of each gearbox; with more than one there are more cars and delays.
 fn draws() -> u64 {

@@ -10,7 +10,7 @@ use study::any_shift::recording::Recording;
 use study::any_shift::tour::{drive_tour, legs};
 use study::any_shift::{SAMPLE_S, TruePhase};
 
-use crate::cars::{cars, sensors};
+use super::cars::{cars, sensors};
 
 fn driven(car: &Car, seed: u64) -> ScoredDrive {
     let model = CarModel::new(drawn_car(car, 0, 0, seed)).unwrap();

@@ -12,8 +12,8 @@ use study::any_shift::matrix::{MatrixRow, Pooled};
 use study::any_shift::recording::{Recording, lock_up_is_applied, reported_engine_n_m};
 use study::any_shift::{RECORD_S, SAMPLE_S, ShiftDraw};
 
-use crate::PHASES;
-use crate::cars::{Random, cars, sensors};
+use super::PHASES;
+use super::cars::{Random, cars, sensors};
 
 /// Where the filter has the torque at the gearbox input from while the lock-up clutch is open.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +67,7 @@ fn drive(known: &Car, seed: u64) -> [Vec<MatrixRow>; ALL.len()] {
     })
 }
 
-/// The numbers of the documentation: `LIMITS_DRAWS=40 cargo test --release -p study --test any_shift engine_torque -- --nocapture`.
+/// The numbers of the documentation: `LIMITS_DRAWS=40 cargo test --release -p study --test tests engine_torque -- --nocapture`.
 #[test]
 fn a_reported_engine_torque_tells_the_capacity_of_the_converter() {
     assert_eq!(SAMPLE_S, 0.01, "three samples are 30 ms");

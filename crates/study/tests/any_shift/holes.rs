@@ -9,7 +9,7 @@ use study::any_shift::drive::DriveScorer;
 use study::any_shift::recording::Recording;
 use study::any_shift::{RECORD_S, ShiftDraw};
 
-use crate::cars::{Random, cars, sensors};
+use super::cars::{Random, cars, sensors};
 
 /// How long a speed is lost from the request of each shift on, s.
 const HOLE_S: f64 = 0.2;
@@ -60,7 +60,7 @@ fn errors(
 }
 
 /// Speeds of different times show a slip wherever the car accelerates: what the model carries on shows none.
-/// `cargo test --release -p study --test any_shift holes -- --nocapture`.
+/// `cargo test --release -p study --test tests holes -- --nocapture`.
 #[test]
 fn a_hole_in_a_speed_at_the_request_of_a_shift_is_no_slip() {
     let car = cars().remove(0);

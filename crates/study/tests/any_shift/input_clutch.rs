@@ -7,7 +7,7 @@ use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use study::any_shift::RECORD_S;
 use study::any_shift::recording::{Recording, input_clutch_n_m, reported_engine_n_m};
 
-use crate::cars::{cars, sensors};
+use super::cars::{cars, sensors};
 
 const DRIVE: &str = "name = \"d\"\nsample_time_s = 0.001\n[[segment]]\nduration_s = 3\nthrottle = 0.0\nbrake = 0.3\n\
     [[segment]]\nduration_s = 12\nthrottle = [0.05, 0.3]\n[[segment]]\nduration_s = 10\nthrottle = 0.15\n\

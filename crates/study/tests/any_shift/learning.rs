@@ -8,7 +8,7 @@ use study::any_shift::matrix::{MatrixCounts, counts, errors_by_phase};
 use study::any_shift::{ShiftDraw, SquaredErrors};
 use study::shift_learning::{RecordedShift, filter, tables_with_inertia};
 
-use crate::cars::{Random, cars, sensors, shifts};
+use super::cars::{Random, cars, sensors, shifts};
 use drivetrain::ShiftKind;
 
 /// Shifts of a car, recorded once.
@@ -144,7 +144,7 @@ const WRONG: [(&str, [(f64, f64); 2]); 2] =
 pub(crate) const SHIFTS: usize = 30;
 
 /// How many orders of the shifts with their noise, and cars of the budget: two, or for the documentation `LEARNING_DRAWS=6 cargo test --release
-/// -p study --test any_shift learning -- --nocapture`.
+/// -p study --test tests learning -- --nocapture`.
 pub(crate) fn draws() -> u64 {
     std::env::var("LEARNING_DRAWS").ok().map_or(2, |draws| draws.parse().unwrap())
 }

@@ -5,7 +5,7 @@ use design::ErrorBudget;
 use std::path::Path;
 use study::any_shift::learnt_coverage::{Coverage, LearntDrive, Quantity, Sampled, SampledCar, learn};
 
-use crate::cars::{cars, sensors};
+use super::cars::{cars, sensors};
 
 /// So many times three minutes in town by a sampled car.
 fn town(car: &Car, what: Sampled, (repetitions, parts): (u32, usize), seed: u64) -> LearntDrive {

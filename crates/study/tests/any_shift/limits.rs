@@ -13,8 +13,8 @@ use study::any_shift::matrix::{
 };
 use study::any_shift::{ShiftScoreRow, inputs, score_samples, simulated};
 
-use crate::PHASES;
-use crate::cars::{cars, sensors};
+use super::PHASES;
+use super::cars::{cars, sensors};
 
 /// The error that is taken away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -212,7 +212,7 @@ fn columns(cars: &[Car], draws: u64) -> Vec<Vec<MatrixRow>> {
 }
 
 /// A clutch grips some milliseconds before or after the readings show that its slip has ended. Where the filter says so too early,
-/// its torque is the mean of both phases: `LIMITS_DRAWS=10 cargo test --release -p study --test any_shift grips -- --nocapture`.
+/// its torque is the mean of both phases: `LIMITS_DRAWS=10 cargo test --release -p study --test tests grips -- --nocapture`.
 #[test]
 fn a_clutch_that_grips_too_early_in_the_filter_has_the_torque_of_both_phases() {
     let (car, draws) = (&cars()[0], std::env::var("LIMITS_DRAWS").map_or(2, |draws| draws.parse().unwrap()));
@@ -262,7 +262,7 @@ fn print(columns: &[Vec<MatrixRow>]) {
     });
 }
 
-/// The numbers of the documentation: `LIMITS_DRAWS=10 cargo test --release -p study --test any_shift limits -- --nocapture`.
+/// The numbers of the documentation: `LIMITS_DRAWS=10 cargo test --release -p study --test tests limits -- --nocapture`.
 #[test]
 fn an_error_that_is_taken_away_shows_what_it_costs() {
     let draws = std::env::var("LIMITS_DRAWS").ok().map(|draws| draws.parse().unwrap());

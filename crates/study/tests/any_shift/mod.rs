@@ -1,7 +1,7 @@
 //! The filter for any shift, over the shifts of the shipped gearboxes, behind toothed wheels, in cars whose clutches, valves
 //! and converters are not those it knows.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
+#![expect(clippy::print_stdout, reason = "a test may")]
 
 mod attacks;
 mod bounds;
@@ -154,7 +154,7 @@ fn is_as_documented(rows: &[MatrixRow], ratios: &Ratios, runs_above: f64, by_cha
 }
 
 /// Lag, delay and hysteresis of the valves anywhere in the budget too: `MATRIX_DRAWS=40 cargo test --release -p study --test
-/// any_shift whole_budget -- --nocapture`.
+/// tests whole_budget -- --nocapture`.
 #[test]
 fn matrix_of_cars_of_the_whole_budget() {
     let rows = rows(&cars(), draws(), true);
@@ -177,7 +177,7 @@ fn is_not_worse_than_the_open_loop(rows: &[MatrixRow]) {
     }
 }
 
-/// The numbers of the documentation: `MATRIX_DRAWS=40 cargo test --release -p study --test any_shift matrix -- --nocapture`.
+/// The numbers of the documentation: `MATRIX_DRAWS=40 cargo test --release -p study --test tests matrix -- --nocapture`.
 #[test]
 fn matrix_of_shifts_and_kinds() {
     let rows = rows(&cars(), draws(), false);

@@ -9,7 +9,7 @@ use study::any_shift::matrix::{controlling_of, drawn_car};
 use study::any_shift::recording::Recording;
 use study::any_shift::tour::drive_tour;
 
-use crate::cars::{one_way, sensors};
+use super::cars::{one_way, sensors};
 
 fn gear(car: &Car, name: &str) -> usize {
     car.gearbox.gear(name).unwrap()

@@ -12,7 +12,7 @@ use study::any_shift::logged::LoggedDrive;
 use study::any_shift::recording::Recording;
 use study::any_shift::{inputs, simulated};
 
-use crate::cars::{cars, sensors};
+use super::cars::{cars, sensors};
 
 /// Up through the gears under power and down again, twice.
 const DRIVE: &str = "name = \"d\"\nsample_time_s = 0.001\nrepetitions = 2\n[[segment]]\nduration_s = 25\nthrottle = [0.1, 0.35]\n\

@@ -4,7 +4,7 @@ use config::{Car, CarErrorBounds, ElementErrorBounds, Source};
 use study::any_shift::influence::{CarInfluences, ValueFrom, car_influences};
 use study::any_shift::sensitivity::{EffectInShift, PhaseOfShift, ShiftErrorKind, car_sensitivity};
 
-use crate::cars::{cars, sensors};
+use super::cars::{cars, sensors};
 
 fn effect(phase: &PhaseOfShift, error: ShiftErrorKind) -> Option<&EffectInShift> {
     phase.effects.iter().find(|effect| effect.error == error)

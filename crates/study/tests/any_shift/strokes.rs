@@ -9,11 +9,11 @@ use study::any_shift::matrix::{MatrixShift, drawn_car, neighbouring_shifts};
 use study::any_shift::{ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase, inputs, score_samples, simulated};
 use study::shift_learning::{filter, tables_with_inertia};
 
-use crate::cars::{Random, cars_with_strokes, sensors};
-use crate::learning::{Drive, Errors, SHIFTS};
-use crate::{controlling, draws, is_not_worse_than_the_open_loop, print, rows};
+use super::cars::{Random, cars_with_strokes, sensors};
+use super::learning::{Drive, Errors, SHIFTS};
+use super::{controlling, draws, is_not_worse_than_the_open_loop, print, rows};
 
-/// The numbers of the documentation: `MATRIX_DRAWS=40 cargo test --release -p study --test any_shift strokes -- --nocapture`.
+/// The numbers of the documentation: `MATRIX_DRAWS=40 cargo test --release -p study --test tests strokes -- --nocapture`.
 #[test]
 fn matrix_of_cars_with_strokes() {
     for timing in [false, true] {
@@ -104,7 +104,7 @@ fn kiss_points_are_learnt_in_cars_with_strokes() {
     let car = cars_with_strokes().remove(0);
     assert!(ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap().tables().elements[0].piston.is_some());
     let (mut sums, mut kiss) = ([Errors::default(), Errors::default()], [0.0; 2]);
-    for seed in 1..=2 * crate::learning::draws() {
+    for seed in 1..=2 * super::learning::draws() {
         let mut random = Random(seed * 77);
         let draw = ShiftDraw::within(&car, &ErrorBudget::of_car(&car), || random.uniform());
         let draw = draw.with_strokes(&car, || random.uniform());

@@ -4,8 +4,8 @@ use config::Car;
 use design::ErrorBudget;
 use study::any_shift::{ShiftDraw, ValveTiming};
 
-use crate::cars::{Random, cars};
-use crate::learning::{Drive, Errors, SHIFTS, draws};
+use super::cars::{Random, cars};
+use super::learning::{Drive, Errors, SHIFTS, draws};
 
 /// How sure a filter is that is told lag and delay: share of the lag, and s.
 const SURE: (f64, f64) = (0.02, 0.001);
@@ -94,7 +94,7 @@ fn print_given(car: &Car) {
     }
 }
 
-/// The numbers of the documentation: `LEARNING_DRAWS=4 cargo test --release -p study --test any_shift valve_timing -- --nocapture`.
+/// The numbers of the documentation: `LEARNING_DRAWS=4 cargo test --release -p study --test tests valve_timing -- --nocapture`.
 #[test]
 fn in_thirty_shifts_lag_and_delay_are_learnt() {
     let car = cars().remove(0);

@@ -13,9 +13,9 @@ use study::any_shift::recording::Recording;
 use study::any_shift::tour::drive_tour;
 use study::any_shift::{inputs, score_samples, simulated};
 
-use crate::PHASES;
-use crate::attacks::cast;
-use crate::cars::{cars, sensors};
+use super::PHASES;
+use super::attacks::cast;
+use super::cars::{cars, sensors};
 
 /// The wheel speed that the filter is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,7 +154,7 @@ fn is_as_good_with_another_scale(columns: &[Vec<MatrixRow>]) {
     }
 }
 
-/// The numbers of the documentation: `WHEEL_DRAWS=3 cargo test --release -p study --test any_shift wheel:: -- --nocapture`.
+/// The numbers of the documentation: `WHEEL_DRAWS=3 cargo test --release -p study --test tests wheel:: -- --nocapture`.
 #[test]
 fn a_wrong_wheel_speed_in_a_short_log() {
     let (cars, draws) = (cars(), draws());

@@ -1,0 +1,14 @@
+//! Files of every format, readings, steps and shifts.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+mod can;
+mod columns;
+mod common;
+mod csv;
+mod formats;
+mod hostile;
+mod mdf;
+mod mdf_conversions;
+mod readings;
+mod shifts;
