@@ -155,11 +155,9 @@ impl GearTrain {
         matrix(&rows, self.shafts.len()) * &self.basis
     }
 
-    /// Inertia of the motions, `M = N' J N`, with more inertia on the output shaft.
-    pub fn mass_kg_m2(&self, more_on_output_kg_m2: f64) -> DMatrix<f64> {
-        let mut inertia = self.inertia();
-        inertia[self.output] += more_on_output_kg_m2;
-        self.basis.transpose() * DMatrix::from_diagonal(&inertia) * &self.basis
+    /// Inertia of the motions, `M = N' J N`.
+    pub fn mass_kg_m2(&self) -> DMatrix<f64> {
+        self.basis.transpose() * DMatrix::from_diagonal(&self.inertia()) * &self.basis
     }
 
     fn inertia(&self) -> DVector<f64> {

@@ -40,7 +40,7 @@ pub use contact::{ContactProblem, ContactSolution, MAX_CONTACTS};
 pub use controller::{Commands, Measured, ShiftController, Stage};
 pub use energy::{PowerBalance, stored_energy};
 pub use fast_fill::FillPlan;
-pub use gear_train::{Limits, TrainError, TrainInputs, TrainModel, TrainRun};
+pub use gear_train::{TrainError, TrainModel};
 pub use hybrid::{HybridIntegrator, PlantError, Segment};
 pub use mode::{Contact, Direction, Mode};
 pub use powertrain::{Inputs, Powertrain, Torques};

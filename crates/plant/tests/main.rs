@@ -7,6 +7,5 @@ mod cars;
 mod common;
 mod energy_audit;
 mod fill;
-mod gear_trains;
 mod independent_method;
 mod shift;

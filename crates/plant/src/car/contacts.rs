@@ -5,7 +5,7 @@
 //! sticking elements.
 
 use super::model::{CarInputs, CarModel, CarState, Part, end_responses};
-use crate::gear_train::{Limits, MAX_ELEMENTS, MAX_FREEDOMS, TrainError};
+use crate::gear_train::{HOLDS_ANY, MAX_ELEMENTS, MAX_FREEDOMS, TrainError};
 use crate::{Contact, Direction, MAX_CONTACTS};
 
 /// Torques on engine, input and output come before those of the elements.
@@ -69,7 +69,7 @@ impl Contacts {
         for (source, free) in ends.chain(elements) {
             let (stuck, count) = (contacts.stuck, contacts.stuck_count);
             let stuck = &stuck[..count];
-            let problem = train.problem(stuck, |element| (train.slip(&free, element), Limits::DOG))?;
+            let problem = train.problem(stuck, |element| (train.slip(&free, element), HOLDS_ANY))?;
             let held = problem.solve(&[]).torques_n_m;
             let mut acceleration = free;
             for (at, (&element, held)) in stuck.iter().zip(held).enumerate() {
@@ -198,8 +198,7 @@ impl Contacts {
         let torques = model.applied(&others, &state, inputs);
         let free = others.accelerations_rad_s2(&model.ends_n_m(&torques), &torques.elements_n_m);
         let problem = train.problem(at_zero, |element| {
-            let (lower, upper) = model.holding_limits(element, &state, inputs).unwrap_or((0.0, 0.0));
-            (train.slip(&free, element), Limits::between(lower, upper))
+            (train.slip(&free, element), model.holding_limits(element, &state, inputs).unwrap_or((0.0, 0.0)))
         })?;
         let solution = problem.solve(&[]);
         for (&element, contact) in at_zero.iter().zip(solution.contacts) {
@@ -254,3 +253,6 @@ impl Contacts {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

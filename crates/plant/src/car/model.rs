@@ -7,7 +7,7 @@ use geartrain::ElementKind;
 
 use super::contacts::Contacts;
 use crate::Contact;
-use crate::gear_train::{MAX_ELEMENTS, MAX_FREEDOMS, TrainError, TrainModel};
+use crate::gear_train::{Limits, MAX_ELEMENTS, MAX_FREEDOMS, TrainError, TrainModel, UNLIMITED_N_M};
 use crate::rosenbrock::StiffRow;
 
 /// Most friction elements of a gearbox.
@@ -53,7 +53,7 @@ pub struct CarState {
     pub wheel_rad_s: f64,
     /// Vehicle speed, m/s.
     pub vehicle_m_s: f64,
-    /// Speeds of train and engine in the coordinates of [`crate::TrainModel::with_engine`], rad/s.
+    /// Speeds of train and engine in the coordinates of [`crate::TrainModel::new`], rad/s.
     pub motion: [f64; MAX_FREEDOMS],
     /// Pressure at the outlet of the valve of each friction element, Pa; that of the element, if its piston has no stroke.
     pub valves_pa: [f64; MAX_PACKS],
@@ -178,7 +178,7 @@ impl CarModel {
     /// The gearbox has no stick diagram, is too large, or its inertia cannot be inverted.
     pub fn new(car: Car) -> Result<Self, TrainError> {
         let train = car.gearbox.train.as_ref().ok_or(TrainError::NoDiagram)?;
-        let train = TrainModel::with_engine(train, car.engine.inertia_kg_m2)?;
+        let train = TrainModel::new(train, car.engine.inertia_kg_m2)?;
         let mut packs = 0;
         let mut parts = Vec::new();
         for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
@@ -248,8 +248,7 @@ impl CarModel {
 
     /// Lowest and highest torque of an element that sticks, N m; `None` for one that is open.
     #[inline]
-    pub(super) fn holding_limits(&self, element: usize, state: &CarState, inputs: &CarInputs) -> Option<(f64, f64)> {
-        const UNLIMITED_N_M: f64 = 1e9;
+    pub(super) fn holding_limits(&self, element: usize, state: &CarState, inputs: &CarInputs) -> Option<Limits> {
         let capacity = match &self.parts[element] {
             Part::Friction(slot, clutch) => clutch.clutch.static_capacity(Self::plates_pa(*slot, clutch, state)),
             Part::OneWay => return Some((0.0, UNLIMITED_N_M)),
