@@ -313,7 +313,7 @@ fn the_output_gets_the_torques_of_the_turbine_and_of_the_housing() {
     for gearbox in planetary() {
         let train = gearbox.train.as_ref().unwrap();
         // A set with the housing as a member takes torque from it as well.
-        if train.sets.iter().any(|set| [set.sun, set.carrier, set.ring].contains(&drivetrain::Member::Housing)) {
+        if train.sets.iter().any(|set| [set.sun, set.carrier, set.ring].contains(&geartrain::Member::Housing)) {
             continue;
         }
         for gear in &gearbox.gears {
@@ -334,9 +334,9 @@ fn in_every_gear_the_speeds_of_a_set_lie_on_its_lever() {
     for gearbox in planetary().into_iter().chain([two_speed()]) {
         let train = gearbox.train.as_ref().unwrap();
         for gear in &gearbox.gears {
-            let speed = |member: drivetrain::Member| match member {
-                drivetrain::Member::Housing => 0.0,
-                drivetrain::Member::Shaft(shaft) => gear.shaft_speeds[shaft].unwrap(),
+            let speed = |member: geartrain::Member| match member {
+                geartrain::Member::Housing => 0.0,
+                geartrain::Member::Shaft(shaft) => gear.shaft_speeds[shaft].unwrap(),
             };
             for set in &train.sets {
                 let planets = if set.planets == geartrain::Planets::Double { -1.0 } else { 1.0 };

@@ -27,4 +27,4 @@ pub use description::{
 pub use finding::{Fault, Finding, Part};
 pub use gearbox::{Gear, Gearbox, GearboxElement, Holding};
 pub use shift::{Change, Shift};
-pub use train::{Connection, GearTrain, TrainElement};
+pub use train::{Connection, GearTrain, Member, TrainElement};

@@ -1,11 +1,9 @@
 //! From names to places in lists, and the checks of single parts.
 
-use drivetrain::Member;
-
 use crate::description::{Element, ElementKind, GearPair, HOUSING, PlanetarySet, StickDiagram};
 use crate::finding::{Fault, Finding, Part};
 use crate::teeth;
-use crate::train::{Connection, GearTrain, TrainElement};
+use crate::train::{Connection, GearTrain, Member, TrainElement};
 
 /// More parts of a kind than this are a mistake; the work grows with the cube of their number.
 const MOST: usize = 32;

@@ -4,7 +4,7 @@
 //! of `N` are a basis of the motions that these rows leave, `w = N q`. The slip of element `c` is `k_c w`. In a gear the
 //! slips of the engaged elements are zero, and what remains must turn input and output in one ratio.
 
-use drivetrain::{Clutch, Member, ReducedShift};
+use drivetrain::{Clutch, ReducedShift};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use crate::description::{ElementKind, GearPair, PlanetarySet, Planets, Shaft};
@@ -12,6 +12,15 @@ use crate::linear::{least_norm, null_space};
 
 /// A speed or a coefficient below this is zero; shaft speeds are of the order of the turbine speed.
 pub(crate) const ZERO: f64 = 1e-9;
+
+/// One side of an element, or a member of a planetary set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Member {
+    /// The gearbox housing, at rest.
+    Housing,
+    /// A shaft, by its position in the list of shafts.
+    Shaft(usize),
+}
 
 /// What an element connects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,8 +86,8 @@ pub(crate) enum NoGear {
 }
 
 impl GearTrain {
-    /// The train of these parts. `None` if one set or pair follows from the others.
-    pub(crate) fn new(
+    /// The train of these parts, whose members and sides are places in `shafts`. `None` if one set or pair follows from the others.
+    pub fn new(
         shafts: Vec<Shaft>,
         [input, output]: [usize; 2],
         sets: Vec<PlanetarySet<Member>>,

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
+mod chapter;
 mod describe;
 mod trains;
 mod wrong_input;

@@ -223,7 +223,7 @@ fn whole(
     check.count(key, value, range).map(|count| count as u32)
 }
 
-fn teeth(check: &Check<'_>, key: &str, value: &Number) -> Result<u32, ConfigError> {
+pub(crate) fn teeth(check: &Check<'_>, key: &str, value: &Number) -> Result<u32, ConfigError> {
     whole(check, key, value, 5.0..=500.0)
 }
 

@@ -9,6 +9,7 @@ use geartrain::{Finding, Gearbox, Part};
 
 use crate::check::Check;
 use crate::{ConfigError, Kind, Source};
+pub(crate) use convert::teeth;
 use convert::{Read, Spans};
 use raw::{RawHead, RawRatios, RawShares, RawStickDiagram};
 

@@ -1,13 +1,12 @@
 //! The gear train of a vehicle file: names turned into shafts, then reduced to the shift.
 
-use drivetrain::{GearTrain, Member, PlanetarySet, ReducedShift};
+use drivetrain::ReducedShift;
+use geartrain::{Connection, ElementKind, GearTrain, HOUSING, Member, PlanetarySet, Planets, Shaft, TrainElement};
 
 use super::raw::{RawPlanetarySet, RawShaft, RawVehicleFile};
 use crate::ConfigError;
 use crate::check::{Check, Word};
-
-/// Name of the gearbox housing in a vehicle file.
-const HOUSING: &str = "housing";
+use crate::gearbox::teeth;
 
 pub(super) struct CheckedGearTrain {
     pub(super) reduced: ReducedShift<f64>,
@@ -21,7 +20,7 @@ pub(super) fn check(check: &Check<'_>, raw: &RawVehicleFile) -> Result<CheckedGe
     let shafts = Shafts::of(check, train.shaft.get_ref())?;
     let sets = train.planetary_set.iter().map(|set| shafts.set(set)).collect::<Result<Vec<_>, _>>()?;
     let held = train.held.iter();
-    let held = held.map(|held| shafts.sides("gear_train.held", &held.input, &held.output));
+    let held = held.map(|held| shafts.element("gear_train.held", &held.input, &held.output));
     let held = held.collect::<Result<Vec<_>, _>>()?;
     let clutch = |key: &str, name: &Word| {
         let raw = raw.clutch.get(name.get_ref()).ok_or_else(|| {
@@ -29,16 +28,15 @@ pub(super) fn check(check: &Check<'_>, raw: &RawVehicleFile) -> Result<CheckedGe
             let message = format!("there is no [clutch.{}]", name.get_ref());
             check.meaning(key, name.span().start, message, Some(format!("the clutches are {}", known.join(", "))))
         })?;
-        shafts.sides(&format!("clutch.{}", name.get_ref()), &raw.input, &raw.output)
+        shafts.element(&format!("clutch.{}", name.get_ref()), &raw.input, &raw.output)
     };
     let offgoing = clutch("gear_train.offgoing", &train.offgoing)?;
     let oncoming = clutch("gear_train.oncoming", &train.oncoming)?;
     let input = shafts.shaft("gear_train.input", &train.input)?;
     let output = shafts.shaft("gear_train.output", &train.output)?;
-    let inertias_kg_m2 = &shafts.inertias_kg_m2;
-    let reduced = GearTrain { inertias_kg_m2, sets: &sets, held: &held, input, output }
-        .reduce(offgoing, oncoming)
-        .map_err(|error| check.meaning("gear_train", train.shaft.span().start, error.to_string(), None))?;
+    let output_inertia_kg_m2 = shafts.shafts[output].inertia_kg_m2;
+    let reduced = reduced(shafts.shafts, [input, output], sets, held, [offgoing, oncoming])
+        .map_err(|message| check.meaning("gear_train", train.shaft.span().start, message, None))?;
     let (before, after) = (reduced.ratio_offgoing(), reduced.ratio_oncoming());
     if !(before.is_finite() && after.is_finite() && before > after && after > 0.0) {
         let message = format!("the ratio changes from {before:.3} to {after:.3}, but an upshift decreases the ratio");
@@ -47,17 +45,41 @@ pub(super) fn check(check: &Check<'_>, raw: &RawVehicleFile) -> Result<CheckedGe
     }
     Ok(CheckedGearTrain {
         reduced,
-        output_inertia_kg_m2: inertias_kg_m2[output],
+        output_inertia_kg_m2,
         offgoing: train.offgoing.get_ref().clone(),
         oncoming: train.oncoming.get_ref().clone(),
     })
 }
 
-/// The shafts by their names, and their inertias.
+/// The shift between two elements while others are held. The error says why there is none.
+fn reduced(
+    shafts: Vec<Shaft>,
+    ends: [usize; 2],
+    sets: Vec<PlanetarySet<Member>>,
+    held: Vec<TrainElement>,
+    shift: [TrainElement; 2],
+) -> Result<ReducedShift<f64>, String> {
+    let freedoms = shafts.len().checked_sub(sets.len() + held.len());
+    if freedoms != Some(2) {
+        let freedoms = freedoms.map_or_else(|| "no".to_owned(), |freedoms| freedoms.to_string());
+        return Err(format!(
+            "the planetary sets and the held clutches leave {freedoms} degrees of freedom, but a shift needs exactly 2"
+        ));
+    }
+    let held_count = held.len();
+    let held_places: Vec<usize> = (0..held_count).collect();
+    let elements = held.into_iter().chain(shift).collect();
+    GearTrain::new(shafts, ends, sets, vec![], elements)
+        .filter(|train| train.speeds_in_shift(&held_places).is_some())
+        .ok_or("turbine and output speed do not determine the speed of every shaft")?
+        .reduce(&held_places, held_count, held_count + 1)
+        .ok_or_else(|| "the slip of each shift clutch must depend on turbine and output speed".to_owned())
+}
+
+/// The shafts of a vehicle file.
 struct Shafts<'c> {
     check: &'c Check<'c>,
-    names: Vec<String>,
-    inertias_kg_m2: Vec<f64>,
+    shafts: Vec<Shaft>,
 }
 
 impl<'c> Shafts<'c> {
@@ -74,47 +96,58 @@ impl<'c> Shafts<'c> {
             let key = format!("gear_train.shaft.{}.inertia_kg_m2", shaft.name.get_ref());
             check.number(&key, &shaft.inertia_kg_m2, 1e-4..=50.0)
         };
-        let names = shafts.iter().map(name).collect::<Result<_, _>>()?;
+        let names = shafts.iter().map(name).collect::<Result<Vec<_>, _>>()?;
         check.distinct("gear_train.shaft.name", shafts.iter().map(|shaft| &shaft.name))?;
-        let inertias_kg_m2 = shafts.iter().map(inertia).collect::<Result<_, _>>()?;
-        Ok(Self { check, names, inertias_kg_m2 })
+        let shaft = |(shaft, name)| Ok(Shaft { name, inertia_kg_m2: inertia(shaft)? });
+        Ok(Self { check, shafts: shafts.iter().zip(names).map(shaft).collect::<Result<_, ConfigError>>()? })
     }
 
     /// Place of a shaft.
     fn shaft(&self, key: &str, name: &Word) -> Result<usize, ConfigError> {
-        self.names.iter().position(|known| known == name.get_ref()).ok_or_else(|| {
+        self.shafts.iter().position(|shaft| shaft.name == *name.get_ref()).ok_or_else(|| {
             let message = format!("there is no shaft \"{}\"", name.get_ref());
-            let hint = format!("the shafts are {}", self.names.join(", "));
+            let names: Vec<_> = self.shafts.iter().map(|shaft| shaft.name.as_str()).collect();
+            let hint = format!("the shafts are {}", names.join(", "));
             self.check.meaning(key, name.span().start, message, Some(hint))
         })
     }
 
-    /// What a clutch joins: shafts or the housing.
-    fn sides(&self, table: &str, input: &Word, output: &Word) -> Result<(Member, Member), ConfigError> {
+    /// A clutch between shafts or a shaft and the housing.
+    fn element(&self, table: &str, input: &Word, output: &Word) -> Result<TrainElement, ConfigError> {
         let member = |field: &str, name: &Word| match name.get_ref().as_str() {
             HOUSING => Ok(Member::Housing),
             _ => self.shaft(&format!("{table}.{field}"), name).map(Member::Shaft),
         };
-        Ok((member("input", input)?, member("output", output)?))
+        Ok(TrainElement {
+            name: table.to_owned(),
+            kind: ElementKind::Clutch,
+            connection: Connection::Sides(member("input", input)?, member("output", output)?),
+            pack: None,
+        })
     }
 
-    fn set(&self, set: &RawPlanetarySet) -> Result<PlanetarySet, ConfigError> {
-        let shaft = |field: &str, name: &Word| self.shaft(&format!("gear_train.planetary_set.{field}"), name);
-        let (sun_teeth, ring_teeth) = teeth(self.check, set)?;
+    fn set(&self, set: &RawPlanetarySet) -> Result<PlanetarySet<Member>, ConfigError> {
+        let shaft = |field: &str, name: &Word| {
+            self.shaft(&format!("gear_train.planetary_set.{field}"), name).map(Member::Shaft)
+        };
+        let (sun_teeth, ring_teeth) = teeth_of(self.check, set)?;
         Ok(PlanetarySet {
             sun: shaft("sun", &set.sun)?,
             ring: shaft("ring", &set.ring)?,
             carrier: shaft("carrier", &set.carrier)?,
             sun_teeth,
             ring_teeth,
+            planets: Planets::Single,
+            planet_count: None,
+            planet_teeth: vec![],
         })
     }
 }
 
 /// Teeth of sun and ring. Between them there must be room for the planets: `Z_r = Z_s + 2 Z_p`.
-fn teeth(check: &Check<'_>, set: &RawPlanetarySet) -> Result<(f64, f64), ConfigError> {
-    let sun = check.count("gear_train.planetary_set.sun_teeth", &set.sun_teeth, 5.0..=500.0)?;
-    let ring = check.count("gear_train.planetary_set.ring_teeth", &set.ring_teeth, 5.0..=500.0)?;
+fn teeth_of(check: &Check<'_>, set: &RawPlanetarySet) -> Result<(u32, u32), ConfigError> {
+    let sun = teeth(check, "gear_train.planetary_set.sun_teeth", &set.sun_teeth)?;
+    let ring = teeth(check, "gear_train.planetary_set.ring_teeth", &set.ring_teeth)?;
     if ring > sun {
         return Ok((sun, ring));
     }

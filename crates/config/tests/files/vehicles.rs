@@ -85,6 +85,10 @@ fn a_gear_train_that_is_none_is_refused_with_the_reason() {
         "",
     );
     assert!(free.contains("leave 3 degrees of freedom"), "{free}");
+    let same = vehicle_error("oncoming = \"b\"", "oncoming = \"a\"");
+    assert!(same.contains("the ratio changes from 2.500 to 2.500"), "{same}");
+    let idle = vehicle_error("input = \"turbine\"\noutput = \"ring\"", "input = \"housing\"\noutput = \"housing\"");
+    assert!(idle.contains("the slip of each shift clutch must depend on turbine and output speed"), "{idle}");
     let clutch = vehicle_error("oncoming = \"b\"", "oncoming = \"c\"");
     assert!(clutch.contains("there is no [clutch.c]\nhint: the clutches are a, b"), "{clutch}");
 }

@@ -1,6 +1,6 @@
 //! Shafts, sets, gear pairs and elements, and beside them the speeds of a gear.
 
-use drivetrain::Member;
+use geartrain::Member;
 use geartrain::{Connection, ElementKind, GearTrain};
 use kuva::render::render::TextAnchor;
 

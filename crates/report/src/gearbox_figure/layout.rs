@@ -1,6 +1,6 @@
 //! Where shafts, sets, gear pairs and elements stand.
 
-use drivetrain::Member;
+use geartrain::Member;
 use geartrain::{Connection, GearTrain, Planets};
 
 use super::MARGIN;

@@ -1,6 +1,6 @@
 //! The planetary sets of a gear as levers.
 
-use drivetrain::Member;
+use geartrain::Member;
 use geartrain::{GearTrain, PlanetarySet, Planets};
 use kuva::render::render::TextAnchor;
 

@@ -54,10 +54,10 @@ pub fn gear_figure(gearbox: &Gearbox, gear: usize) -> Option<String> {
 }
 
 /// Name of a member.
-fn member_name(train: &GearTrain, member: drivetrain::Member) -> &str {
+fn member_name(train: &GearTrain, member: geartrain::Member) -> &str {
     match member {
-        drivetrain::Member::Housing => geartrain::HOUSING,
-        drivetrain::Member::Shaft(shaft) => &train.shafts[shaft].name,
+        geartrain::Member::Housing => geartrain::HOUSING,
+        geartrain::Member::Shaft(shaft) => &train.shafts[shaft].name,
     }
 }
 

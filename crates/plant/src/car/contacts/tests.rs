@@ -1,7 +1,5 @@
 //! Contacts and accelerations in published gearboxes.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use config::{Car, Source};
 use drivetrain::{Engagement, ShiftTorques};
 use geartrain::Change;
