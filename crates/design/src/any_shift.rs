@@ -2,7 +2,7 @@
 
 use config::{Car, ElementErrors, ErrorBudget, Sensors};
 use drivetrain::{Cylinder, Real};
-use geartrain::{Change, ElementKind, Gearbox};
+use geartrain::{Change, ElementKind, Gear, Gearbox};
 use observer::any_shift::{
     AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, Piston, ShiftRow,
     ShiftUncertainty, TurbineTorque, ValveLimits,
@@ -90,7 +90,11 @@ impl ShiftTables<f64> {
             shift.map_or(f64::INFINITY, |shift| shift.inertia_at(ratio))
         };
         let gears = gearbox.gears.iter().enumerate();
-        let gears = gears.map(|(at, gear)| GearRow { ratio: gear.ratio, inertia_kg_m2: inertia(at, gear.ratio) });
+        let gears = gears.map(|(at, gear)| GearRow {
+            ratio: gear.ratio,
+            inertia_kg_m2: inertia(at, gear.ratio),
+            holding: holding(gear, &places),
+        });
         Ok(Self { gears: gears.collect(), elements, shifts, places })
     }
 
@@ -170,6 +174,17 @@ impl ShiftTables<f64> {
         }
         Ok(tables)
     }
+}
+
+/// The torques of the elements in a gear per turbine torque, in the order of the tables.
+fn holding(gear: &Gear, places: &[Option<usize>]) -> [f64; MAX_ELEMENTS] {
+    let mut holding = [0.0; MAX_ELEMENTS];
+    for of in &gear.holding {
+        if let Some(at) = places[of.element] {
+            holding[at] = of.per_turbine_torque;
+        }
+    }
+    holding
 }
 
 /// Whether a dog of the gear after is not in the gear before.

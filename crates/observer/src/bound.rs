@@ -258,6 +258,14 @@ pub(crate) fn pressure_and_torque<T: Real>(
     ([lower_pa, upper_pa], torque)
 }
 
+/// Lower bound of the torque up to which the clutch holds, N m.
+#[inline]
+pub(crate) fn capacity_min_n_m<T: Real>(clutch: &Clutch<T>, budget: &Budget<T>, pressure: &PressureRange<T>) -> T {
+    let [lowest_force, _] = clamp_force(clutch, budget, pressure, pressure.pressure_pa(budget));
+    let friction = clutch.static_friction.at_least(clutch.friction.at(T::zero()));
+    budget.friction_factor[0] * friction * clutch.lever() * lowest_force
+}
+
 /// Least and greatest force that presses the plates together, N: none before the piston has closed the clearance.
 #[inline]
 fn clamp_force<T: Real>(

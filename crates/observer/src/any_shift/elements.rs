@@ -6,7 +6,7 @@ use super::pistons::Pistons;
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
 use super::{PIECE_S, ShiftUncertainty, pieces, square};
-use crate::bound::pressure_and_torque;
+use crate::bound::{capacity_min_n_m, pressure_and_torque};
 use crate::kalman::valve_model::Commands;
 use crate::{ChannelHealth, LOST_S, PressureRange, Reading};
 
@@ -371,6 +371,12 @@ impl<T: Real> ElementState<T> {
     /// Guaranteed range of the pressure, Pa.
     pub(super) fn pressure_range_pa(&self, element: &FrictionElement<T>) -> Option<[T; 2]> {
         Some(self.range.as_ref()?.pressure_pa(element.budget.as_ref()?))
+    }
+
+    /// Lower bound of the torque up to which the element holds, N m; `None` without a budget, or before the first command.
+    pub(super) fn capacity_min_n_m(&self, element: &FrictionElement<T>) -> Option<T> {
+        self.newest?;
+        Some(capacity_min_n_m(&element.clutch, element.budget.as_ref()?, self.range.as_ref()?))
     }
 
     /// Guaranteed ranges of pressure and torque at the element, with its least and greatest slip if they are known.

@@ -37,7 +37,7 @@ pub struct ClutchEstimate<T> {
     /// Lowest and highest pressure, Pa, for errors within the budget.
     pub pressure_range_pa: Option<[T; 2]>,
     /// Lowest and highest torque, N m, for errors within the budget. Its direction is that of the slip, if that is larger than its
-    /// error; else, and where a speed has not been read twice within 50 ms or its last reading was refused, either direction is
+    /// error; else, where an element that is engaged in both gears may slip by the bounds of the errors, and where a speed has not been read twice within 50 ms or its last reading was refused, either direction is
     /// possible. The slip errs by 7 deviations and 0.6 rad/s, by twice its change since the older reading, by the spread of
     /// the readings' ages times the rate of each speed, and by an acceleration that changes by up to 10,000 rad/s^3.
     pub torque_range_n_m: Option<[T; 2]>,
@@ -141,7 +141,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
-                        let is_tied = shift.is_tied(c, since_s);
+                        let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
                         self.in_range(estimate, &state.elements, (&shift.clutches[c.min(1)], is_tied), &state.newest)
                     })
                 });
@@ -172,7 +172,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                                 let slip = self.slip(clutch.ratio, then);
                                 let direction = Self::direction_by_valve(&slip, turbine_n_m);
                                 let estimate = self.by_valve(&state.elements, clutch, [slip.value, direction], lasting);
-                                let is_tied = shift.is_tied(c, since_s);
+                                let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
                                 self.in_range(estimate, &state.elements, (clutch, is_tied), &state.newest)
                             })
                         },

@@ -32,6 +32,7 @@ mod correct;
 mod covariance;
 mod elements;
 mod estimate;
+mod held;
 mod input_clutch;
 mod learnt;
 mod newest;
@@ -251,6 +252,8 @@ pub struct AnyShiftState<T> {
     unfit: u8,
     /// Whether an element of the gear has slipped, and no gear has fitted since.
     slips: bool,
+    /// Whether an element that is engaged in both gears of the shift may slip by the bounds of the errors.
+    held_may_slip: bool,
     /// Without a converter: whether the clutch of the gear was open, or the car slow, and no gear has fitted since.
     launches: bool,
     /// The gears of the newest step, and since when they have been these, s.
@@ -379,6 +382,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             lost: false,
             unfit: 0,
             slips: false,
+            held_may_slip: false,
             launches: false,
             gears: (GearCommand { from: GearCommand::NEUTRAL, to: GearCommand::NEUTRAL }, T::zero()),
             learnt: *learnt,
@@ -430,6 +434,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
         }
         health = health.max(self.settle(state, input, torque.as_ref()));
+        self.follow_held(state, input.gear, torque.as_ref());
         let turbine_n_m = torque.map(|torque| torque.turbine_n_m);
         self.conclude(state, input, (&channels, &commands), health, turbine_n_m);
         state.estimate.input_clutch = input_clutch.filter(|clutch| clutch.torque_n_m.is_finite());

@@ -83,6 +83,8 @@ pub struct GearRow<T> {
     pub ratio: T,
     /// Inertia of the gearbox in this gear, at its output, kg m^2.
     pub inertia_kg_m2: T,
+    /// Torque of each element of [`GearboxTables::elements`] per turbine torque while the gear holds; zero of one that is not engaged.
+    pub holding: [T; MAX_ELEMENTS],
 }
 
 /// The place of a one-way clutch, which has no pressure and is in no table.
@@ -178,7 +180,7 @@ impl<T: Real> GearRow<T> {
     /// The same in another precision.
     pub fn cast<U: Real>(&self) -> GearRow<U> {
         let to = |x: T| U::of(x.to_f64_exact());
-        GearRow { ratio: to(self.ratio), inertia_kg_m2: to(self.inertia_kg_m2) }
+        GearRow { ratio: to(self.ratio), inertia_kg_m2: to(self.inertia_kg_m2), holding: self.holding.map(to) }
     }
 }
 
