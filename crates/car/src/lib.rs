@@ -1,4 +1,4 @@
-//! Plain types of a car, its readings and their errors.
+//! Plain types of a car, of what it is driven through, of its readings and of their errors.
 //!
 //! Every crate that computes with a car takes it from here. Nothing here reads a file or parses a text: `config` makes these types
 //! from files.
@@ -7,10 +7,67 @@
 //! nothing and is generic over `f32` and `f64`.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+#[cfg(feature = "std")]
+mod capacity;
+#[cfg(feature = "std")]
+mod car;
+#[cfg(feature = "std")]
+mod clutch;
+mod discretisation;
+#[cfg(feature = "std")]
+mod drive;
+#[cfg(feature = "std")]
+mod error_bounds;
+#[cfg(feature = "std")]
+pub mod error_budget;
+#[cfg(feature = "std")]
+mod experiment;
+mod fill_budget;
 mod ids;
+#[cfg(feature = "std")]
+mod observers;
+#[cfg(feature = "std")]
+mod off_nominal;
+#[cfg(feature = "std")]
+pub mod one_shift;
+#[cfg(feature = "std")]
+pub mod ratios_alone;
 mod reading;
+#[cfg(feature = "std")]
+mod sensors;
+#[cfg(feature = "std")]
+mod speed_trace;
 mod step;
+#[cfg(feature = "std")]
+pub mod stroke;
+#[cfg(feature = "std")]
+mod vehicle;
 
+pub use discretisation::Discretisation;
+pub use fill_budget::FillBudget;
 pub use ids::{ElementId, Gear, GearId, MAX_ELEMENTS, ShiftId};
 pub use reading::Reading;
 pub use step::{Commands, ShiftCommand, Speeds, Step};
+
+#[cfg(feature = "std")]
+pub use self::{
+    car::{Car, LockUp},
+    clutch::ShiftClutch,
+    drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule},
+    error_bounds::{CarErrorBounds, ElementErrorBounds, ErrorBounds},
+    error_budget::{ElementErrors, ErrorBudget},
+    experiment::{Experiment, FastFill, Profile, Scenario, ShiftCalibration},
+    observers::{GainMethod, GivenGains, ObserverEntry, ObserverKind, SAMPLE_TIMES_S},
+    off_nominal::OffNominal,
+    one_shift::OneShiftError,
+    ratios_alone::TURBINE_SIDE_INERTIA_KG_M2,
+    sensors::{CurrentSensor, OUTLIER_A, ReadingErrors, Sensors, SpeedSensor},
+    speed_trace::SpeedTrace,
+    vehicle::{
+        CompliantRequirement, DesignRequirement, FilterSettings, PhaseSlips, Uncertainty, ValveUncertainty, Vehicle,
+    },
+};
+
+/// Temperatures of transmission oil, degC.
+#[cfg(feature = "std")]
+pub const OIL_TEMPERATURES_DEGC: core::ops::RangeInclusive<f64> = -40.0..=150.0;

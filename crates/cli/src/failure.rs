@@ -5,7 +5,8 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-use config::{ConfigError, OneShiftError};
+use car::OneShiftError;
+use config::ConfigError;
 use design::DesignError;
 use fit::FitError;
 use logs::LogError;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use config::Vehicle;
+use config::VehicleFile;
 use trace::{Cell, ColumnKind, TableWriter};
 
 use crate::fit::common::{Logs, TestCar};
@@ -72,7 +72,7 @@ fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
     let folder = Folder::new("log-to-fit");
     run_page(&folder, "fit.md", "# Fitting a vehicle file to logs", |command, said| {
         if command.starts_with("wetclutch init") {
-            let mut car = TestCar::of(Vehicle::read(Path::new(&folder.path("car.toml"))).unwrap(), 4);
+            let mut car = TestCar::of(VehicleFile::read(Path::new(&folder.path("car.toml"))).unwrap(), 4);
             write_log(Path::new(&folder.path("drive.mf4")), &mut car);
         }
         if command.starts_with("wetclutch estimate") {

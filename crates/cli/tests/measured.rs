@@ -74,7 +74,7 @@ fn the_pressure_that_is_asked_of_the_clutch_stands_for_the_command_of_its_valve(
     printed(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("")]));
     let log = folder.path("e1_measured.csv");
     let map = printed(&wetclutch(&["inspect", &log, "--suggest"]));
-    let valve = config::Vehicle::built_in().unwrap().oncoming.valve;
+    let valve = config::VehicleFile::built_in().unwrap().oncoming.valve;
     let asked_bar = |current_a: f64| 1e-5 * valve.settled_pressure(current_a);
     let text = with_other(&folder.read("e1_measured.csv"), "oncoming_current_a", "P_cmd [bar]", asked_bar);
     let other = folder.write("asked.csv", text);

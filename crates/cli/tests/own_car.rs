@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use config::{Car, Vehicle};
+use config::{CarFile, VehicleFile};
 
 use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, said, wetclutch};
 
@@ -69,7 +69,7 @@ fn the_short_file_of_each_template_goes_through_check_and_estimate() {
         // Every default that is named is the one that the complete file has.
         let listed = printed(&wetclutch(&["check", &short, "--all"]));
         let complete_file: toml::Table = folder.read("complete.toml").parse().unwrap();
-        let vehicle = Vehicle::read(Path::new(&short)).unwrap();
+        let vehicle = VehicleFile::read(Path::new(&short)).unwrap();
         assert!(listed.contains(&format!("{} values are not in the file", vehicle.defaults_taken.len())), "{listed}");
         for taken in &vehicle.defaults_taken {
             assert!(listed.contains(&taken.key), "{name}: {} is not named", taken.key);
@@ -202,7 +202,7 @@ fn a_first_file_of_a_whole_gearbox_goes_through_check_and_loses_nothing() {
     assert!(folder.read("ravigneaux_4.toml").ends_with("# mine\n"));
     let own = folder.path("ravigneaux_4.toml");
     said(&init_car(&folder, "third.toml", &["--gearbox", &own, "--stroke"]));
-    let third = Car::read(Path::new(&folder.path("third.toml"))).unwrap();
+    let third = CarFile::read(Path::new(&folder.path("third.toml"))).unwrap();
     assert!(third.clutches.iter().flatten().all(|clutch| clutch.has_stroke));
 }
 

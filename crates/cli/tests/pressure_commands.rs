@@ -5,7 +5,7 @@ use crate::support::{Folder, ROOT, refused, said};
 
 /// The log with the commands of these elements as pressures in this unit of so many Pa.
 fn with_pressures(text: &str, elements: &[&str], (unit, size): (&str, f64)) -> String {
-    let car = config::Car::read(std::path::Path::new(&format!("{ROOT}vehicles/four_speed.toml"))).unwrap();
+    let car = config::CarFile::read(std::path::Path::new(&format!("{ROOT}vehicles/four_speed.toml"))).unwrap();
     let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     let valves: Vec<_> = (names.iter())
         .map(|name| {

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use car::{Car, Sensors};
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::check::{Check, Number, Word};
 use crate::experiment::raw::RawSensors;
 use crate::experiment::sensors::sensors;
-use crate::{Car, ConfigError, Drive, Kind, Sensors, Source};
+use crate::{CarFile, ConfigError, DriveFile, Kind, Source};
 
 /// Most cars of a study.
 const MOST_RUNS: f64 = 1e6;
@@ -19,7 +20,7 @@ const NEIGHBOURING: &str = "neighbouring";
 #[derive(Debug, Clone, PartialEq)]
 pub enum CarStudyRuns {
     /// A drive.
-    Drive(Box<Drive>),
+    Drive(Box<DriveFile>),
     /// Single shifts, each with power and without: the gears before and after.
     Shifts(Vec<[usize; 2]>),
 }
@@ -46,7 +47,7 @@ pub struct CarStudy {
     /// Title for people.
     pub title: String,
     /// The car that filter and shift controller know.
-    pub car: Car,
+    pub car: CarFile,
     /// What every drawn car does.
     pub what: CarStudyRuns,
     /// Number of cars.
@@ -108,11 +109,11 @@ impl CarStudy {
         let beside = |name: &str| source.path.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
         let of_file = |key: &str, word: &Word| (beside(word.get_ref()), key.to_owned(), word.span().start);
         let (path, key, at) = of_file("vehicle", &raw.vehicle);
-        let car = Car::read(&path).map_err(|error| error.named_by(&source, &key, at))?;
+        let car = CarFile::read(&path).map_err(|error| error.named_by(&source, &key, at))?;
         let drive = match &raw.drive {
             Some(word) => {
                 let (path, key, at) = of_file("drive", word);
-                Some(Drive::read(&path).map_err(|error| error.named_by(&source, &key, at))?)
+                Some(DriveFile::read(&path).map_err(|error| error.named_by(&source, &key, at))?)
             }
             None => None,
         };
@@ -137,14 +138,12 @@ impl CarStudy {
     /// SHA-256 of everything that determines the runs.
     pub fn fingerprint(&self) -> String {
         let drive = match &self.what {
-            CarStudyRuns::Drive(drive) => {
-                format!("{:?}", Drive { source: Source::built_in("", &drive.source.text), ..(**drive).clone() })
-            }
+            CarStudyRuns::Drive(drive) => format!("{}{:?}", drive.source.text, drive.drive),
             CarStudyRuns::Shifts(_) => String::new(),
         };
         // The gearbox is a file of its own: the car as a whole says it.
-        let car = Car { source: Source::built_in("", &self.car.source.text), ..self.car.clone() };
-        let text = [self.source.text.as_str(), &format!("{car:?}"), &drive].join("\u{0}");
+        let car = format!("{}{:?}", self.car.source.text, self.car.car);
+        let text = [self.source.text.as_str(), &car, &drive].join("\u{0}");
         Source { path: PathBuf::new(), text }.sha256()
     }
 }
@@ -162,7 +161,12 @@ impl RawErrors {
     }
 }
 
-fn what(check: &Check<'_>, raw: &RawCarStudy, drive: Option<Drive>, car: &Car) -> Result<CarStudyRuns, ConfigError> {
+fn what(
+    check: &Check<'_>,
+    raw: &RawCarStudy,
+    drive: Option<DriveFile>,
+    car: &Car,
+) -> Result<CarStudyRuns, ConfigError> {
     let shifts = match (drive, &raw.shifts) {
         (Some(drive), None) => return Ok(CarStudyRuns::Drive(Box::new(drive))),
         (None, Some(shifts)) => shifts,

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use car::{Drive, DriveSegment, ShiftPlan, ShiftSchedule, SpeedTrace};
 use drivetrain::Table1;
 use serde::Deserialize;
 use toml::Spanned;
@@ -9,7 +10,7 @@ use toml::Spanned;
 use crate::check::{Check, Number, Numbers, Word};
 use crate::experiment::raw::RawSensors;
 use crate::experiment::sensors::sensors;
-use crate::{Car, ConfigError, Kind, Sensors, Source, SpeedTrace};
+use crate::{CarFile, ConfigError, Kind, Source, file_of, speed_trace};
 
 /// Most repetitions of the segments.
 const MOST_REPETITIONS: f64 = 1e6;
@@ -20,67 +21,22 @@ const SCHEDULE: [[f64; 5]; 3] =
 /// Least time in a gear where a schedule says nothing, s.
 const LEAST_TIME_IN_GEAR_S: f64 = 1.0;
 
-/// A piece of a drive. Each value changes linearly from the first to the second number.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DriveSegment {
-    /// Its length, s.
-    pub duration_s: f64,
-    /// Throttle, 0 to 1.
-    pub throttle: [f64; 2],
-    /// Brake, 0 to 1: share of the largest force of the tyres.
-    pub brake: [f64; 2],
-    /// Grade, rad, positive uphill.
-    pub grade_rad: [f64; 2],
-}
-
-/// When the gearbox shifts.
+/// A drive file.
 #[derive(Debug, Clone, PartialEq)]
-pub enum ShiftPlan {
-    /// By throttle and speed of the gearbox input.
-    Schedule(Box<ShiftSchedule>),
-    /// At given times, in rising order: time, s, and name of the gear.
-    Listed(Vec<(f64, String)>),
-}
-
-/// Lines of a shift schedule.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ShiftSchedule {
-    /// Input speed above which the next gear is taken, over throttle, rad/s.
-    pub up_rad_s: Table1<f64>,
-    /// Input speed below which the gear below is taken, over throttle, rad/s.
-    pub down_rad_s: Table1<f64>,
-    /// Least time in a gear, s.
-    pub time_in_gear_s: f64,
-}
-
-/// A drive.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Drive {
+pub struct DriveFile {
+    /// What it describes.
+    pub drive: Drive,
     /// The file.
     pub source: Source,
-    /// Its name, also that of its results.
-    pub name: String,
     /// The vehicle file, from the folder of the drive file.
     pub vehicle: Option<PathBuf>,
-    /// Time between two rows of the results, s.
-    pub sample_time_s: f64,
-    /// Gear at the start; the first of the gearbox if the file names none.
-    pub start_gear: Option<String>,
-    /// Vehicle speed at the start, m/s.
-    pub start_m_s: f64,
-    /// The pieces; none where the speed is given.
-    pub segments: Vec<DriveSegment>,
-    /// The speed that a driver model follows.
-    pub trace: Option<SpeedTrace>,
-    /// How often they, or the speeds, are driven.
-    pub repetitions: u32,
-    /// When the gearbox shifts.
-    pub shifts: ShiftPlan,
-    /// The sensors that the measured signals go through; without them a car measures exactly.
-    pub sensors: Option<Sensors>,
+    /// The file of the speeds that a driver follows.
+    pub speeds: Option<PathBuf>,
 }
 
-impl Drive {
+file_of!(DriveFile, drive: Drive);
+
+impl DriveFile {
     /// Reads and checks a drive file.
     ///
     /// # Errors
@@ -93,22 +49,13 @@ impl Drive {
     ///
     /// # Errors
     /// It names none, or the vehicle file is wrong.
-    pub fn read_vehicle(&self) -> Result<Car, ConfigError> {
+    pub fn read_vehicle(&self) -> Result<CarFile, ConfigError> {
         let Some(vehicle) = &self.vehicle else {
             let hint = "vehicle = \"../vehicles/eight_speed.toml\", or the option --vehicle".to_owned();
             return Err(Check::of(&self.source).meaning("vehicle", 0, "names no vehicle file".to_owned(), Some(hint)));
         };
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
-        Car::read(&folder.join(vehicle)).map_err(|error| error.named_by(&self.source, "vehicle", 0))
-    }
-
-    /// Length of the drive, s.
-    pub fn duration_s(&self) -> f64 {
-        let once_s = match &self.trace {
-            Some(trace) => trace.duration_s(),
-            None => self.segments.iter().map(|segment| segment.duration_s).sum(),
-        };
-        f64::from(self.repetitions) * once_s
+        CarFile::read(&folder.join(vehicle)).map_err(|error| error.named_by(&self.source, "vehicle", 0))
     }
 
     /// Checks the text of a drive file.
@@ -138,19 +85,20 @@ impl Drive {
             Some(value) => check.number(key, value, range),
             None => Ok(default),
         };
-        Ok(Self {
+        let speeds = trace.as_ref().map(|(path, _)| PathBuf::clone(path));
+        let vehicle = raw.vehicle.as_ref().map(|vehicle| PathBuf::from(vehicle.get_ref()));
+        let drive = Drive {
             name: check.file_name("name", &raw.name)?,
-            vehicle: raw.vehicle.as_ref().map(|vehicle| PathBuf::from(vehicle.get_ref())),
             sample_time_s: optional("sample_time_s", &raw.sample_time_s, 1e-4..=10.0, 0.01)?,
             start_m_s: optional("start.vehicle_m_s", &raw.start.vehicle_m_s, 0.0..=100.0, 0.0)?,
             start_gear: raw.start.gear.map(Spanned::into_inner),
             sensors: raw.sensors.as_ref().map(|raw| sensors(&check, "sensors", raw, None)).transpose()?,
             segments,
-            trace,
+            trace: trace.map(|(_, trace)| trace),
             repetitions,
             shifts,
-            source,
-        })
+        };
+        Ok(Self { drive, vehicle, speeds, source })
     }
 }
 
@@ -224,7 +172,7 @@ fn check_segments(check: &Check<'_>, raw: &Spanned<Vec<RawSegment>>) -> Result<V
     raw.get_ref().iter().map(|segment| check_segment(check, segment)).collect()
 }
 
-fn read_trace(check: &Check<'_>, source: &Source, raw: &RawTrace) -> Result<SpeedTrace, ConfigError> {
+fn read_trace(check: &Check<'_>, source: &Source, raw: &RawTrace) -> Result<(PathBuf, SpeedTrace), ConfigError> {
     let folder = source.path.parent().unwrap_or(Path::new(""));
     let grade_rad = match &raw.grade_rad {
         Some(grade) => check.number("trace.grade_rad", grade, -0.4..=0.4)?,
@@ -232,7 +180,8 @@ fn read_trace(check: &Check<'_>, source: &Source, raw: &RawTrace) -> Result<Spee
     };
     let file = Source::read_list(&folder.join(raw.file.get_ref()));
     let file = file.map_err(|error| error.named_by(source, "trace.file", raw.file.span().start))?;
-    SpeedTrace::from_source(&file, grade_rad)
+    let trace = speed_trace::of_source(&file, grade_rad)?;
+    Ok((file.path, trace))
 }
 
 fn check_segment(check: &Check<'_>, raw: &RawSegment) -> Result<DriveSegment, ConfigError> {

@@ -104,11 +104,11 @@ pub fn read_learnt(gearbox: &Gearbox, source: &Source) -> Result<Learnt<f64>, Co
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Car;
+    use crate::CarFile;
 
     fn gearbox(file: &str, text: &str) -> Gearbox {
         let vehicle = format!("name = \"car\"\ngearbox = \"{file}\"\n");
-        Car::from_sources(Source::built_in("car.toml", &vehicle), Source::built_in(file, text)).unwrap().gearbox
+        CarFile::from_sources(Source::built_in("car.toml", &vehicle), Source::built_in(file, text)).unwrap().car.gearbox
     }
 
     fn eight_speed() -> Gearbox {

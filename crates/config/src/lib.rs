@@ -22,20 +22,41 @@ pub mod vehicle;
 
 pub use all_errors::all_errors;
 pub use car_study::{CarStudy, CarStudyRuns, SampledErrors};
-pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};
+pub use drive::DriveFile;
 pub use error::ConfigError;
-pub use experiment::{
-    CurrentSensor, Experiment, FastFill, GainMethod, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile,
-    ReadingErrors, SAMPLE_TIMES_S, Scenario, Sensors, ShiftCalibration, SpeedSensor,
-};
+pub use experiment::{ExperimentFile, read_sensors, sensors_of};
 pub use gearbox::GearboxFile;
 pub use learnt::{check_learnt, read_learnt, write_learnt};
 pub use source::{Kind, Source, toml_number};
-pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use trace::toml_string;
-pub use vehicle::{
-    Car, CarErrorBounds, CompliantRequirement, DefaultTaken, DesignRequirement, ElementErrorBounds, ElementErrors,
-    ErrorBounds, ErrorBudget, FilterSettings, LockUp, OneShiftError, ShiftClutch, TURBINE_SIDE_INERTIA_KG_M2,
-    Uncertainty, ValveUncertainty, Vehicle,
+pub use vehicle::{CarFile, DefaultTaken, VehicleFile};
+
+// The types that a file is read into, for the time in which their users still name this crate.
+pub use car::{
+    Car, CarErrorBounds, CompliantRequirement, CurrentSensor, DesignRequirement, Drive, DriveSegment,
+    ElementErrorBounds, ElementErrors, ErrorBounds, ErrorBudget, Experiment, FastFill, FilterSettings, GainMethod,
+    GivenGains, LockUp, ObserverEntry, ObserverKind, OffNominal, OneShiftError, Profile, ReadingErrors, SAMPLE_TIMES_S,
+    Scenario, Sensors, ShiftCalibration, ShiftClutch, ShiftPlan, ShiftSchedule, SpeedSensor, SpeedTrace,
+    TURBINE_SIDE_INERTIA_KG_M2, Uncertainty, ValveUncertainty, Vehicle,
 };
+
+/// A file is used as what it describes.
+macro_rules! file_of {
+    ($file:ident, $field:ident: $described:ty) => {
+        impl std::ops::Deref for $file {
+            type Target = $described;
+
+            fn deref(&self) -> &Self::Target {
+                &self.$field
+            }
+        }
+
+        impl std::ops::DerefMut for $file {
+            fn deref_mut(&mut self) -> &mut Self::Target {
+                &mut self.$field
+            }
+        }
+    };
+}
+pub(crate) use file_of;

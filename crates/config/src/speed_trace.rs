@@ -1,6 +1,6 @@
 //! Speeds over time that a driver follows: a file of two columns.
 
-use std::path::PathBuf;
+use car::SpeedTrace;
 
 use crate::check::Check;
 use crate::{ConfigError, Source};
@@ -10,104 +10,53 @@ const FASTEST_M_S: f64 = 100.0;
 /// Columns of speeds, each with its unit in m/s.
 const SPEEDS: [(&str, f64); 3] = [("speed_m_s", 1.0), ("speed_km_h", 1.0 / 3.6), ("speed_mph", 1609.344 / 3600.0)];
 
-/// Speeds over time, linear between the points, on a road of one grade.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SpeedTrace {
-    /// The file.
-    pub path: PathBuf,
-    /// Rising times, s; the first is zero.
-    time_s: Vec<f64>,
-    /// A speed for each, m/s.
-    speed_m_s: Vec<f64>,
-    /// Grade, rad, positive uphill.
-    pub grade_rad: f64,
-}
-
-impl SpeedTrace {
-    /// Reads a file: a head with `time_s` and one of `speed_m_s`, `speed_km_h` and `speed_mph`, then the points. What follows a
-    /// `#` is a comment.
-    ///
-    /// # Errors
-    /// The first line that is wrong.
-    pub fn from_source(source: &Source, grade_rad: f64) -> Result<Self, ConfigError> {
-        let check = Check::of(source);
-        let wrong = |at: usize, message: String, hint: &str| {
-            Err(check.meaning("time_s, speed", at, message, (!hint.is_empty()).then(|| hint.to_owned())))
+/// Reads a file: a head with `time_s` and one of `speed_m_s`, `speed_km_h` and `speed_mph`, then the points. What follows a
+/// `#` is a comment.
+///
+/// # Errors
+/// The first line that is wrong.
+pub(crate) fn of_source(source: &Source, grade_rad: f64) -> Result<SpeedTrace, ConfigError> {
+    let check = Check::of(source);
+    let wrong = |at: usize, message: String, hint: &str| {
+        Err(check.meaning("time_s, speed", at, message, (!hint.is_empty()).then(|| hint.to_owned())))
+    };
+    const HEAD: &str = "the first line is \"time_s,speed_km_h\" (or speed_m_s, speed_mph), then one point in each line";
+    let mut unit_m_s = None;
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    let mut at = 0;
+    for line in source.text.split_inclusive('\n') {
+        let begin = at;
+        at += line.len();
+        let text = line.split('#').next().unwrap_or_default().trim().trim_start_matches('\u{feff}');
+        if text.is_empty() {
+            continue;
+        }
+        let Some((time, speed)) = text.split_once(',') else {
+            return wrong(begin, format!("\"{text}\" has no comma"), HEAD);
         };
-        const HEAD: &str =
-            "the first line is \"time_s,speed_km_h\" (or speed_m_s, speed_mph), then one point in each line";
-        let mut unit_m_s = None;
-        let mut trace = Self { path: source.path.clone(), time_s: Vec::new(), speed_m_s: Vec::new(), grade_rad };
-        let mut at = 0;
-        for line in source.text.split_inclusive('\n') {
-            let begin = at;
-            at += line.len();
-            let text = line.split('#').next().unwrap_or_default().trim().trim_start_matches('\u{feff}');
-            if text.is_empty() {
-                continue;
-            }
-            let Some((time, speed)) = text.split_once(',') else {
-                return wrong(begin, format!("\"{text}\" has no comma"), HEAD);
-            };
-            let (time, speed) = (time.trim(), speed.trim());
-            let Some(unit) = unit_m_s else {
-                let column = SPEEDS.iter().find(|(name, _)| *name == speed && time == "time_s");
-                let Some((_, unit)) = column else { return wrong(begin, format!("the columns are \"{text}\""), HEAD) };
-                unit_m_s = Some(*unit);
-                continue;
-            };
-            let (Ok(time_s), Ok(speed)) = (time.parse::<f64>(), speed.parse::<f64>()) else {
-                return wrong(begin, format!("\"{text}\" is not two numbers"), "");
-            };
-            let speed_m_s = unit * speed;
-            if !(0.0..=FASTEST_M_S).contains(&speed_m_s) {
-                return wrong(begin, format!("the speed is {speed_m_s:.1} m/s, expected 0 to {FASTEST_M_S}"), "");
-            }
-            let follows = trace.time_s.last().map_or(time_s == 0.0, |before| time_s > *before && time_s < 1e9);
-            if !follows {
-                return wrong(begin, format!("the time is {time_s} s"), "times begin at 0 and rise");
-            }
-            trace.time_s.push(time_s);
-            trace.speed_m_s.push(speed_m_s);
+        let (time, speed) = (time.trim(), speed.trim());
+        let Some(unit) = unit_m_s else {
+            let column = SPEEDS.iter().find(|(name, _)| *name == speed && time == "time_s");
+            let Some((_, unit)) = column else { return wrong(begin, format!("the columns are \"{text}\""), HEAD) };
+            unit_m_s = Some(*unit);
+            continue;
+        };
+        let (Ok(time_s), Ok(speed)) = (time.parse::<f64>(), speed.parse::<f64>()) else {
+            return wrong(begin, format!("\"{text}\" is not two numbers"), "");
+        };
+        let speed_m_s = unit * speed;
+        if !(0.0..=FASTEST_M_S).contains(&speed_m_s) {
+            return wrong(begin, format!("the speed is {speed_m_s:.1} m/s, expected 0 to {FASTEST_M_S}"), "");
         }
-        if trace.time_s.len() < 2 {
-            return wrong(0, "the file has fewer than two points".to_owned(), HEAD);
+        let follows = points.last().map_or(time_s == 0.0, |(before, _)| time_s > *before && time_s < 1e9);
+        if !follows {
+            return wrong(begin, format!("the time is {time_s} s"), "times begin at 0 and rise");
         }
-        Ok(trace)
+        points.push((time_s, speed_m_s));
     }
-
-    /// Time of the last point, s.
-    pub fn duration_s(&self) -> f64 {
-        self.time_s.last().copied().unwrap_or(0.0)
-    }
-
-    /// Number of points.
-    pub fn points(&self) -> usize {
-        self.time_s.len()
-    }
-
-    /// Speed at a time, m/s; before the first point and after the last one that of these.
-    pub fn at_m_s(&self, time_s: f64) -> f64 {
-        let after = self.time_s.partition_point(|&point| point <= time_s);
-        match (after.checked_sub(1), self.time_s.get(after)) {
-            (Some(before), Some(next)) => {
-                let share = (time_s - self.time_s[before]) / (next - self.time_s[before]);
-                self.speed_m_s[before] + share * (self.speed_m_s[after] - self.speed_m_s[before])
-            }
-            (Some(last), None) => self.speed_m_s[last],
-            (None, _) => self.speed_m_s.first().copied().unwrap_or(0.0),
-        }
-    }
-
-    /// Lowest and highest speed within this time before and after a time, m/s.
-    pub fn range_m_s(&self, time_s: f64, around_s: f64) -> [f64; 2] {
-        let ends = [self.at_m_s(time_s - around_s), self.at_m_s(time_s + around_s), self.at_m_s(time_s)];
-        let first = self.time_s.partition_point(|&point| point <= time_s - around_s);
-        let last = self.time_s.partition_point(|&point| point < time_s + around_s);
-        let within = self.speed_m_s.get(first..last).unwrap_or_default();
-        let all = || ends.iter().chain(within).copied();
-        [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)]
-    }
+    // The times were checked above: what is left is their number.
+    SpeedTrace::new(points, grade_rad)
+        .map_or_else(|| wrong(0, "the file has fewer than two points".to_owned(), HEAD), Ok)
 }
 
 #[cfg(test)]
@@ -115,7 +64,7 @@ mod tests {
     use super::*;
 
     fn trace(text: &str) -> Result<SpeedTrace, String> {
-        SpeedTrace::from_source(&Source::built_in("t.csv", text), 0.0).map_err(|error| error.to_string())
+        of_source(&Source::built_in("t.csv", text), 0.0).map_err(|error| error.to_string())
     }
 
     #[test]

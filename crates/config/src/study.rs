@@ -6,12 +6,13 @@ mod values;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use car::ObserverEntry;
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers};
 use crate::tree::Tree;
-use crate::{ConfigError, Experiment, Kind, ObserverEntry, Source, Vehicle};
+use crate::{ConfigError, ExperimentFile, Kind, Source, VehicleFile};
 use experiments::{changed_experiment, experiment_tree};
 
 pub use values::{Sometimes, Values};
@@ -106,9 +107,9 @@ pub struct Study {
     /// What varies.
     pub factors: Vec<Factor>,
     /// The vehicle before any change.
-    pub vehicle: Arc<Vehicle>,
+    pub vehicle: Arc<VehicleFile>,
     /// The experiment before any change, with the study's observers.
-    pub experiment: Arc<Experiment>,
+    pub experiment: Arc<ExperimentFile>,
     /// The values of vehicle and experiment.
     trees: [Tree; 2],
 }
@@ -117,11 +118,11 @@ pub struct Study {
 #[derive(Debug, Clone)]
 pub struct Varied {
     /// The simulated car, before the experiment's `off_nominal` differences.
-    pub car: Arc<Vehicle>,
+    pub car: Arc<VehicleFile>,
     /// The parameters of observers and shift controller.
-    pub vehicle: Arc<Vehicle>,
+    pub vehicle: Arc<VehicleFile>,
     /// The experiment.
-    pub experiment: Experiment,
+    pub experiment: ExperimentFile,
 }
 
 #[derive(Deserialize)]
@@ -197,16 +198,16 @@ impl Study {
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let raw: RawStudy = source.parse_as(Kind::Study)?;
         let beside = |name: &str| source.path.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
-        let experiment = Experiment::read(&beside(raw.experiment.get_ref()))
+        let experiment = ExperimentFile::read(&beside(raw.experiment.get_ref()))
             .map_err(|error| error.named_by(&source, "experiment", raw.experiment.span().start))?;
         let vehicle = experiment.read_vehicle()?;
         Self::of(source, experiment, vehicle)
     }
 
-    fn of(source: Source, mut experiment: Experiment, vehicle: Vehicle) -> Result<Self, ConfigError> {
+    fn of(source: Source, mut experiment: ExperimentFile, vehicle: VehicleFile) -> Result<Self, ConfigError> {
         let raw: RawStudy = source.parse()?;
         let check = Check::of(&source);
-        experiment.observers = observers(&check, &raw, experiment.observers)?;
+        experiment.observers = observers(&check, &raw, std::mem::take(&mut experiment.observers))?;
         let factors = raw.factor.get_ref().iter().map(|raw| factor(&check, raw)).collect::<Result<Vec<_>, _>>()?;
         let at = raw.factor.span().start;
         if factors.is_empty() {
@@ -284,8 +285,9 @@ impl Study {
         let of = |target| changes.iter().copied().filter(move |(factor, _)| factor.target == target);
         let [vehicle_tree, experiment_tree] = &self.trees;
         let source = &self.vehicle.source;
-        let changed_vehicle =
-            |changes: &mut dyn Iterator<Item = _>| Vehicle::from_tree(source, &changed(source, vehicle_tree, changes)?);
+        let changed_vehicle = |changes: &mut dyn Iterator<Item = _>| {
+            VehicleFile::from_tree(source, &changed(source, vehicle_tree, changes)?)
+        };
         let vehicle = if of(Target::Vehicle).count() == 0 {
             Arc::clone(&self.vehicle)
         } else {

@@ -261,7 +261,7 @@ impl<'de> Deserializer<'de> for &'de Node {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Experiment, Vehicle};
+    use crate::{ExperimentFile, VehicleFile};
 
     fn path(key: &str) -> Vec<String> {
         key.split('.').map(str::to_owned).collect()
@@ -269,22 +269,22 @@ mod tests {
 
     #[test]
     fn a_file_is_the_same_through_its_tree() {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap();
         let tree = Tree::of(&vehicle.source).unwrap();
-        assert_eq!(Vehicle::from_tree(&vehicle.source, &tree).unwrap(), vehicle);
-        for experiment in Experiment::built_in().unwrap().into_iter().chain([Experiment::bench().unwrap()]) {
+        assert_eq!(VehicleFile::from_tree(&vehicle.source, &tree).unwrap(), vehicle);
+        for experiment in ExperimentFile::built_in().unwrap().into_iter().chain([ExperimentFile::bench().unwrap()]) {
             let tree = Tree::of(&experiment.source).unwrap();
-            assert_eq!(Experiment::from_tree(&experiment.source, &tree).unwrap(), experiment);
+            assert_eq!(ExperimentFile::from_tree(&experiment.source, &tree).unwrap(), experiment);
         }
     }
 
     #[test]
     fn what_is_wrong_with_a_changed_value_is_said_with_its_line_in_the_file() {
-        let source = Vehicle::built_in().unwrap().source;
+        let source = VehicleFile::built_in().unwrap().source;
         let error = |key: &str, change, value| {
             let mut tree = Tree::of(&source).unwrap();
             tree.change(&path(key), change, value).unwrap();
-            Vehicle::from_tree(&source, &tree).unwrap_err().to_string()
+            VehicleFile::from_tree(&source, &tree).unwrap_err().to_string()
         };
         let line = 1 + source.text.lines().position(|line| line.starts_with("mass_kg")).unwrap();
         let heavy = error("vehicle.mass_kg", Change::Scale, 1e6);

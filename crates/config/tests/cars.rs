@@ -1,24 +1,25 @@
 //! Vehicle files with a gearbox file, and drive files.
 
+use car::{ErrorBudget, ShiftPlan};
 use config::gearbox::SHIPPED;
 use config::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
-use config::{Car, Drive, ErrorBudget, ShiftPlan, Source, Vehicle};
+use config::{CarFile, DriveFile, Source, VehicleFile};
 
 const GEARBOX: &str = include_str!("../../../gearboxes/8hp.toml");
 
-fn car(text: &str) -> Result<Car, String> {
+fn car(text: &str) -> Result<CarFile, String> {
     let text = format!("name = \"car\"\ngearbox = \"8hp.toml\"\n{text}");
     let (source, gearbox) = (Source::built_in("car.toml", &text), Source::built_in("8hp.toml", GEARBOX));
-    Car::from_sources(source, gearbox).map_err(|error| error.to_string())
+    CarFile::from_sources(source, gearbox).map_err(|error| error.to_string())
 }
 
-fn drive(text: &str) -> Result<Drive, String> {
-    Drive::from_source(Source::built_in("drive.toml", text)).map_err(|error| error.to_string())
+fn drive(text: &str) -> Result<DriveFile, String> {
+    DriveFile::from_source(Source::built_in("drive.toml", text)).map_err(|error| error.to_string())
 }
 
 #[test]
 fn a_name_and_a_gearbox_are_a_complete_vehicle_file() {
-    let (short, whole) = (car("").unwrap(), Car::eight_speed().unwrap());
+    let (short, whole) = (car("").unwrap(), CarFile::eight_speed().unwrap());
     assert_eq!(short.clutches, whole.clutches);
     assert_eq!((short.engine, short.converter, short.road), (whole.engine, whole.converter, whole.road));
     let named = |key: &str| short.defaults_taken.iter().any(|taken| taken.key == key);
@@ -30,7 +31,7 @@ fn a_name_and_a_gearbox_are_a_complete_vehicle_file() {
 
 #[test]
 fn the_greatest_engine_torque_scales_what_depends_on_the_size_of_a_car() {
-    let shipped = Car::eight_speed().unwrap();
+    let shipped = CarFile::eight_speed().unwrap();
     let same = car("[engine]\nmax_torque_n_m = 190\n").unwrap();
     assert_eq!((same.engine, same.converter, same.driveline), (shipped.engine, shipped.converter, shipped.driveline));
     assert_eq!((same.road, same.tyre, &same.clutches), (shipped.road, shipped.tyre, &shipped.clutches));
@@ -39,7 +40,7 @@ fn the_greatest_engine_torque_scales_what_depends_on_the_size_of_a_car() {
     let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
     close(large.engine.torque(500.0, 1.0), 2.0 * shipped.engine.torque(500.0, 1.0));
     close(large.engine.inertia_kg_m2, 2.0 * shipped.engine.inertia_kg_m2);
-    let capacity = |car: &Car| car.converter.unwrap().capacity_n_m_s2.at(0.5);
+    let capacity = |car: &CarFile| car.converter.unwrap().capacity_n_m_s2.at(0.5);
     close(capacity(&large), 2.0 * capacity(&shipped));
     // Twice the torque through half the ratio.
     close(large.driveline.shaft_stiffness_n_m_rad, shipped.driveline.shaft_stiffness_n_m_rad);
@@ -126,7 +127,7 @@ fn a_first_file_of_every_shipped_gearbox_is_short_and_a_car_of_its_numbers() {
             let file = short_car_file(&facts, &gearbox).unwrap();
             let keys = file.lines().filter(|line| line.contains(" = ")).count();
             assert!((15..=30).contains(&keys), "{name}: {keys}");
-            let made = Car::from_sources(Source::built_in("car.toml", &file), gearbox.clone()).unwrap();
+            let made = CarFile::from_sources(Source::built_in("car.toml", &file), gearbox.clone()).unwrap();
             assert_eq!((made.name.as_str(), made.road.mass_kg), ("car \"x\"", facts.mass_kg));
             assert_eq!(made.converter.is_some(), facts.has_converter);
             // The comments hold the defaults: with all of them as keys it is the same car.
@@ -136,12 +137,12 @@ fn a_first_file_of_every_shipped_gearbox_is_short_and_a_car_of_its_numbers() {
                 .filter(|line| line.contains(" = ") || line.starts_with('['))
                 .map(|line| format!("{line}\n"))
                 .collect();
-            let given = Car::from_sources(Source::built_in("car.toml", &given), gearbox.clone()).unwrap();
+            let given = CarFile::from_sources(Source::built_in("car.toml", &given), gearbox.clone()).unwrap();
             assert!(given.defaults_taken.len() + 10 < made.defaults_taken.len());
             let source = (made.source.clone(), made.defaults_taken.clone());
-            assert_eq!(Car { source: source.0, defaults_taken: source.1, ..given }, made, "{name}");
+            assert_eq!(CarFile { source: source.0, defaults_taken: source.1, ..given }, made, "{name}");
             // Pistons are as large as the engine is strong, and touch at the same pressure.
-            let shipped = Car::from_sources(
+            let shipped = CarFile::from_sources(
                 Source::built_in("car.toml", "name = \"x\"\ngearbox = \"g.toml\"\n"),
                 Source::built_in("g.toml", text),
             )
@@ -183,7 +184,8 @@ fn a_table_fill_gives_the_pistons_a_stroke() {
     assert!(close(own[0], 1.0) && close(own[2], 2.0) && own[3].is_none(), "{own:?}");
     let cold = car("[fill]\n[oil]\ntemperature_degc = 5\n").unwrap();
     assert!(cold.clutches[0].unwrap().cylinder.viscosity_m2_s > 1e-4);
-    let shipped = Car::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed_stroke.toml").as_ref());
+    let shipped =
+        CarFile::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed_stroke.toml").as_ref());
     assert_eq!(shipped.unwrap().clutches, car("[fill]\n").unwrap().clutches);
 }
 
@@ -218,7 +220,7 @@ fn a_valve_with_a_current_of_zero_pressure_is_normally_high() {
     assert!(self::car(pulse).unwrap_err().contains("another kind of valve"));
     let single = include_str!("../../../vehicles/two_speed_at.toml")
         .replace("[clutch.b.valve]\n", "[clutch.b.valve]\nzero_pressure_a = 1.1\n");
-    let error = config::Vehicle::from_source(Source::built_in("v.toml", &single)).unwrap_err().to_string();
+    let error = config::VehicleFile::from_source(Source::built_in("v.toml", &single)).unwrap_err().to_string();
     assert!(
         error.contains("clutch.b.valve.zero_pressure_a") && error.contains("for cars with a gearbox file"),
         "{error}"
@@ -237,7 +239,7 @@ fn the_shipped_vehicle_files_are_right() {
         ("dual_clutch", 2),
     ] {
         let path = format!("{folder}{name}.toml");
-        let car = Car::read(path.as_ref()).unwrap();
+        let car = CarFile::read(path.as_ref()).unwrap();
         assert_eq!(car.clutches.iter().flatten().count(), elements, "{name}");
         assert_eq!(Source::read(path.as_ref()).unwrap().kind().unwrap(), config::Kind::Car);
     }
@@ -278,7 +280,7 @@ fn wrong_vehicle_files_get_their_line_and_a_hint() {
 fn a_gearbox_with_elements_without_plates_is_refused() {
     let of = |gearbox: &str| {
         let source = Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
-        Car::from_sources(source, Source::built_in("g.toml", gearbox)).unwrap_err().to_string()
+        CarFile::from_sources(source, Source::built_in("g.toml", gearbox)).unwrap_err().to_string()
     };
     let at = GEARBOX.find("pack = {").unwrap();
     let end = at + GEARBOX[at..].find('}').unwrap() + 1;
@@ -289,7 +291,7 @@ fn a_gearbox_with_elements_without_plates_is_refused() {
 #[test]
 fn a_vehicle_with_a_gearbox_is_not_one_with_a_single_shift() {
     let text = include_str!("../../../vehicles/eight_speed.toml");
-    let error = config::Vehicle::from_source(Source::built_in("v.toml", text)).unwrap_err().to_string();
+    let error = config::VehicleFile::from_source(Source::built_in("v.toml", text)).unwrap_err().to_string();
     assert!(error.contains("v.toml:1: `gearbox`: is a vehicle with a whole gearbox"), "{error}");
 }
 
@@ -298,9 +300,9 @@ fn a_file_that_names_no_gearbox_is_told_so() {
     let folder = std::env::temp_dir();
     let path = folder.join(format!("wetclutch_no_gearbox_{}.toml", std::process::id()));
     std::fs::write(&path, "name = \"car\"\n").unwrap();
-    let error = Car::read(&path).unwrap_err().to_string();
+    let error = CarFile::read(&path).unwrap_err().to_string();
     std::fs::write(&path, "name = \"car\"\ngearbox = \"nowhere.toml\"\n").unwrap();
-    let missing = Car::read(&path).unwrap_err().to_string();
+    let missing = CarFile::read(&path).unwrap_err().to_string();
     std::fs::remove_file(&path).unwrap();
     assert!(error.contains("names no gearbox file\nhint: gearbox = "), "{error}");
     assert!(missing.contains(":2: `gearbox`") && missing.contains("nowhere.toml"), "{missing}");
@@ -370,7 +372,7 @@ fn bounds_that_do_not_contain_the_valve_of_the_file_are_refused() {
     let text = include_str!("../../../vehicles/two_speed_at.toml");
     let late = text.replacen("valve_delay_s = [", "valve_delay_s = [0.1, 0.2] # [", 1);
     assert_ne!(late, text);
-    let message = Vehicle::from_source(Source::built_in("v.toml", &late)).unwrap_err().to_string();
+    let message = VehicleFile::from_source(Source::built_in("v.toml", &late)).unwrap_err().to_string();
     assert!(message.contains("`design.error_bounds.valve_delay_s`: 0.1 to 0.2 does not contain"), "{message}");
 }
 
@@ -378,7 +380,7 @@ fn bounds_that_do_not_contain_the_valve_of_the_file_are_refused() {
 fn one_pulse_width_valve_changes_no_limit_of_the_others() {
     let pulse_width = "[clutch.B.valve]\nkind = \"pulse-width\"\nflow_sqrt_pa_s = 6000\nline_pressure_pa = 1.6e6\ndelay = { duty_percent = [0.0, 100.0], delay_s = [0.016, 0.016] }\n";
     let (alone, mixed) = (car("").unwrap(), car(pulse_width).unwrap());
-    let [alone, mixed] = [&alone, &mixed].map(ErrorBudget::of_car);
+    let [alone, mixed] = [&alone.car, &mixed.car].map(ErrorBudget::of_car);
     let mut others = 0;
     for (alone, mixed) in alone.elements.iter().flatten().zip(mixed.elements.iter().flatten()) {
         if mixed.command_max == 100.0 {

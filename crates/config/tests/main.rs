@@ -9,3 +9,4 @@ mod gearbox_errors;
 mod gearboxes;
 mod mutations;
 mod one_shift;
+mod ratios_alone;

@@ -1,7 +1,7 @@
 //! Files with one thing wrong in them: each is refused with its reason or accepted, and none stops the program.
 
 use crate::common::{EXPERIMENT, FILL, STROKE, STUDY, VEHICLE, mutations};
-use config::{Car, ConfigError, Drive, Experiment, GearboxFile, Sensors, Source, Study, Vehicle};
+use config::{CarFile, ConfigError, DriveFile, ExperimentFile, GearboxFile, Source, Study, VehicleFile};
 
 /// Every error but those of reading names a line of the file.
 fn has_its_place(error: &ConfigError, path: &str, lines: usize, mutation: &str) {
@@ -16,14 +16,14 @@ fn every_mutation_of_a_vehicle_file_is_refused_with_its_place_or_accepted() {
     let mut accepted = 0;
     let all = mutations(VEHICLE);
     for (n, (name, text)) in all.iter().enumerate() {
-        match Vehicle::from_source(Source::built_in("v.toml", text)) {
+        match VehicleFile::from_source(Source::built_in("v.toml", text)) {
             Ok(_) => accepted += 1,
             Err(error) => has_its_place(&error, "v.toml", text.lines().count(), name),
         }
         let over = Source::built_in("over.toml", text);
         let _ = over.kind();
         if n % 8 == 0 {
-            let checked = Vehicle::check_overlay(&over);
+            let checked = VehicleFile::check_overlay(&over);
             checked.unwrap_or_else(|error| has_its_place(&error, "over.toml", text.lines().count(), name));
         }
     }
@@ -58,7 +58,7 @@ fn every_mutation_of_a_vehicle_file_with_a_gearbox_is_refused_with_its_place_or_
     let all = mutations(file);
     for (name, text) in &all {
         let gearbox = Source::built_in("g.toml", include_str!("../../../gearboxes/8hp.toml"));
-        match Car::from_sources(Source::built_in("c.toml", text), gearbox) {
+        match CarFile::from_sources(Source::built_in("c.toml", text), gearbox) {
             Ok(_) => accepted += 1,
             // A list may not fit the one that is taken from the shipped file.
             Err(error) if error.path().ends_with("eight_speed.toml") => (),
@@ -73,7 +73,7 @@ fn every_mutation_of_a_drive_file_is_refused_with_its_place_or_accepted() {
     let mut accepted = 0;
     let all = mutations(include_str!("../../../drives/city.toml"));
     for (name, text) in &all {
-        match Drive::from_source(Source::built_in("d.toml", text)) {
+        match DriveFile::from_source(Source::built_in("d.toml", text)) {
             Ok(drive) => {
                 assert!(drive.duration_s().is_finite());
                 accepted += 1;
@@ -86,13 +86,13 @@ fn every_mutation_of_a_drive_file_is_refused_with_its_place_or_accepted() {
 
 #[test]
 fn every_mutation_of_an_experiment_file_is_refused_with_its_place_or_accepted() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap();
     let mut accepted = 0;
     let all = mutations(EXPERIMENT);
     for (name, text) in &all {
         let source = Source::built_in("e.toml", text);
         let _ = source.kind();
-        let checked = Experiment::from_source(source).and_then(|e| e.check_observers(&vehicle).map(|()| e));
+        let checked = ExperimentFile::from_source(source).and_then(|e| e.check_observers(&vehicle).map(|()| e));
         match checked {
             Ok(experiment) => {
                 accepted += 1;
@@ -125,7 +125,7 @@ fn every_mutation_of_cylinders_hysteresis_and_backlash_is_refused_with_its_place
     let all = mutations_between(&text, "hysteresis_pa = ", "wheel_inertia_kg_m2 = ");
     let mut accepted = 0;
     for (name, text) in &all {
-        match Vehicle::from_source(Source::built_in("v.toml", text)) {
+        match VehicleFile::from_source(Source::built_in("v.toml", text)) {
             Ok(vehicle) => {
                 accepted += 1;
                 let cylinder = vehicle.oncoming.cylinder;
@@ -142,7 +142,7 @@ fn every_mutation_of_a_fast_fill_is_refused_with_its_place_or_accepted() {
     let all = mutations_between(FILL, "[shift.fill]", "[shift.torque_phase]");
     let mut accepted = 0;
     for (name, text) in &all {
-        match Experiment::from_source(Source::built_in("e.toml", text)) {
+        match ExperimentFile::from_source(Source::built_in("e.toml", text)) {
             Ok(_) => accepted += 1,
             Err(error) => has_its_place(&error, "e.toml", text.lines().count(), name),
         }
@@ -161,7 +161,7 @@ fn every_mutation_of_a_study_file_is_refused_or_accepted() {
             let ends: Vec<f64> = study.factors.iter().map(|factor| factor.values.ends()[1]).collect();
             assert!(ends.iter().all(|end| end.is_finite()), "{name}");
         }
-        let _ = Sensors::read(&path);
+        let _ = config::read_sensors(&path);
     }
     std::fs::remove_dir_all(&folder).unwrap();
 }

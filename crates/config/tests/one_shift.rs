@@ -1,6 +1,8 @@
 //! The vehicle of one shift of a car with a gearbox.
 
-use config::{Car, Source, Vehicle};
+use car::one_shift::ACCELERATION_ERRORS_RAD_S2;
+use car::{Car, Vehicle};
+use config::{CarFile, Source, VehicleFile};
 use drivetrain::Valve;
 
 fn shipped(vehicle: &str, gearbox: &str) -> Car {
@@ -8,11 +10,13 @@ fn shipped(vehicle: &str, gearbox: &str) -> Car {
         let text = std::fs::read_to_string(format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"))).unwrap();
         Source { path: path.into(), text }
     };
-    Car::from_sources(read(format!("vehicles/{vehicle}.toml")), read(format!("gearboxes/{gearbox}.toml"))).unwrap()
+    CarFile::from_sources(read(format!("vehicles/{vehicle}.toml")), read(format!("gearboxes/{gearbox}.toml")))
+        .unwrap()
+        .car
 }
 
 fn eight_speed() -> Car {
-    Car::eight_speed().unwrap()
+    CarFile::eight_speed().unwrap().car
 }
 
 fn of(car: &Car, shift: &str) -> Result<Vehicle, String> {
@@ -30,8 +34,8 @@ fn near(a: f64, b: f64, within: f64) {
 fn the_two_speed_gearbox_gives_the_built_in_vehicle() {
     let text = "name = \"two speeds\"\ngearbox = \"two_speed.toml\"\n[hydraulics]\nline_pressure_pa = 1.0e6\n";
     let gearbox = Source::built_in("two_speed.toml", include_str!("../../../gearboxes/two_speed.toml"));
-    let found = of(&Car::from_sources(Source::built_in("two.toml", text), gearbox).unwrap(), "1-2").unwrap();
-    let built_in = Vehicle::built_in().unwrap();
+    let found = of(&CarFile::from_sources(Source::built_in("two.toml", text), gearbox).unwrap(), "1-2").unwrap();
+    let built_in = VehicleFile::built_in().unwrap().vehicle;
     assert_eq!((found.engine, found.converter), (built_in.engine, built_in.converter));
     assert_eq!((found.driveline, found.road), (built_in.driveline, built_in.road));
     near(found.output_inertia_kg_m2, built_in.output_inertia_kg_m2, 1e-12);
@@ -55,10 +59,80 @@ fn the_two_speed_gearbox_gives_the_built_in_vehicle() {
     assert!((0.9..1.0).contains(&model_error(|vehicle| vehicle.torque_phase.model_error_max_rad_s2)));
     near(model_error(|vehicle| vehicle.inertia_phase.model_error_max_rad_s2), 1.0, 0.1);
     near(found.filter.offgoing_n_m, built_in.filter.offgoing_n_m, 1e-9);
-    assert_eq!(found.supervisor, built_in.supervisor);
+    assert_eq!(found.phase_slips, built_in.phase_slips);
     // The turbine torque is within 10 % of 133 N m, the inertia of 0.06 kg m^2 and more within 20 %.
     near(own.turbine_torque_n_m, 13.3, 1e-9);
     near(own.inertia_torque_n_m, 0.2 * found.shift.mass_kg_m2[0][0] * 600.0, 1e-9);
+}
+
+/// What a shift has in common with the built-in vehicle stands in both.
+#[test]
+fn what_no_car_scales_is_that_of_the_vehicle_files_of_one_shift() {
+    let pulse_width = "kind = \"pulse-width\"\nflow_sqrt_pa_s = 6000\nline_pressure_pa = 2.0e6\n\
+        delay = { duty_percent = [0.0, 100.0], delay_s = [0.016, 0.016] }\n";
+    let text = format!("name = \"car\"\ngearbox = \"8hp.toml\"\n[clutch.C.valve]\n{pulse_width}");
+    let gearbox = Source::built_in("8hp.toml", include_str!("../../../gearboxes/8hp.toml"));
+    let by_duty_cycle = CarFile::from_sources(Source::built_in("car.toml", &text), gearbox).unwrap().car;
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_pwm.toml");
+    let pwm = VehicleFile::read(path.as_ref()).unwrap().vehicle;
+    let built_in = VehicleFile::built_in().unwrap().vehicle;
+    for (found, other) in [(of(&eight_speed(), "2-3").unwrap(), built_in), (of(&by_duty_cycle, "2-3").unwrap(), pwm)] {
+        assert_eq!((found.phase_slips, found.speed_max_rad_s), (other.phase_slips, other.speed_max_rad_s));
+        assert_eq!(
+            (found.uncertainty.valve, found.shaft_settling_s),
+            (other.uncertainty.valve, other.shaft_settling_s)
+        );
+        let settling = |vehicle: &Vehicle| {
+            let (torque, inertia) = (&vehicle.torque_phase, &vehicle.inertia_phase);
+            let compliant = (&vehicle.compliant_torque_phase, &vehicle.compliant_inertia_phase);
+            [
+                (torque.settling_time_s, torque.kappa1_per_s),
+                (inertia.settling_time_s, inertia.kappa1_per_s),
+                (compliant.0.settling_time_s, compliant.0.kappa1_per_s),
+                (compliant.1.settling_time_s, compliant.1.kappa1_per_s),
+            ]
+        };
+        assert_eq!(settling(&found), settling(&other));
+        let of_pressure = |vehicle: &Vehicle| {
+            let size = vehicle.error_bounds.shift_pressure_pa;
+            [vehicle.torque_phase.offset_max_pa, vehicle.inertia_phase.offset_max_pa, vehicle.error_bounds.pressure_pa]
+                .map(|pressure_pa| pressure_pa / size)
+        };
+        for (own, other) in of_pressure(&found).into_iter().zip(of_pressure(&other)) {
+            near(own, other, 1e-12);
+        }
+        let same = |vehicle: &Vehicle| {
+            let (bounds, filter) = (&vehicle.error_bounds, &vehicle.filter);
+            let of_bounds = [
+                bounds.grade_rad,
+                bounds.offgoing_drain_s,
+                bounds.turbine_quantum_rad_s,
+                bounds.output_quantum_rad_s,
+                bounds.wheel_quantum_rad_s,
+                bounds.sampling_delay_s,
+                bounds.float32_rounding,
+                bounds.command_age_s,
+                bounds.command,
+                bounds.wheel_delay_s,
+                bounds.channel_skew_s,
+                bounds.backlash_rad,
+            ];
+            let of_filter = [
+                filter.turbine_share,
+                filter.turbine_share_s,
+                filter.twist_rate_rad_s,
+                filter.valve_rate_s,
+                filter.offgoing_release_s,
+                filter.output_least_rad_s,
+            ];
+            (of_bounds, of_filter)
+        };
+        assert_eq!(same(&found), same(&other));
+    }
+    let errors = VehicleFile::built_in().unwrap().acceleration_errors();
+    for (own, other) in ACCELERATION_ERRORS_RAD_S2.into_iter().zip(errors) {
+        near(own, other, 1e-12);
+    }
 }
 
 #[test]
@@ -119,7 +193,7 @@ fn a_normally_high_valve_is_commanded_by_the_current_below_the_one_without_press
         delay = { current_a = [0.0, 1.2], delay_s = [0.01, 0.01] }\n";
     let text = format!("name = \"car\"\ngearbox = \"8hp.toml\"\n{valve}");
     let gearbox = Source::built_in("8hp.toml", include_str!("../../../gearboxes/8hp.toml"));
-    let car = Car::from_sources(Source::built_in("car.toml", &text), gearbox).unwrap();
+    let car = CarFile::from_sources(Source::built_in("car.toml", &text), gearbox).unwrap().car;
     let vehicle = of(&car, "2-3").unwrap();
     assert!(car.clutches[2].unwrap().valve.falls() && !vehicle.oncoming.valve.falls());
     assert_eq!(vehicle.observer_valve, Valve::Proportional { time_constant_s: 0.05, gain_pa_a: 1.5e6 });

@@ -1,6 +1,6 @@
 //! The filter for every shift of a gearbox: its tables from the gear train, and what it does not know from budgets.
 
-use config::{Car, ElementErrors, ErrorBudget, Sensors};
+use car::{Car, ElementErrors, ErrorBudget, Sensors};
 use drivetrain::{Cylinder, Real};
 use geartrain::{Change, ElementKind, Gear, Gearbox};
 use observer::any_shift::{

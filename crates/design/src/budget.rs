@@ -1,6 +1,6 @@
 //! What the bounds of the vehicle file's error budget come to in the units of a design.
 
-use config::Vehicle;
+use car::Vehicle;
 use drivetrain::{ClutchValve, Valve};
 use observer::Phase;
 
@@ -79,12 +79,14 @@ pub fn mass_n_m(vehicle: &Vehicle) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use config::VehicleFile;
+
     use super::*;
     use drivetrain::{Table1, ValveMaps};
 
     #[test]
     fn a_valve_that_is_what_the_observers_are_told_has_no_error() {
-        let mut vehicle = Vehicle::built_in().unwrap();
+        let mut vehicle = VehicleFile::built_in().unwrap().vehicle;
         let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve else { panic!() };
         vehicle.oncoming.valve = ClutchValve::Proportional(ValveMaps {
             time_constant_s: Table1::constant(time_constant_s),

@@ -1,6 +1,6 @@
 //! What is promised about a gain, and the check of it that needs no solver.
 
-use config::Vehicle;
+use car::Vehicle;
 use nalgebra::DMatrix;
 use observer::{Discretisation, Phase};
 use serde::Serialize;
@@ -50,8 +50,6 @@ pub struct Certificate {
     pub slip_directions: &'static str,
     /// Iterations of the conic solver.
     pub solver_iterations: u32,
-    /// SHA-256 of the vehicle file.
-    pub vehicle_sha256: String,
 }
 
 impl Certificate {
@@ -92,7 +90,6 @@ impl Certificate {
             vertices,
             slip_directions: BOTH_DIRECTIONS,
             solver_iterations: 0,
-            vehicle_sha256: String::new(),
         })
     }
 

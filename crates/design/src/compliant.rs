@@ -11,11 +11,10 @@
 //!
 //! and the remaining error is at most `|w| sqrt(lambda_max(H' L' L H)/(4 kappa1 kappa2))`, Eq. (2.81).
 
-use config::Vehicle;
+use car::Vehicle;
 use nalgebra::DMatrix;
 use observer::{CompliantGains, CompliantModel, CompliantObserver, Discretisation, Phase, Schedule};
 use serde::Serialize;
-use trace::ShownPath as _;
 
 use crate::budget::{grade_n_m, mass_n_m, turbine_n_m};
 use crate::certificate::BOTH_DIRECTIONS;
@@ -100,8 +99,6 @@ pub struct CompliantCertificate {
     pub slip_directions: &'static str,
     /// Iterations of the conic solver.
     pub solver_iterations: u32,
-    /// SHA-256 of the vehicle file.
-    pub vehicle_sha256: String,
 }
 
 /// Certified gains of the compliant observer in both phases.
@@ -220,7 +217,7 @@ pub fn error_matrix(vehicle: &Vehicle, phase: Phase) -> DMatrix<f64> {
     }
 }
 
-fn required(vehicle: &Vehicle, phase: Phase) -> &config::CompliantRequirement {
+fn required(vehicle: &Vehicle, phase: Phase) -> &car::CompliantRequirement {
     match phase {
         Phase::InertiaPhase | Phase::AfterShift => &vehicle.compliant_inertia_phase,
         Phase::BeforeShift | Phase::TorquePhase => &vehicle.compliant_torque_phase,
@@ -311,7 +308,7 @@ pub fn best_compliant_phase(
         let key = format!("design.compliant.{}.offset_max_pa", phase.name());
         OffsetMissed {
             phase,
-            required_by: format!("`{key}` of {}", vehicle.source.path.shown()),
+            required_by: format!("`{key}` of {}", vehicle.name),
             required_pa: requirement.offset_max_pa,
             settling_time_s,
             offset_pa: certificate.offset_pa,
@@ -321,7 +318,7 @@ pub fn best_compliant_phase(
             reached_with_s: settling_time_for(requirement.offset_max_pa, settling_time_s, offset),
         }
     });
-    Ok((CompliantCertificate { vehicle_sha256: vehicle.source.sha256(), ..certificate }, missed))
+    Ok((certificate, missed))
 }
 
 /// `A22` and `G` at every combination of the extremes of friction and valve, Eq. (2.69), (2.70), (2.82).
@@ -466,18 +463,19 @@ fn check(
         vertices: margins,
         slip_directions: BOTH_DIRECTIONS,
         solver_iterations: 0,
-        vehicle_sha256: String::new(),
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use config::VehicleFile;
+
     use super::*;
 
     /// The gain of the inertia phase is not unique by its cost; it must not depend on how the program is scaled.
     #[test]
     fn the_gain_of_least_norm_is_the_same_however_the_program_is_scaled() {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let phase = Phase::InertiaPhase;
         let (requirement, vertices) = (compliant_requirement(&vehicle, phase), vertices(&vehicle, phase));
         let at = |unit| {

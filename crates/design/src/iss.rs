@@ -12,7 +12,7 @@
 
 use std::fmt;
 
-use config::DesignRequirement;
+use car::DesignRequirement;
 use nalgebra::DMatrix;
 use observer::Phase;
 

@@ -1,6 +1,6 @@
 //! The Kalman filters of a vehicle: what it does not know, from the error budget and the sensors.
 
-use config::{Sensors, SpeedSensor, Vehicle};
+use car::{Sensors, SpeedSensor, Vehicle};
 use drivetrain::ReducedShift;
 use observer::{
     EngineNoise, ExtendedFilter, FilterNoise, KalmanFilter, OffgoingClutch, Readings, ReportedTorque, SpeedReading,
@@ -9,7 +9,7 @@ use observer::{
 
 use crate::budget::{ValveErrors, shift_pressure, shift_time_constant};
 use crate::compliant::compliant_model;
-use crate::rigid::tracker;
+use crate::rigid::{input_limits, supervisor, tracker};
 
 /// Least standard deviation of a speed reading, rad/s \[chosen\].
 const READING_RAD_S: f64 = 0.02;
@@ -96,7 +96,7 @@ pub(crate) fn engine_noise(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> 
 /// ```
 /// # use observer::{Estimator, Input, Reading};
 /// # let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml"));
-/// let vehicle = config::Vehicle::read(path)?;
+/// let vehicle = config::VehicleFile::read(path)?.vehicle;
 /// let observer = design::kalman_filter(&vehicle, None).cast::<f32>();
 /// let range = design::range(&vehicle).guaranteed().cast::<f32>();
 /// let for_the_controller = observer::Bounded { observer, range };
@@ -142,8 +142,8 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         (speed_reading(sensors.map(|sensors| &sensors.engine), budget.turbine_quantum_rad_s), engine),
         offgoing,
         reported,
-        vehicle.supervisor,
-        vehicle.limits,
+        supervisor(vehicle),
+        input_limits(vehicle),
     )
 }
 

@@ -14,10 +14,10 @@
 //! inequality in it is evaluated again by eigenvalues, not taken from the solver.
 //!
 //! ```
-//! use config::Vehicle;
+//! use config::VehicleFile;
 //! use design::design_rigid;
 //!
-//! let designed = design_rigid(&Vehicle::built_in()?)?;
+//! let designed = design_rigid(&VehicleFile::built_in()?.vehicle)?;
 //! let certificate = &designed.inertia_phase;
 //! assert!((certificate.gain_pa_s_rad[0] + 783.7).abs() < 0.1);
 //! assert!((certificate.offset_pa - 49.9e3).abs() < 0.1e3);
@@ -47,7 +47,6 @@ pub use any_shift::{ShiftTables, any_shift_filter, shift_uncertainty};
 pub use budget::{ValveErrors, shift_time_constant};
 pub use certificate::{Certificate, VertexMargin, error_bound};
 pub use compliant::{CompliantCertificate, CompliantDesign, best_compliant, compliant_observer, design_compliant};
-pub use config::{ElementErrors, ErrorBudget};
 pub use discrete::given::{UnstableCorner, longest_stable_step_s, longest_step_of, unstable_corners};
 pub use discrete::{
     DiscreteCertificate, DiscreteDesign, Model, Quantity, SolverRecord, design_discrete, design_discrete_phase,
@@ -57,7 +56,8 @@ pub use kalman::{extended_filter, kalman_filter, open_loop_maps, unscented_filte
 pub use open_loop::{compliant_open_loop_phases, open_loop_bound_pa, rigid_open_loop_phases};
 pub use polytope::{Polytope, Vertex};
 pub use rigid::{
-    RigidDesign, best_rigid, bounded, design_rigid, range, requirement, rigid_model, rigid_observer, tracker,
+    RigidDesign, best_rigid, bounded, design_rigid, input_limits, range, requirement, rigid_model, rigid_observer,
+    supervisor, tracker,
 };
 pub use rivals::{inversion, super_twisting};
 pub use sliding::{design_sliding, sliding_observer};

@@ -1,6 +1,6 @@
 //! Whether a gain does anything: one whose corrections do not change the estimate is the open loop, whatever its digits.
 
-use config::Vehicle;
+use car::Vehicle;
 use nalgebra::DMatrix;
 use observer::{CompliantGains, Phase, RigidGains, Schedule};
 
@@ -76,12 +76,14 @@ fn phases(is_open_loop: impl Fn(Phase) -> bool) -> Vec<Phase> {
 
 #[cfg(test)]
 mod tests {
+    use config::VehicleFile;
+
     use super::*;
 
     /// What a gain does to the estimate decides, and not its size.
     #[test]
     fn a_gain_is_the_open_loop_by_its_effect_on_the_bound() {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let is_one =
             |vehicle: &Vehicle, gain: f64| is_open_loop(vehicle, Model::Rigid, Phase::InertiaPhase, &[gain, 0.0], 0.01);
         assert!(is_one(&vehicle, 0.0) && !is_one(&vehicle, -6323.0));

@@ -1,6 +1,6 @@
 //! The polytope in which the observer's error dynamics lie, Eq. (2.46).
 
-use config::{Uncertainty, ValveUncertainty};
+use car::{Uncertainty, ValveUncertainty};
 use drivetrain::Valve;
 use observer::{Phase, RigidModel};
 use serde::Serialize;

@@ -1,12 +1,11 @@
 //! From a vehicle to the rigid observer: model, polytopes, gains, certificates.
 
-use config::{DesignRequirement, Vehicle};
+use car::{DesignRequirement, Vehicle};
 use observer::{
-    Bounded, Budget, Discretisation, Phase, RangeEstimator, RigidGains, RigidModel, RigidObserver, Schedule,
-    ShaftErrors, ShaftRange, Tracker,
+    Bounded, Budget, Discretisation, InputLimits, Phase, RangeEstimator, RigidGains, RigidModel, RigidObserver,
+    Schedule, ShaftErrors, ShaftRange, Supervisor, Tracker,
 };
 use serde::Serialize;
-use trace::ShownPath as _;
 
 use crate::iss::{OffsetMissed, required, settling_time_for};
 use crate::{Certificate, DesignError, IssRequirement, Polytope, design_iss};
@@ -81,10 +80,32 @@ pub fn tracker(vehicle: &Vehicle) -> Tracker<f64> {
     Tracker {
         valve: vehicle.observer_valve,
         shift: vehicle.shift,
-        supervisor: vehicle.supervisor,
-        limits: vehicle.limits,
+        supervisor: supervisor(vehicle),
+        limits: input_limits(vehicle),
         discretisation: Discretisation::Exact,
         sample_max_s: SAMPLE_MAX_S,
+    }
+}
+
+/// The phase supervisor of this vehicle.
+pub fn supervisor(vehicle: &Vehicle) -> Supervisor<f64> {
+    let slips = &vehicle.phase_slips;
+    Supervisor {
+        kiss_pressure_pa: vehicle.oncoming.clutch.kiss_pressure(),
+        release_slip_rad_s: slips.release_slip_rad_s,
+        lock_slip_rad_s: slips.lock_slip_rad_s,
+        lock_hold_s: slips.lock_hold_s,
+    }
+}
+
+/// What a reading or an estimate of this vehicle can be.
+pub fn input_limits(vehicle: &Vehicle) -> InputLimits<f64> {
+    InputLimits {
+        speed_max_rad_s: vehicle.speed_max_rad_s,
+        command_max: vehicle.command_max,
+        command_error: vehicle.error_bounds.command,
+        pressure_max_pa: vehicle.error_bounds.pressure_max_pa,
+        shaft_torque_max_n_m: vehicle.shaft_torque_max_n_m(),
     }
 }
 
@@ -174,7 +195,7 @@ pub fn best_phase(
         let offset = |kappa2_per_s| design(kappa2_per_s).ok().map(|certificate| certificate.offset_pa);
         OffsetMissed {
             phase,
-            required_by: format!("`design.{}.offset_max_pa` of {}", phase.name(), vehicle.source.path.shown()),
+            required_by: format!("`design.{}.offset_max_pa` of {}", phase.name(), vehicle.name),
             required_pa: requirement.offset_max_pa,
             settling_time_s,
             offset_pa: certificate.offset_pa,
@@ -184,5 +205,5 @@ pub fn best_phase(
             reached_with_s: settling_time_for(requirement.offset_max_pa, settling_time_s, offset),
         }
     });
-    Ok((Certificate { vehicle_sha256: vehicle.source.sha256(), ..certificate }, missed))
+    Ok((certificate, missed))
 }

@@ -1,6 +1,6 @@
 //! Observers without a certificate, with the parameters that the vehicle file's error budget gives them.
 
-use config::Vehicle;
+use car::Vehicle;
 use observer::{Inversion, Phase, SuperTwisting};
 
 use crate::budget::{ValveErrors, shift_time_constant};

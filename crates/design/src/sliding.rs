@@ -5,7 +5,7 @@
 //! `1/tau + mu R N A (ks3 C13/ks1 + ks4 (C13-C23)/ks2)`; the pressure gains follow from the wanted decay, shared
 //! between the outputs in the direction in which the pressure moves them.
 
-use config::Vehicle;
+use car::Vehicle;
 use drivetrain::ShiftTorques;
 use observer::{Phase, SlidingGains, SlidingObserver};
 

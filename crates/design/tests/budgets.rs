@@ -1,6 +1,7 @@
 //! Error budgets with no entry and with one: none may panic a design.
 
-use config::{ErrorBounds, GainMethod, Vehicle};
+use car::{ErrorBounds, GainMethod, Vehicle};
+use config::VehicleFile;
 use design::{
     Model, Quantity, design_discrete_phase, extended_filter, kalman_filter, super_twisting, unscented_filter,
 };
@@ -84,7 +85,7 @@ const ENTRIES: [Entry; 22] = [
 
 /// The built-in car with a valve that is what the observers are told, so that nothing is left of its errors.
 fn known_valve() -> Vehicle {
-    let mut vehicle = Vehicle::built_in().unwrap();
+    let mut vehicle = VehicleFile::built_in().unwrap().vehicle;
     let drivetrain::Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve else { panic!() };
     vehicle.oncoming.valve = ClutchValve::Proportional(ValveMaps {
         time_constant_s: Table1::constant(time_constant_s),
@@ -145,7 +146,7 @@ fn without_errors_the_open_loop_serves_and_its_bound_is_zero() {
 
 #[test]
 fn a_budget_without_errors_has_a_design() {
-    for (turn, mut vehicle) in [Vehicle::built_in().unwrap(), known_valve()].into_iter().enumerate() {
+    for (turn, mut vehicle) in [VehicleFile::built_in().unwrap().vehicle, known_valve()].into_iter().enumerate() {
         vehicle.error_bounds = without_errors(&vehicle);
         filters_are_finite(&vehicle, "no entry");
         designs_hold(&vehicle, turn, "no entry");
@@ -154,7 +155,7 @@ fn a_budget_without_errors_has_a_design() {
 
 #[test]
 fn a_budget_of_one_entry_has_a_design() {
-    let file = Vehicle::built_in().unwrap();
+    let file = VehicleFile::built_in().unwrap().vehicle;
     for (turn, (name, put)) in ENTRIES.into_iter().enumerate() {
         // A valve whose told gain is off leaves an error of its own.
         let mut vehicle = if turn % 2 == 0 { file.clone() } else { known_valve() };

@@ -4,7 +4,8 @@ use std::sync::Mutex;
 
 use crate::common::sampled::{Disturbance, SampledCar, disturbance};
 use crate::common::{Car, DISCRETISATION_PA, DT_S};
-use config::{GainMethod, Vehicle};
+use car::GainMethod;
+use config::VehicleFile;
 use design::{DiscreteDesign, Model, design_discrete, design_rigid};
 use observer::Phase;
 use proptest::prelude::*;
@@ -19,7 +20,7 @@ proptest! {
         initial in -0.2e6..0.2e6_f64,
         errors in prop::collection::vec((0.0..1.0_f64, 0.0..6.3_f64), 15),
     ) {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let design = design_rigid(&vehicle).unwrap();
         let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
         let certificate = design.of(phase).unwrap();
@@ -55,7 +56,7 @@ fn designed(method: GainMethod, sample_time: usize) -> DiscreteDesign {
     if let Some((_, design)) = designs.iter().find(|(of, _)| *of == key) {
         return design.clone();
     }
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let design = design_discrete(&vehicle, Model::Rigid, method, SAMPLE_TIMES_S[sample_time]).unwrap();
     designs.push((key, design.clone()));
     design
@@ -69,7 +70,7 @@ fn errors(
     initial_pa: f64,
     disturbances: &[Disturbance],
 ) -> Vec<[f64; 2]> {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let gains = designed(method, sample_time).rigid_gains();
     let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
     let speeds = if inertia { [340.0, 300.0] } else { [360.0, 360.0] };
@@ -124,7 +125,7 @@ fn the_sampled_bound_holds_with_the_worst_noise() {
 #[test]
 fn without_model_error_the_estimate_decays_at_least_with_kappa2() {
     for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let kappa2 = design_rigid(&vehicle).unwrap().of(phase).unwrap().kappa2_per_s;
         let mut car = Car::start(phase, 0.1e6);
         for n in 1..=1000 {

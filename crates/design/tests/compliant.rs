@@ -1,14 +1,14 @@
 //! The compliant observer on a car that obeys its model.
 
 use crate::common::{DT_S, ENGINE_RAD_S, input};
-use config::Vehicle;
+use config::VehicleFile;
 use design::{compliant_observer, design_compliant};
 use observer::{Health, Phase, Sample, SampleEstimator};
 
 /// A car that obeys the compliant model: both estimates converge from wrong starts.
 #[test]
 fn the_compliant_observer_finds_pressure_and_shaft_torque_of_its_own_model() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let design = design_compliant(&vehicle).unwrap();
     let observer = compliant_observer(&vehicle, design.gains());
     let model = observer.model;
@@ -58,7 +58,7 @@ fn the_compliant_observer_finds_pressure_and_shaft_torque_of_its_own_model() {
 
 #[test]
 fn before_the_shift_the_shaft_torque_starts_at_its_steady_value() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let observer = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
     let mut state = observer.start_sample();
     let sample = Sample { wheel_rad_s: 40.0, ..input(0.0, 300.0, 300.0, 0.0) };

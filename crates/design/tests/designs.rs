@@ -1,16 +1,17 @@
 //! Designs against the chapter's numbers, the closed form, and random polytopes.
 
-use config::{Experiment, GivenGains, ValveUncertainty, Vehicle};
+use car::{Experiment, GivenGains, ValveUncertainty, Vehicle};
+use config::{ExperimentFile, VehicleFile};
 use design::compliant::{CompliantRequirement, compliant_model, design_compliant_phase};
 use design::rigid::design_phase;
 use design::{
     Certificate, DesignError, IssRequirement, Polytope, Vertex, design_compliant, design_iss, design_rigid, rigid_model,
 };
-use observer::{Phase, SlidingGains};
+use observer::Phase;
 use proptest::prelude::*;
 
 fn vehicle() -> Vehicle {
-    Vehicle::built_in().unwrap()
+    VehicleFile::built_in().unwrap().vehicle
 }
 
 fn requirement(kappa1_per_s: Option<f64>) -> IssRequirement {
@@ -106,15 +107,15 @@ fn the_best_certified_gain_is_there_where_the_offset_is_missed() {
 #[test]
 fn given_gains_that_let_an_error_grow_are_found() {
     let vehicle = vehicle();
-    for experiment in config::Experiment::built_in().unwrap() {
+    for experiment in config::ExperimentFile::built_in().unwrap() {
         for entry in &experiment.observers {
             assert!(design::unstable_corners(&vehicle, entry).is_empty(), "{}", entry.name);
         }
     }
-    let [_, _, e3, _] = config::Experiment::built_in().unwrap();
-    let mut entry = e3.observers.into_iter().find(|entry| entry.name == "ISS, Euler, lowered").unwrap();
-    let gains = observer::RigidGains { torque_phase_pa_s_rad: -1.892e5, inertia_phase_pa_s_rad: [-783.7, -1310.8] };
-    entry.gains = Some(config::GivenGains::Rigid(gains));
+    let [_, _, e3, _] = config::ExperimentFile::built_in().unwrap();
+    let mut entry = e3.experiment.observers.into_iter().find(|entry| entry.name == "ISS, Euler, lowered").unwrap();
+    entry.gains =
+        Some(car::GivenGains::Rigid { torque_phase_pa_s_rad: -1.892e5, inertia_phase_pa_s_rad: [-783.7, -1310.8] });
     assert!(design::unstable_corners(&vehicle, &entry).is_empty());
     // At the strong vertex of the inertia phase the error decays with 73/s: by Euler's rule it grows from 2/73 s on.
     for (sample_time_s, grows) in [(0.027, false), (0.028, true)] {
@@ -298,19 +299,19 @@ fn given_gains(experiment: &Experiment, name: &str) -> GivenGains {
 
 #[test]
 fn chapter_gains_of_the_sliding_observer_are_those_of_e3() {
-    let [_, _, e3, _] = &Experiment::built_in().unwrap();
-    let expected = SlidingGains {
+    let [_, _, e3, _] = &ExperimentFile::built_in().unwrap();
+    let expected = GivenGains::Sliding {
         torque_speed_rad_s2: 100.0,
         torque_pressure_pa_s: -7.5e6,
         inertia_speed_rad_s2: [2000.0, 3200.0],
         inertia_pressure_pa_s: [-4.2e6, -7.0e6],
     };
-    assert_eq!(given_gains(e3, "Sliding, continuous gains"), GivenGains::Sliding(expected));
+    assert_eq!(given_gains(e3, "Sliding, continuous gains"), expected);
 }
 
 #[test]
 fn chapter_gains_of_the_compliant_observer_are_those_of_e4() {
-    let [_, _, _, e4] = &Experiment::built_in().unwrap();
+    let [_, _, _, e4] = &ExperimentFile::built_in().unwrap();
     let torque = [[-2.08, 30.49], [-6.46, -152.48]];
     let inertia = [[-0.023, 0.22, 56.9], [-1.74, -0.23, 1.73]];
     assert_eq!(given_gains(e4, "compliant, chapter's gains"), GivenGains::CompliantNormalised(torque, inertia));

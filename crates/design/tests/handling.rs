@@ -1,7 +1,8 @@
 //! What the observers with designed gains make of unusable input, gaps and changes of phase.
 
 use crate::common::{Car, DT_S, input, observer};
-use config::{GainMethod, Vehicle};
+use car::GainMethod;
+use config::VehicleFile;
 use design::{
     Model, compliant_observer, design_compliant, design_discrete, inversion, kalman_filter, rigid_observer,
     unscented_filter,
@@ -10,7 +11,7 @@ use observer::{Estimator, Health, Input, Phase, RigidGains, RigidObserver, Rigid
 
 #[test]
 fn a_reading_that_no_pressure_explains_is_rejected_and_nothing_possible_is_left() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let design = design_discrete(&vehicle, Model::Rigid, GainMethod::PeakToPeak, 0.01).unwrap();
     let observer = rigid_observer(&vehicle, design.rigid_gains());
     let mut car = Car::start_at(observer, Phase::InertiaPhase, [340.0, 300.0], 0.0);
@@ -20,7 +21,7 @@ fn a_reading_that_no_pressure_explains_is_rejected_and_nothing_possible_is_left(
     // 560 rad/s more are 3.5 MPa less by the gain of -6323 Pa s/rad.
     let wrong = step(900.0);
     assert_eq!(wrong.health, Health::SpeedsRejected);
-    assert!((0.0..=vehicle.limits.pressure_max_pa).contains(&wrong.pressure_pa));
+    assert!((0.0..=vehicle.error_bounds.pressure_max_pa).contains(&wrong.pressure_pa));
     // The way back is no news either.
     assert_eq!(step(turbine).health, Health::Good);
     // 100 rad/s could be a pressure, but not one that there is.
@@ -30,7 +31,7 @@ fn a_reading_that_no_pressure_explains_is_rejected_and_nothing_possible_is_left(
 
 #[test]
 fn an_observer_that_starts_anew_says_so_once() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let compliant = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
     says_so(&kalman_filter(&vehicle, None), "kalman");
     says_so(&unscented_filter(&vehicle, None), "unscented");
@@ -42,7 +43,7 @@ fn says_so(observer: &impl Estimator<f64>, name: &str) {
     let usable = Sample { wheel_rad_s: 40.0, ..input(0.01, 300.0, 300.0, 0.0) };
     let mut state = observer.start();
     let mut health = |input: Sample<f64>| {
-        observer.step(&mut state, &Input::of_sample(&input, &Vehicle::built_in().unwrap().shift)).health
+        observer.step(&mut state, &Input::of_sample(&input, &VehicleFile::built_in().unwrap().vehicle.shift)).health
     };
     assert_eq!([(); 3].map(|()| health(usable)), [Health::Good; 3], "{name}: the first start is no new one");
     // The gap is longer than any gain is made for.

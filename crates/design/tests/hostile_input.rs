@@ -2,7 +2,8 @@
 
 use std::sync::OnceLock;
 
-use config::{GainMethod, Vehicle};
+use car::{GainMethod, Vehicle};
+use config::VehicleFile;
 use design::{
     Model, bounded, compliant_observer, design_compliant, design_discrete, design_rigid, design_sliding,
     extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
@@ -25,7 +26,7 @@ struct Gains {
 fn gains() -> &'static Gains {
     static GAINS: OnceLock<Gains> = OnceLock::new();
     GAINS.get_or_init(|| {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let methods = &GainMethod::ALL[1..];
         let discrete = |model, method: &GainMethod| design_discrete(&vehicle, model, *method, 0.01).unwrap();
         let mut rigid = vec![design_rigid(&vehicle).unwrap().gains().into(), RigidGains::open_loop().into()];
@@ -119,7 +120,7 @@ fn attack<T: Real>(
     samples: &[Sample],
     recovers: bool,
 ) -> Result<(), TestCaseError> {
-    let limits = &vehicle.limits.cast::<T>();
+    let limits = &design::input_limits(vehicle).cast::<T>();
     let range = bounded(vehicle, ());
     let tracker = |tracker: Tracker<f64>| Tracker { discretisation, ..tracker };
     macro_rules! survives {
@@ -214,7 +215,7 @@ fn vehicle() -> impl Strategy<Value = Vehicle> {
             let mut draws = draw.into_iter();
             // On a logarithmic scale: the ends of the ranges are met as often as their middles.
             let mut within = |low: f64, high: f64| low * (high / low).powf(draws.next().unwrap());
-            let mut v = Vehicle::built_in().unwrap();
+            let mut v = VehicleFile::built_in().unwrap().vehicle;
             v.engine.inertia_kg_m2 = within(0.01, 5.0);
             v.driveline.final_ratio = within(0.5, 10.0);
             v.driveline.shaft_stiffness_n_m_rad = within(100.0, 1e6);
@@ -228,10 +229,8 @@ fn vehicle() -> impl Strategy<Value = Vehicle> {
             clutch.return_spring_n = within(1.0, 10e3);
             clutch.friction = Table1::constant(within(0.02, 0.5));
             clutch.static_friction = 0.5;
-            v.supervisor.kiss_pressure_pa = clutch.kiss_pressure();
-            v.limits.speed_max_rad_s = within(100.0, 5e3);
-            v.limits.pressure_max_pa = within(1e5, 10e6);
-            v.error_bounds.pressure_max_pa = v.limits.pressure_max_pa;
+            v.speed_max_rad_s = within(100.0, 5e3);
+            v.error_bounds.pressure_max_pa = within(1e5, 10e6);
             valve_and_stroke(&mut v, budget);
             v.error_bounds.turbine_torque_share = within(1e-3, 0.9);
             v.error_bounds.sampling_delay_s = within(1e-6, 0.2);
@@ -243,14 +242,15 @@ fn vehicle() -> impl Strategy<Value = Vehicle> {
             v.filter.offgoing_release_s = within(1e-3, 10.0);
             v.filter.output_least_rad_s = within(0.1, 500.0);
             v.shaft_settling_s = within(0.01, 10.0);
-            v.supervisor.lock_slip_rad_s = within(0.1, 100.0);
-            v.supervisor.release_slip_rad_s = within(0.1, 100.0);
+            v.phase_slips.lock_slip_rad_s = within(0.1, 100.0);
+            v.phase_slips.release_slip_rad_s = within(0.1, 100.0);
             let time_constant_s = within(0.001, 2.0);
             if pulse_width {
-                let law = PulseWidth { flow_sqrt_pa_s: within(1e3, 1e6), line_pressure_pa: v.limits.pressure_max_pa };
+                let law =
+                    PulseWidth { flow_sqrt_pa_s: within(1e3, 1e6), line_pressure_pa: v.error_bounds.pressure_max_pa };
                 v.observer_valve = Valve::PulseWidth(law);
                 v.oncoming.valve = ClutchValve::PulseWidth { law, delay_s: Table1::constant(0.01) };
-                v.limits.command_max = 100.0;
+                v.command_max = 100.0;
             } else {
                 v.observer_valve = Valve::Proportional { time_constant_s, gain_pa_a: within(1e4, 20e6) };
             }
@@ -264,7 +264,7 @@ proptest! {
 
     #[test]
     fn prop_no_input_stops_an_observer(samples in samples(), euler in any::<bool>()) {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let discretisation = if euler { Discretisation::Euler } else { Discretisation::Exact };
         attack::<f64>(&vehicle, discretisation, &samples, true)?;
         attack::<f32>(&vehicle, discretisation, &samples, true)?;

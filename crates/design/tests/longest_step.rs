@@ -1,13 +1,14 @@
 //! The longest step over which the speeds may correct an estimate follows from the certificate of the car.
 
-use config::{Experiment, GainMethod, ObserverEntry, ObserverKind, SAMPLE_TIMES_S, Vehicle};
+use car::{GainMethod, ObserverEntry, ObserverKind, SAMPLE_TIMES_S, Vehicle};
+use config::{ExperimentFile, VehicleFile};
 use design::{
     Model, design_compliant, design_discrete, design_rigid, longest_stable_step_s, longest_step_of, rigid_model,
 };
-use observer::{Discretisation, Phase, RigidGains};
+use observer::{Discretisation, Phase};
 
 fn vehicle() -> Vehicle {
-    Vehicle::built_in().unwrap()
+    VehicleFile::built_in().unwrap().vehicle
 }
 
 /// What a gain on `(w_t, dw)` multiplies an error by over a step in the inertia phase, at this friction.
@@ -70,8 +71,8 @@ fn the_longest_step_is_that_of_the_car() {
 }
 
 fn entry(kind: ObserverKind) -> ObserverEntry {
-    let [_, _, e3, _] = Experiment::built_in().unwrap();
-    let mut entry = e3.observers.into_iter().find(|entry| entry.name == "ISS, Euler, lowered").unwrap();
+    let [_, _, e3, _] = ExperimentFile::built_in().unwrap();
+    let mut entry = e3.experiment.observers.into_iter().find(|entry| entry.name == "ISS, Euler, lowered").unwrap();
     (entry.kind, entry.method, entry.gains) = (kind, GainMethod::Iss, None);
     (entry.discretisation, entry.sample_time_s) = (Discretisation::Exact, 0.01);
     entry
@@ -87,10 +88,8 @@ fn an_observer_of_an_experiment_has_the_step_of_its_gains() {
     assert_eq!(of(&entry(ObserverKind::Sliding)), None);
     assert_eq!(longest_stable_step_s(&vehicle, &rigid), None, "its gains are not given");
     // Given gains have no certificate. By Euler's rule the strong vertex with 73/s is unstable from 2/73 s on.
-    rigid.gains = Some(config::GivenGains::Rigid(RigidGains {
-        torque_phase_pa_s_rad: -1.892e5,
-        inertia_phase_pa_s_rad: [-783.7, -1310.8],
-    }));
+    rigid.gains =
+        Some(car::GivenGains::Rigid { torque_phase_pa_s_rad: -1.892e5, inertia_phase_pa_s_rad: [-783.7, -1310.8] });
     rigid.discretisation = Discretisation::Euler;
     assert!((of(&rigid).unwrap() * 73.0 / 2.0 - 1.0).abs() < 2e-3, "{:?}", of(&rigid));
 }

@@ -3,7 +3,8 @@
 #[path = "../../config/tests/common/mod.rs"]
 mod common;
 
-use config::{GainMethod, Source, Vehicle};
+use car::{GainMethod, Vehicle};
+use config::{Source, VehicleFile};
 use design::{
     Model, Quantity, best_compliant, best_rigid, bounded, compliant_observer, design_discrete_phase, design_sliding,
     extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
@@ -21,7 +22,7 @@ fn runs(observer: &impl Estimator<f64>, vehicle: &Vehicle, name: &str) {
             turbine_rad_s: 330.0 - 3.0 * f64::from(n),
             slip_rad_s: 190.0 - 6.0 * f64::from(n),
             wheel_rad_s: 45.0 + turned,
-            command: vehicle.limits.command_max * (0.3 + 0.2 * turned),
+            command: vehicle.command_max * (0.3 + 0.2 * turned),
         };
         let estimate = observer.step(&mut state, &Input::of_sample(&input, &vehicle.shift));
         assert!(estimate.pressure_pa.is_finite() && estimate.clutch_torque_n_m.is_finite(), "{name}: {n} {estimate:?}");
@@ -54,7 +55,7 @@ fn an_accepted_vehicle_stops_no_design_and_no_observer() {
     // Without optimisation a part of them; with it (`cargo test --release`) all.
     let (some, few) = if cfg!(debug_assertions) { (19, 199) } else { (1, 5) };
     let accepted = common::mutations(common::VEHICLE).into_iter().filter_map(|(name, text)| {
-        let vehicle = Vehicle::from_source(Source::built_in("v.toml", &text)).ok()?;
+        let vehicle = VehicleFile::from_source(Source::built_in("v.toml", &text)).ok()?;
         Some((name, vehicle))
     });
     for (n, (name, vehicle)) in accepted.enumerate() {

@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 
 use crate::common::sampled::{Disturbance, SampledCar, disturbance};
-use config::{GainMethod, Vehicle};
+use car::{GainMethod, Vehicle};
 use design::{DiscreteDesign, Model, Quantity, design_discrete, design_discrete_phase};
 use drivetrain::Valve;
 use observer::Phase;
@@ -24,7 +24,7 @@ const METHODS: [GainMethod; 2] = [GainMethod::Interval, GainMethod::IssDiscrete]
 
 fn vehicle((file, shift, sign): (&str, &str, f64)) -> Vehicle {
     let path = format!("{}/../../vehicles/{file}.toml", env!("CARGO_MANIFEST_DIR"));
-    let car = config::Car::read(path.as_ref()).unwrap();
+    let car = config::CarFile::read(path.as_ref()).unwrap().car;
     let vehicle = car.of_shift(car.shift_named(shift).unwrap()).unwrap();
     assert!(sign * vehicle.shift.slip_oncoming[0] > 0.0, "{file} {shift}");
     vehicle
@@ -138,8 +138,8 @@ fn the_bound_does_not_depend_on_the_sign_of_alpha() {
 #[test]
 fn the_errors_of_the_car_are_in_the_bound() {
     const C: usize = 2;
-    let bounds = |change: fn(&mut config::Car)| {
-        let mut car = config::Car::eight_speed().unwrap();
+    let bounds = |change: fn(&mut car::Car)| {
+        let mut car = config::CarFile::eight_speed().unwrap().car;
         change(&mut car);
         let vehicle = car.of_shift(car.shift_named("2-3").unwrap()).unwrap();
         let phase = Phase::InertiaPhase;
@@ -153,8 +153,8 @@ fn the_errors_of_the_car_are_in_the_bound() {
     assert!(bounds(|car| car.error_bounds.elements[C].friction_factor = Some([0.7, 1.3]))[0] > 1.1 * open_loop);
     assert!(bounds(|car| car.error_bounds.elements[C].valve_gain_factor = Some([0.8, 1.2]))[0] > 1.1 * open_loop);
     for change in [
-        |car: &mut config::Car| car.error_bounds.inertia_share = Some(0.05),
-        |car: &mut config::Car| car.error_bounds.converter_share = Some(0.02),
+        |car: &mut car::Car| car.error_bounds.inertia_share = Some(0.05),
+        |car: &mut car::Car| car.error_bounds.converter_share = Some(0.02),
     ] {
         let [alone, better] = bounds(change);
         assert!(alone == open_loop && better < 0.99 * gain, "{better} {gain}");

@@ -1,7 +1,8 @@
 //! Single precision beside double precision.
 
 use crate::common::{Car, input, observer};
-use config::{GainMethod, Vehicle};
+use car::GainMethod;
+use config::VehicleFile;
 use design::{
     Model, compliant_observer, design_compliant, design_discrete, inversion, kalman_filter, rigid_observer,
     super_twisting, unscented_filter,
@@ -10,7 +11,7 @@ use observer::{Estimator, Input, Phase, Sample};
 
 #[test]
 fn single_precision_follows_double_precision() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let compliant = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
     assert_single_follows_double(&observer(), &observer().cast::<f32>(), 1.0);
     assert_single_follows_double(&compliant, &compliant.cast::<f32>(), 1.0);
@@ -35,7 +36,7 @@ fn single_precision_follows_double_precision() {
 /// pressures are rounded to 0.03 Pa.
 fn assert_single_follows_double(double: &impl Estimator<f64>, single: &impl Estimator<f32>, tolerance_pa: f64) {
     let mut car = Car::start(Phase::InertiaPhase, 0.1e6);
-    let shift = Vehicle::built_in().unwrap().shift;
+    let shift = VehicleFile::built_in().unwrap().vehicle.shift;
     let (mut a, mut b) = (double.start(), single.start());
     for n in 0..500 {
         car.step([100.0, -200.0]);

@@ -1,7 +1,8 @@
 //! The rigid observer of a car with pulse-width valves.
 
 use crate::common::input;
-use config::{ValveUncertainty, Vehicle};
+use car::ValveUncertainty;
+use config::VehicleFile;
 use design::{design_rigid, rigid_observer};
 use drivetrain::{PulseWidth, Valve};
 use observer::{RigidGains, SampleEstimator};
@@ -9,10 +10,10 @@ use observer::{RigidGains, SampleEstimator};
 /// The valve of Remark 2.1, linearised along its own way, is the nonlinear law itself where nothing else is wrong.
 #[test]
 fn the_open_loop_of_a_pulse_width_valve_is_its_law() {
-    let mut vehicle = Vehicle::built_in().unwrap();
+    let mut vehicle = VehicleFile::built_in().unwrap().vehicle;
     let law = PulseWidth { flow_sqrt_pa_s: 6000.0, line_pressure_pa: 1e6 };
     vehicle.observer_valve = Valve::PulseWidth(law);
-    vehicle.limits.command_max = 100.0;
+    vehicle.command_max = 100.0;
     let observer = rigid_observer(&vehicle, RigidGains::open_loop());
     let mut state = observer.start_sample();
     let (mut truth, mut last) = (0.0_f64, 0.0);
@@ -30,7 +31,7 @@ fn the_open_loop_of_a_pulse_width_valve_is_its_law() {
 
 #[test]
 fn a_pulse_width_valve_adds_its_operating_points_as_vertices() {
-    let mut vehicle = Vehicle::built_in().unwrap();
+    let mut vehicle = VehicleFile::built_in().unwrap().vehicle;
     let law = PulseWidth { flow_sqrt_pa_s: 12e3, line_pressure_pa: 1e6 };
     vehicle.observer_valve = Valve::PulseWidth(law);
     vehicle.uncertainty.valve = ValveUncertainty::PressureDrop((0.0, 0.09e6));

@@ -1,6 +1,7 @@
 //! The ranges of a vehicle: once for all observers, around estimates, and through the fill of a clutch.
 
-use config::{Source, Vehicle};
+use car::Vehicle;
+use config::{Source, VehicleFile};
 use design::{bounded, design_rigid, inversion, kalman_filter, range, rigid_observer};
 use observer::{Bounds, ChannelHealth, Channels, Estimate, Estimator, Health, Input, Phase, Reading};
 
@@ -8,7 +9,7 @@ const STROKE: &str = include_str!("../../../vehicles/two_speed_stroke.toml");
 const DT_S: f64 = 0.01;
 
 fn with_stroke() -> Vehicle {
-    Vehicle::from_source(Source::built_in("two_speed_stroke.toml", STROKE)).unwrap()
+    VehicleFile::from_source(Source::built_in("two_speed_stroke.toml", STROKE)).unwrap().vehicle
 }
 
 /// A car that rolls in first gear, with this command of the oncoming clutch.
@@ -133,7 +134,7 @@ fn a_clutch_carries_no_torque_before_its_piston_can_have_arrived_and_some_once_i
     assert_eq!((soon.clutch_torque_n_m, soon.pressure_pa[1]), ([0.0, 0.0], 1.1 * kiss));
     assert!(later.pressure_pa[0] > 1.1 * kiss && later.clutch_torque_n_m[0] > 0.0, "{later:?}");
     // Without a stroke the same 40 ms are pressure and torque.
-    let chapter = Vehicle::built_in().unwrap();
+    let chapter = VehicleFile::built_in().unwrap().vehicle;
     let at = ranges(&chapter, &[(4.0, 0.0), (0.04, asked)])[1];
     assert!(at.pressure_pa[1] > 2.0 * kiss && at.clutch_torque_n_m[1] > 0.0, "{at:?}");
 }

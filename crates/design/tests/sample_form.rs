@@ -1,7 +1,7 @@
 //! What the observers do to an error over one sample.
 
 use crate::common::{ENGINE_RAD_S, input, observer, over_a_sample};
-use config::Vehicle;
+use config::VehicleFile;
 use design::{compliant_observer, design_compliant};
 use observer::{Discretisation, Phase, Sample, SampleEstimator};
 
@@ -82,7 +82,7 @@ fn over_a_sample_the_error_is_multiplied_by_phi_less_l_g_psi() {
 #[test]
 fn over_a_sample_both_errors_of_the_compliant_observer_are_multiplied_by_phi_less_l_g_psi() {
     const T: f64 = 0.01;
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let observer = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
     let (model, command) = (observer.model, 0.25);
     for (phase, mut speeds) in

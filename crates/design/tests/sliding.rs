@@ -1,14 +1,14 @@
 //! The sliding-mode observer on a car that obeys its model.
 
 use crate::common::{Car, DT_S, ENGINE_RAD_S, input};
-use config::Vehicle;
+use config::VehicleFile;
 use design::{design_sliding, sliding_observer};
 use observer::{Phase, SampleEstimator};
 
 /// In sliding the pressure error decays by the pressure gains; what remains is their switching.
 #[test]
 fn the_sliding_observer_brings_a_wrong_pressure_down() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let mut car = Car::start(Phase::InertiaPhase, 0.08e6);
     let sliding = sliding_observer(&vehicle, design_sliding(&vehicle));
     let mut state = sliding.start_sample();
@@ -30,7 +30,7 @@ fn the_sliding_observer_brings_a_wrong_pressure_down() {
 #[test]
 fn the_sliding_observer_takes_eulers_step_of_its_equations() {
     const HAIR_RAD_S: f64 = 1e-6;
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let sliding = sliding_observer(&vehicle, design_sliding(&vehicle));
     let (model, gains, command) = (sliding.model, sliding.gains, 0.25);
     for (phase, start) in [(Phase::TorquePhase, [360.0, 360.0]), (Phase::InertiaPhase, [340.0, 300.0])] {

@@ -1,14 +1,15 @@
 //! Gains with backward slip.
 
 use crate::common::{Car, observer};
-use config::{GainMethod, Vehicle};
+use car::GainMethod;
+use config::VehicleFile;
 use design::{Model, compliant_observer, design_compliant, design_discrete, rigid_observer};
 use observer::Phase;
 
 /// With backward slip the clutch drives the turbine and not the output: `G` has the other sign, and so must have `L`.
 #[test]
 fn with_backward_slip_the_error_decays_as_with_forward_slip() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let discrete = GainMethod::ALL[1..].iter().map(|method| {
         rigid_observer(&vehicle, design_discrete(&vehicle, Model::Rigid, *method, 0.01).unwrap().rigid_gains())
     });
@@ -32,7 +33,7 @@ fn with_backward_slip_the_error_decays_as_with_forward_slip() {
 /// The same of the compliant observer, of whose gain the pressure's row alone changes its sign.
 #[test]
 fn the_compliant_gain_is_mirrored_with_backward_slip() {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let design = design_compliant(&vehicle).unwrap();
     let model = compliant_observer(&vehicle, design.gains()).model;
     let gain = design.gains().inertia_phase;

@@ -7,7 +7,7 @@
 //! `cargo run --release -p fit --example coast_down`
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
 
-use config::Vehicle;
+use config::VehicleFile;
 use drivetrain::RoadLoad;
 use drivetrain::road::GRAVITY_M_S2;
 use nalgebra::{Matrix2, Vector2};
@@ -89,7 +89,7 @@ fn errors(load: &RoadLoad<f64>, is_other: Option<bool>, of: [f64; 3], random: &m
 }
 
 fn main() {
-    let load = Vehicle::built_in().unwrap().road;
+    let load = VehicleFile::built_in().unwrap().road;
     let mut random = Pcg64Mcg::new(0xcafe_f00d_d15e_a5e5);
     for of in ROADS_OF {
         let [mean_rad, changing_rad, wind_m_s] = of;

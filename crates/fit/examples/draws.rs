@@ -9,7 +9,7 @@
 mod common;
 
 use config::vehicle::short::{Facts, ValveKind, short_file};
-use config::{Source, Vehicle};
+use config::{Source, VehicleFile};
 
 use common::{Logs, TestCar, TestShift};
 use fit::{Map, Parameter};
@@ -55,7 +55,7 @@ fn car_of(case: &str, seed: u64) -> TestCar {
                 valve: ValveKind::Proportional,
             };
             let file = Source::built_in("another car", &short_file(&facts, false).unwrap());
-            TestCar::of(Vehicle::from_source(file).unwrap(), seed)
+            TestCar::of(VehicleFile::from_source(file).unwrap(), seed)
         }
         "other shape" => TestCar::drawn(seed).with_other_maps(),
         "other converter" => TestCar::drawn(seed).with_other_converter(),

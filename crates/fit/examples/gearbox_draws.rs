@@ -13,7 +13,8 @@ mod drawn;
 #[path = "../tests/gearbox/estimated.rs"]
 mod estimated;
 
-use config::{Car, Drive, DriveSegment};
+use car::{Car, Drive, DriveSegment};
+use config::DriveFile;
 use drawn::{Case, Drawn, every_fifth};
 use estimated::{Estimated, estimated};
 use fit::Known;
@@ -128,9 +129,9 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let told = told.collect();
     let estimates = match std::env::var("FIT_ESTIMATE") {
         Ok(_) => {
-            let without = Car { error_bounds: drawn.file.error_bounds.clone(), ..file.clone() };
-            let cycle = Drive::read(&drawn::root().join("drives/wltc_3b.toml")).unwrap();
-            estimated(drawn, &cycle, &[drawn.file.clone(), without, unchecked, file])
+            let without = Car { error_bounds: drawn.file.error_bounds.clone(), ..file.car.clone() };
+            let cycle = DriveFile::read(&drawn::root().join("drives/wltc_3b.toml")).unwrap();
+            estimated(drawn, &cycle, &[drawn.file.car.clone(), without, unchecked.car, file.car])
         }
         Err(_) => Vec::new(),
     };

@@ -1,6 +1,6 @@
 //! The car of a set of parameters.
 
-use config::{SpeedSensor, Vehicle};
+use car::{SpeedSensor, Vehicle};
 use drivetrain::{Clutch, Converter, Cylinder, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Tyre};
 
 use crate::Parameter;
@@ -25,7 +25,7 @@ pub struct ReadingAges {
 
 impl ReadingAges {
     /// Those of described sensors.
-    pub fn of(sensors: &config::Sensors) -> Self {
+    pub fn of(sensors: &car::Sensors) -> Self {
         let age = |sensor: &SpeedSensor| 0.5 * (sensor.periods + 1.0) * std::f64::consts::TAU / sensor.teeth;
         Self {
             engine_rad: age(&sensors.engine),

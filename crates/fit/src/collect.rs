@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use config::Vehicle;
-use config::vehicle::ShiftClutch;
+use car::ShiftClutch;
+use car::Vehicle;
+use config::VehicleFile;
 use drivetrain::{ClutchValve, CommandKind};
 use logs::{
     ChannelMap, Direction, Gearbox, Load, Log, LogError, Mapped, Quality, Reading, Readings, Role, Shift, ShiftFinder,
@@ -86,7 +87,7 @@ pub fn own_names(log: &Log) -> Result<ChannelMap, FitError> {
 ///
 /// # Errors
 /// The log cannot be read, or lacks a channel that a fit needs.
-pub fn collect(path: &Path, map: &ChannelMap, vehicle: &Vehicle) -> Result<Collected, FitError> {
+pub fn collect(path: &Path, map: &ChannelMap, vehicle: &VehicleFile) -> Result<Collected, FitError> {
     if path == Path::new("-") {
         return Err(FitError::input("a fit reads a log twice\nhint: give a file in place of standard input"));
     }
@@ -259,7 +260,7 @@ struct BetweenShifts {
 }
 
 impl BetweenShifts {
-    fn new(vehicle: &Vehicle, shifts: &[Shift]) -> Result<Self, FitError> {
+    fn new(vehicle: &VehicleFile, shifts: &[Shift]) -> Result<Self, FitError> {
         let open = |clutch: &ShiftClutch| (clutch.valve, clutch.clutch.kiss_pressure());
         Ok(Self {
             recorder: DrivingRecorder::new(driven_car(vehicle, &shafts(vehicle)?)),
@@ -340,7 +341,7 @@ mod tests {
     /// What a shift has told is not used again, and a clutch that may carry torque makes no gear.
     #[test]
     fn a_gear_is_one_outside_of_shifts_with_the_other_clutch_open() {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap();
         let shift = Shift {
             from: 1,
             to: 2,

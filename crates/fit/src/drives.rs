@@ -3,7 +3,7 @@
 //! It adds the torque balance of the car in the gears before and after the shift ([`crate::driving`]) to the normal equations of the shifts. As each shift
 //! has a mass of its own, so has each log: a deviation that is eliminated.
 
-use config::Vehicle;
+use car::Vehicle;
 use nalgebra::{DMatrix, DVector};
 
 use crate::driving::{DrivenCar, Driving, DrivingModel, DrivingWeights, Evaluated, Term, misfit, usable};

@@ -1,6 +1,6 @@
 //! The vehicle file of a fit: the text of the given one with other values.
 
-use config::{Source, Vehicle};
+use config::{Source, VehicleFile};
 
 use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
@@ -18,7 +18,7 @@ impl Fit {
     ///
     /// # Errors
     /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
-    pub fn vehicle_file(&self, vehicle: &Vehicle, logs: &str) -> Result<Vehicle, FitError> {
+    pub fn vehicle_file(&self, vehicle: &VehicleFile, logs: &str) -> Result<VehicleFile, FitError> {
         let mut text = VehicleText::new(&vehicle.source.text)?;
         let oncoming = oncoming_name(&vehicle.source.text)?;
         let shafts = parameters::shafts(vehicle)?;
@@ -36,7 +36,7 @@ impl Fit {
         let logs = logs.replace(char::is_control, " ");
         let head = format!("values below lines like this one come from {} shifts of {logs}", self.shifts);
         let source = Source { path: vehicle.source.path.clone(), text: headed(&head, &text.finish()) };
-        Vehicle::from_source(source).map_err(|error| {
+        VehicleFile::from_source(source).map_err(|error| {
             FitError::Work(format!(
                 "the fitted values are not those of a possible car: {error}\n\
                  hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
@@ -48,10 +48,10 @@ impl Fit {
     ///
     /// # Errors
     /// None that the given file does not have itself.
-    pub fn kept_file(&self, vehicle: &Vehicle, reason: &str) -> Result<Vehicle, FitError> {
+    pub fn kept_file(&self, vehicle: &VehicleFile, reason: &str) -> Result<VehicleFile, FitError> {
         let text = headed(&kept(reason), &vehicle.source.text);
         let source = Source { path: vehicle.source.path.clone(), text };
-        Vehicle::from_source(source).map_err(|error| FitError::Work(error.to_string()))
+        VehicleFile::from_source(source).map_err(|error| FitError::Work(error.to_string()))
     }
 
     fn write(&self, text: &mut VehicleText, fitted: &Car, clutch: &str, parameter: Parameter) -> Result<(), FitError> {
@@ -101,7 +101,7 @@ impl Fit {
     }
 
     /// The error budget: what the fit leaves open of each parameter.
-    fn write_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
+    fn write_budget(&self, text: &mut VehicleText, vehicle: &VehicleFile) -> Result<(), FitError> {
         let bound = |key: &str| keys(&["design", "error_bounds", key]);
         let sd = |parameters: &[Parameter]| {
             parameters.iter().map(|p| self.sd(*p).unwrap_or(0.0).powi(2)).sum::<f64>().sqrt()
@@ -149,7 +149,7 @@ impl Fit {
     }
 
     /// Writes the stroke of the oncoming clutch's piston, and the preload of its spring, which moves with the fitted kiss point.
-    fn write_fill(&self, text: &mut VehicleText, vehicle: &Vehicle, clutch: &str) -> Result<(), FitError> {
+    fn write_fill(&self, text: &mut VehicleText, vehicle: &VehicleFile, clutch: &str) -> Result<(), FitError> {
         let table = ["clutch", clutch, "fill"];
         let spring = self.value(Parameter::Spring).unwrap_or(1.0);
         let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) else {
@@ -175,7 +175,7 @@ impl Fit {
     }
 
     /// Factor on the preload beside the kiss point.
-    fn preload_factor(&self, vehicle: &Vehicle) -> f64 {
+    fn preload_factor(&self, vehicle: &VehicleFile) -> f64 {
         /// Most of the force at the kiss point that it may become \[chosen: the limits of the error budget, 10 % to each side, stay below those of
         /// the kiss point\].
         const MOST: f64 = 0.9;
@@ -185,7 +185,7 @@ impl Fit {
     }
 
     /// The limits of the piston's stroke: pressures move with the spring, the volume has what the fit leaves open of it.
-    fn write_fill_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
+    fn write_fill_budget(&self, text: &mut VehicleText, vehicle: &VehicleFile) -> Result<(), FitError> {
         let Some(given) = &vehicle.error_bounds.fill else { return Ok(()) };
         let bound = |key: &str| keys(&["design", "error_bounds", "fill", key]);
         let spring = self.value(Parameter::Spring).unwrap_or(1.0);

@@ -1,6 +1,7 @@
 //! The fit of a vehicle to shifts.
 
-use config::Vehicle;
+use car::Vehicle;
+use config::VehicleFile;
 use nalgebra::DVector;
 
 use crate::car::Car;
@@ -98,7 +99,7 @@ pub fn available(shifts: &[ShiftRecord]) -> Available {
 /// # Errors
 /// There is no shift, or no minimum was found.
 pub fn fit(
-    vehicle: &Vehicle,
+    vehicle: &VehicleFile,
     shifts: &[ShiftRecord],
     driving: &[Driving],
     ages: ReadingAges,

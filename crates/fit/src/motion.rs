@@ -446,7 +446,7 @@ fn at_tyre_limit(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use config::Vehicle;
+    use config::VehicleFile;
 
     use super::*;
     use crate::ReadingAges;
@@ -475,7 +475,7 @@ mod tests {
     /// the parameters, and a fit gets stuck in it.
     #[test]
     fn a_torque_keeps_its_sign_where_the_slip_would_turn_around() {
-        let car = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
+        let car = Car::of_file(&VehicleFile::built_in().unwrap(), ReadingAges::default());
         let (inputs, of, start) = slipping(&car, 0.7e6, 60.0);
         let motion = Motion::run(SegmentKind::Slipping, PART, &Run { car: &car, of, inputs: &inputs, start });
         let slips: Vec<f64> = (motion.turbine.iter().zip(&motion.output))
@@ -489,7 +489,7 @@ mod tests {
     /// part of a derivative. One stands nearly, and one pulls at the limit of its tyres.
     #[test]
     fn motions_side_by_side_are_those_of_each_alone() {
-        let file = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
+        let file = Car::of_file(&VehicleFile::built_in().unwrap(), ReadingAges::default());
         let mut weak_tyres = file.clone();
         weak_tyres.tyre.max_force_n *= 0.05;
         let cars = [&file, &file, &weak_tyres, &file, &file, &weak_tyres];

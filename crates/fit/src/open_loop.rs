@@ -1,6 +1,6 @@
 //! Pressure and torque of the oncoming clutch from commands and measured slip alone.
 
-use config::Vehicle;
+use car::Vehicle;
 
 use crate::car::Car;
 use crate::pressure::{Grid, Hydraulics, pressures};

@@ -1,6 +1,7 @@
 //! What is fitted, and what is known of it before.
 
-use config::Vehicle;
+use car::Vehicle;
+use config::VehicleFile;
 
 use crate::driving::{AIR, ROLLING, rolling_floor};
 use crate::shape::{Knots, Map};
@@ -204,13 +205,14 @@ pub(crate) struct Shaft {
 }
 
 /// The shafts of a vehicle file: each inertia is doubled in the text, and the change of the mass matrix is its share.
-pub(crate) fn shafts(vehicle: &Vehicle) -> Result<Vec<Shaft>, FitError> {
+pub(crate) fn shafts(vehicle: &VehicleFile) -> Result<Vec<Shaft>, FitError> {
     let names = vehicle_text::shaft_names(&vehicle.source.text)?;
     let shaft = |(i, name): (usize, String)| {
         let path = vehicle_text::shaft_inertia(i);
         let mut text = vehicle_text::VehicleText::new(&vehicle.source.text)?;
         text.scale(&path, 2.0)?;
-        let heavier = Vehicle::from_source(config::Source { path: vehicle.source.path.clone(), text: text.finish() })?;
+        let heavier =
+            VehicleFile::from_source(config::Source { path: vehicle.source.path.clone(), text: text.finish() })?;
         let mut mass_kg_m2 = heavier.shift.mass_kg_m2;
         for (row, base) in mass_kg_m2.iter_mut().zip(vehicle.shift.mass_kg_m2) {
             row.iter_mut().zip(base).for_each(|(cell, base)| *cell -= base);

@@ -15,7 +15,7 @@ pub(crate) struct Hydraulics {
 
 impl Hydraulics {
     /// Those of a clutch of a vehicle file.
-    pub(crate) fn of(clutch: &config::ShiftClutch) -> Self {
+    pub(crate) fn of(clutch: &car::ShiftClutch) -> Self {
         let cylinder = clutch.has_stroke.then_some(clutch.cylinder);
         Self { valve: clutch.valve, hysteresis_pa: clutch.hysteresis_pa, cylinder }
     }
@@ -201,17 +201,17 @@ fn step(valve: &ClutchValve<f64>, settled_pa: f64, pressure_pa: f64, dt_s: f64) 
 
 #[cfg(test)]
 mod tests {
-    use config::Vehicle;
+    use config::VehicleFile;
 
     use super::*;
 
-    fn clutch() -> config::ShiftClutch {
+    fn clutch() -> car::ShiftClutch {
         let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_stroke.toml"));
-        Vehicle::read(path).unwrap().oncoming
+        VehicleFile::read(path).unwrap().oncoming
     }
 
     /// Commands every 10 ms: empty, a pulse, a hold above the kiss point, a higher pressure and empty again.
-    fn commands(clutch: &config::ShiftClutch) -> Series {
+    fn commands(clutch: &car::ShiftClutch) -> Series {
         let course = [(0.1, 0.0), (0.2, 0.21e6), (0.3, 0.08e6), (0.3, 0.4e6), (1.0, 0.0)];
         let mut series = Series::default();
         let mut begin = 0.0;

@@ -2,7 +2,7 @@
 
 use std::ops::Div;
 
-use config::Vehicle;
+use car::Vehicle;
 use drivetrain::{ClutchValve, Table1};
 
 use crate::Parameter;
@@ -210,10 +210,11 @@ pub(crate) fn mapped(table: &Table1<f64>, value: impl Fn(f64, f64) -> f64) -> Ta
 #[cfg(test)]
 mod tests {
     use super::*;
+    use config::VehicleFile;
 
     #[test]
     fn a_freed_shape_without_a_change_is_the_map_of_the_file() {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap();
         let knots = Knots::of(&vehicle);
         let clutch = &vehicle.oncoming.clutch;
         let friction = knots.changed(&clutch.friction, Map::Friction, 0, 0.0);
@@ -233,7 +234,7 @@ mod tests {
 
     #[test]
     fn a_change_is_whole_at_its_point_and_none_at_the_next() {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap();
         let knots = Knots::of(&vehicle);
         let before = vehicle.oncoming.clutch.friction;
         let after = knots.changed(&before, Map::Friction, 1, -0.1);

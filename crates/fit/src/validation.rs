@@ -1,6 +1,7 @@
 //! Shifts that were not fitted, with the given and with the fitted vehicle.
 
-use config::Vehicle;
+use car::Vehicle;
+use config::VehicleFile;
 
 use crate::car::Car;
 use crate::drives::Drives;
@@ -36,8 +37,8 @@ impl Fit {
     /// A shift cannot be computed with either vehicle.
     pub fn validate(
         &self,
-        given: &Vehicle,
-        fitted: &Vehicle,
+        given: &VehicleFile,
+        fitted: &VehicleFile,
         held_out: &[ShiftRecord],
         ages: ReadingAges,
     ) -> Result<Option<HeldOut>, FitError> {
@@ -66,7 +67,7 @@ impl Fit {
     /// RMS of the one-step errors of the turbine speed with a vehicle file, and the fitted delays and scales of the signals.
     fn turbine_error(
         &self,
-        vehicle: &Vehicle,
+        vehicle: &VehicleFile,
         held_out: &[ShiftRecord],
         ages: ReadingAges,
     ) -> Result<Option<f64>, FitError> {

@@ -1,6 +1,7 @@
 //! The fill volume of a clutch whose piston has a stroke, and logs with which it is not told.
 use crate::common::{Logs, TestCar, fitted};
-use config::{Source, Vehicle};
+use car::Vehicle;
+use config::{Source, VehicleFile};
 use fit::{Parameter, Series, ShiftRecord, Verdict};
 
 fn shifts(car: &mut TestCar, count: u64) -> Vec<ShiftRecord> {
@@ -35,7 +36,7 @@ fn a_pressure_in_one_shift_tells_the_fill_volume_and_the_file_gets_it() {
     assert!((limits[1][0]..limits[1][1]).contains(&(car.fill * volumes[0])), "{limits:?} {}", car.fill * volumes[0]);
     // A file that leaves the cylinder at its defaults gets a table of its own.
     let silent = Source { text: without_fill_tables(&car), ..car.file.source.clone() };
-    let silent = Vehicle::from_source(silent).unwrap();
+    let silent = VehicleFile::from_source(silent).unwrap();
     let file = fit.vehicle_file(&silent, "a simulation").unwrap();
     assert!((file.oncoming.cylinder.stroke_m3 / volumes[1] - 1.0).abs() < 1e-9, "{}", file.source.text);
 }
@@ -60,7 +61,7 @@ fn the_preload_that_was_found_with_the_volume_is_written_with_it() {
         .text
         .replace("preload_n = 450 ", "preload_n = 560 ")
         .replace("[40.5e3, 49.5e3]", "[50.4e3, 61.6e3]");
-    let strong = Vehicle::from_source(Source { text, ..car.file.source.clone() }).unwrap();
+    let strong = VehicleFile::from_source(Source { text, ..car.file.source.clone() }).unwrap();
     assert!(share(&strong) > 0.9, "{}", share(&strong));
     let file = fit.vehicle_file(&strong, "a simulation").unwrap();
     // To the digits that are written.

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use config::{Car, write_learnt};
+use config::{CarFile, write_learnt};
 use fuzz::{Depth, Fuzzer};
 use study::any_shift::logged::LoggedDrive;
 use trace::{Cell, ColumnKind, TableWriter};
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     table(&corpus.join("mdf/words.mf4"))?;
     fs::write(corpus.join("blf/unpacked.blf"), blf())?;
     fs::write(corpus.join("table/runs.csv"), Fuzzer::new(Depth::Short)?.table())?;
-    let car = Car::eight_speed()?;
+    let car = CarFile::eight_speed()?;
     let tables = LoggedDrive::tables(&car, None)?;
     let drive = LoggedDrive::new(&car, &tables, None, None);
     fs::write(corpus.join("learnt/nothing_yet.toml"), write_learnt(&car.gearbox, drive.learnt().1))?;

@@ -4,7 +4,8 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use config::{Car, Experiment, GearboxFile, Source, Study, Vehicle, read_learnt, write_learnt};
+use car::Car;
+use config::{CarFile, ExperimentFile, GearboxFile, Source, Study, VehicleFile, read_learnt, write_learnt};
 use design::{design_compliant, design_rigid};
 use observer::Reading;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
@@ -30,7 +31,7 @@ fn written(fuzzer: &Fuzzer, name: &str, input: &[u8]) -> PathBuf {
 
 pub(crate) fn vehicle(fuzzer: &Fuzzer, input: &[u8]) {
     car(input);
-    let Ok(vehicle) = Vehicle::read(&written(fuzzer, "vehicles/input", input)) else { return };
+    let Ok(vehicle) = VehicleFile::read(&written(fuzzer, "vehicles/input", input)) else { return };
     samples::drive_all(&vehicle);
     if fuzzer.depth == Depth::Long {
         // Requirements that cannot be met are an error, which is well.
@@ -42,8 +43,8 @@ pub(crate) fn vehicle(fuzzer: &Fuzzer, input: &[u8]) {
 fn car(input: &[u8]) {
     let gearbox = Source::built_in("gearboxes/8hp.toml", include_str!("../../../gearboxes/8hp.toml"));
     let source = Source::built_in("vehicles/input", &String::from_utf8_lossy(input));
-    let Ok(car) = Car::from_sources(source, gearbox) else { return };
-    let Ok(model) = CarModel::new(car) else { return };
+    let Ok(car) = CarFile::from_sources(source, gearbox) else { return };
+    let Ok(model) = CarModel::new(car.car) else { return };
     let shift = CarShift { duration_s: 2.0, ..CarShift::usual(&model.car, 2, 3, 0.2) };
     // A car that cannot shift is an error, which is well.
     let _ = simulate_car_shift(&model, &model.car, CarCalibration::STANDARD, &shift, |_| {});
@@ -89,7 +90,7 @@ pub(crate) fn learnt(car: &Car, input: &[u8]) {
 }
 
 pub(crate) fn experiment(fuzzer: &Fuzzer, input: &[u8]) {
-    let Ok(experiment) = Experiment::read(&written(fuzzer, "experiments/input", input)) else { return };
+    let Ok(experiment) = ExperimentFile::read(&written(fuzzer, "experiments/input", input)) else { return };
     if fuzzer.depth == Depth::Long && experiment.duration_s <= LONGEST_DRIVE_S {
         let car = experiment.simulated_vehicle(&fuzzer.vehicle);
         let _ = simulate_shift(&car, &fuzzer.vehicle, &experiment, config::study::RECORD_BEFORE_S);

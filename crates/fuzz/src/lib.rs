@@ -20,7 +20,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{env, fs, panic};
 
-use config::{Car, GainMethod, Study, Vehicle};
+use car::GainMethod;
+use config::{CarFile, Study, VehicleFile};
 use logs::{CanKind, Format};
 use rand_pcg::Pcg64Mcg;
 use study::AnyObserver;
@@ -135,8 +136,8 @@ pub struct Fuzzer {
     depth: Depth,
     /// A folder of its own, with the project's vehicle and experiment files in it.
     folder: PathBuf,
-    vehicle: Vehicle,
-    car: Car,
+    vehicle: VehicleFile,
+    car: CarFile,
     observers: Vec<AnyObserver>,
     layout: Layout,
 }
@@ -157,11 +158,11 @@ impl Fuzzer {
                 fs::copy(&path, folder.join(name).join(path.file_name().unwrap_or_default()))?;
             }
         }
-        let vehicle = Vehicle::built_in()?;
+        let vehicle = VehicleFile::built_in()?;
         let methods = if depth == Depth::Long { &GainMethod::ALL[..] } else { &[GainMethod::Iss] };
         let observers = samples::observers(&vehicle, methods)?;
         let layout = Layout::of(&Study::read(&folder.join("experiments/settings.toml"))?);
-        Ok(Self { depth, folder, vehicle, car: Car::eight_speed()?, observers, layout })
+        Ok(Self { depth, folder, vehicle, car: CarFile::eight_speed()?, observers, layout })
     }
 
     /// The input of a case.

@@ -1,6 +1,6 @@
 //! Samples for the observers: plausible ones with some that are not.
 
-use config::{GainMethod, ObserverKind, Vehicle};
+use car::{GainMethod, ObserverKind, Vehicle};
 use design::{DesignError, bounded};
 use drivetrain::Real;
 use observer::{Estimate, Estimator, Health, Input, InputLimits, Reading};
@@ -50,7 +50,7 @@ fn step_through<T: Real>(
 
 /// Steps every observer through an input, alone and within its range, in both precisions.
 pub(crate) fn step_all(vehicle: &Vehicle, observers: &[AnyObserver], input: &[u8]) {
-    let limits = &vehicle.limits;
+    let limits = &design::input_limits(vehicle);
     macro_rules! both {
         ($observer:expr) => {{
             let (double, single) = ($observer, $observer.cast::<f32>());

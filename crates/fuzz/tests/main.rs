@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use config::{Car, Source, read_learnt};
+use config::{CarFile, Source, read_learnt};
 use fuzz::{Depth, Fuzzer, Target};
 use logs::can::Database;
 use logs::{ChannelMap, Format, Log, OpenOptions, inspect};
@@ -103,7 +103,7 @@ fn each_seed_is_one_that_its_reader_takes_and_a_corpus_is_small() {
     let text = |path: &PathBuf| Source::built_in("seed", &fs::read_to_string(path).unwrap());
     seeds(Target::Dbc).iter().for_each(|path| assert!(!Database::read(path).unwrap().channels().is_empty()));
     seeds(Target::Map).iter().for_each(|path| assert!(!ChannelMap::read(path).unwrap().channels.is_empty()));
-    let gearbox = Car::eight_speed().unwrap().gearbox;
+    let gearbox = CarFile::eight_speed().unwrap().car.gearbox;
     seeds(Target::Learnt).iter().for_each(|path| assert!(read_learnt(&gearbox, &text(path)).is_ok()));
     for target in Target::ALL {
         let bytes: usize = Fuzzer::corpus(target).iter().map(Vec::len).sum();

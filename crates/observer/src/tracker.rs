@@ -1,18 +1,9 @@
 //! The part of a step that all observers share: checks, valve, phase.
 
+pub use car::Discretisation;
 use drivetrain::{Lag, LinearValve, Real, ReducedShift, Valve, ValveStep};
 
 use crate::{ChannelHealth, Channels, Estimate, Health, InputLimits, Phase, Sample, Supervisor, SupervisorState};
-
-/// How the frozen dynamics are carried over a sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Discretisation {
-    /// By the matrix exponential: exact for coefficients that stand still over the sample.
-    Exact,
-    /// By forward Euler, as the chapter did.
-    Euler,
-}
 
 /// Checks sample, follows the valve model and the phase.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@
 //! converter and the static characteristic of its valves, which is measured at the end of production; it
 //! does not know pressures, torques, or the present delay and lag of the valves.
 
-use config::{ShiftCalibration, ShiftClutch, Vehicle};
+use car::{ShiftCalibration, ShiftClutch, Vehicle};
 use drivetrain::{Engagement, ShiftCoefficients, ShiftTorques};
 
 use crate::FillPlan;

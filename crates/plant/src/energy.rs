@@ -1,6 +1,6 @@
 //! Energy audit of the plant.
 
-use config::Vehicle;
+use car::Vehicle;
 use drivetrain::Driveline;
 
 use crate::{Inputs, Mode, Powertrain, State};

@@ -1,6 +1,6 @@
 //! How the shift controller fills a clutch whose piston has a stroke.
 
-use config::{FastFill, ShiftClutch};
+use car::{FastFill, ShiftClutch};
 
 use crate::delay::DelayLine;
 

@@ -8,11 +8,11 @@
 //! [`car`] is the same for a car with a whole gearbox, in any gear and any shift.
 //!
 //! ```
-//! use config::{Experiment, Vehicle};
+//! use config::{ExperimentFile, VehicleFile};
 //! use plant::simulate;
 //!
-//! let experiment = Experiment::e1()?;
-//! let vehicle = Vehicle::built_in()?;
+//! let experiment = ExperimentFile::e1()?.experiment;
+//! let vehicle = VehicleFile::built_in()?.vehicle;
 //! let mut highest_pa = 0.0_f64;
 //! simulate(&vehicle, &experiment, |sample| highest_pa = highest_pa.max(sample.oncoming_pa))?;
 //! assert!(highest_pa > 0.5e6);

@@ -1,6 +1,6 @@
 //! The equations of the powertrain, smooth within a mode.
 
-use config::{ShiftClutch, Vehicle};
+use car::{ShiftClutch, Vehicle};
 use drivetrain::clutch::drag_torque;
 use drivetrain::{Clutch, ColumnPlace, Driveline, Engagement, ShiftCoefficients, ShiftTorques};
 

@@ -8,7 +8,7 @@
 mod errors;
 mod teeth;
 
-use config::{CurrentSensor, SpeedSensor};
+use car::{CurrentSensor, SpeedSensor};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64Mcg;
 use teeth::Teeth;
@@ -163,7 +163,7 @@ fn tooth_speed(sensor: &SpeedSensor, teeth: &mut Teeth<'_>, now: f64, pitch: f64
 
 #[cfg(test)]
 mod tests {
-    use config::ReadingErrors;
+    use car::ReadingErrors;
 
     use super::*;
 

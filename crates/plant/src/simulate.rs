@@ -1,6 +1,6 @@
 //! One simulated drive: controller, valves, powertrain, recorder.
 
-use config::{Experiment, Profile, ShiftClutch, Vehicle};
+use car::{Experiment, Profile, ShiftClutch, Vehicle};
 use drivetrain::Play;
 
 use crate::delay::DelayLine;

@@ -1,7 +1,7 @@
 //! What the engine gives is stored or dissipated, and the audit notices a missing term.
 
 use crate::common::{e1, each_step, vehicle};
-use config::Experiment;
+use car::Experiment;
 use plant::{PowerBalance, Powertrain, stored_energy};
 
 /// Energies of a whole drive, J.

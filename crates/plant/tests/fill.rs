@@ -1,7 +1,8 @@
 //! Clutches whose pistons have a stroke: fill, plateau on release, oil balance; hysteresis, backlash and drag.
 
 use crate::common::{e1, smooth_vehicle, vehicle};
-use config::{Experiment, OffNominal, Source, Vehicle};
+use car::{Experiment, OffNominal, Vehicle};
+use config::{ExperimentFile, Source, VehicleFile};
 use drivetrain::Cylinder;
 use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::{Contact, HybridIntegrator, Inputs, Powertrain, Sample, Segment, Simulation, Stage, State};
@@ -10,11 +11,11 @@ const STROKE: &str = include_str!("../../../vehicles/two_speed_stroke.toml");
 const FILL: &str = include_str!("../../../experiments/fill.toml");
 
 fn stroke_vehicle() -> Vehicle {
-    Vehicle::from_source(Source::built_in("two_speed_stroke.toml", STROKE)).unwrap()
+    VehicleFile::from_source(Source::built_in("two_speed_stroke.toml", STROKE)).unwrap().vehicle
 }
 
 fn fill() -> Experiment {
-    Experiment::from_source(Source::built_in("fill.toml", FILL)).unwrap()
+    ExperimentFile::from_source(Source::built_in("fill.toml", FILL)).unwrap().experiment
 }
 
 /// The experiment "fill" with these differences.

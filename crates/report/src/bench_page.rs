@@ -1,6 +1,6 @@
 //! The page of the bench: the ranking, and every scenario.
 
-use config::{Experiment, Vehicle};
+use config::{ExperimentFile, VehicleFile};
 use minijinja::{Value, context};
 use observer::Phase;
 use study::Bench;
@@ -15,7 +15,7 @@ use crate::tables::{coverage, number, phase_name};
 ///
 /// # Errors
 /// None in a released program; the tests render the template.
-pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> Result<String, PageError> {
+pub fn bench_page(bench: &Bench, vehicle: &VehicleFile, experiment: &ExperimentFile) -> Result<String, PageError> {
     // The order of the ranking; without one, that of the experiment.
     let observers: Vec<String> =
         bench.rows.first().map_or_else(Vec::new, |row| row.cells.iter().map(|cell| cell.observer.clone()).collect());

@@ -1,6 +1,7 @@
 //! How errors act on the estimates of every shift of a car: rows of tables, and a page.
 
-use config::{Car, ErrorBudget};
+use car::{Car, ErrorBudget};
+use config::CarFile;
 use minijinja::{Value, context};
 use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity};
 
@@ -83,7 +84,7 @@ pub fn hidden_phases(shifts: &[ShiftSensitivity]) -> [usize; 2] {
 ///
 /// # Errors
 /// None in a released program; the tests render the template.
-pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &Car) -> Result<String, PageError> {
+pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &CarFile) -> Result<String, PageError> {
     let errors: Vec<ShiftErrorKind> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(car)).collect();
     let budget = ErrorBudget::of_car(car);
     let bounds = errors.iter().map(|error| context! { error => error.name(), bound => error.bound(&budget) });

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use config::Vehicle;
+use config::VehicleFile;
 use drivetrain::CommandKind;
 use minijinja::{Value, context};
 use observer::Health;
@@ -34,7 +34,7 @@ pub struct LogPage<'a> {
     /// The log.
     pub log: &'a Path,
     /// The vehicle.
-    pub vehicle: &'a Vehicle,
+    pub vehicle: &'a VehicleFile,
     /// The observer and how its gains were found, in words.
     pub observer: &'a str,
     /// The whole drive.

@@ -1,6 +1,6 @@
 //! Figures of the maps: engine, converter, friction, and the observer's `f1` and `f2`.
 
-use config::Vehicle;
+use car::Vehicle;
 use observer::{Phase, RigidModel};
 use trace::units::rpm;
 

@@ -1,6 +1,7 @@
 //! The matrix of a car: every shift in every kind, as rows of tables, and as a page.
 
-use config::Car;
+use car::Car;
+use config::CarFile;
 use drivetrain::ShiftKind;
 use minijinja::{Value, context};
 use study::any_shift::SquaredErrors;
@@ -194,7 +195,7 @@ pub fn shift_cells<'a>(row: &MatrixRow, car: &'a Car) -> Vec<(String, Cell<'a>)>
 ///
 /// # Errors
 /// None in a released program; the tests render the template.
-pub fn matrix_page(matrix: &Matrix, car: &Car, seed: u64) -> Result<String, PageError> {
+pub fn matrix_page(matrix: &Matrix, car: &CarFile, seed: u64) -> Result<String, PageError> {
     let all = Pooled::of(&matrix.rows, |_| true).counts;
     let (kind_titles, kinds) = kind_rows(matrix);
     let (titles, rows) = shift_rows(matrix, car);

@@ -1,6 +1,6 @@
 //! The report of a comparison as one self-contained page.
 
-use config::{Source, Vehicle};
+use config::{Source, VehicleFile};
 use minijinja::{Environment, Value, context};
 use observer::Phase;
 use study::Comparison;
@@ -56,11 +56,11 @@ pub(crate) fn inline(svg: &str) -> Value {
 }
 
 impl Page {
-    /// The report of a comparison on this vehicle.
+    /// The report of a comparison on this vehicle; `source` is the text of its experiment.
     ///
     /// # Errors
     /// None in a released program; the tests render the template.
-    pub fn of(comparison: &Comparison, vehicle: &Vehicle) -> Result<Self, PageError> {
+    pub fn of(comparison: &Comparison, vehicle: &VehicleFile, source: &Source) -> Result<Self, PageError> {
         let shift = shift_figure(comparison).svg();
         let drive = drive_figure(comparison).svg();
         let experiment = &comparison.experiment;
@@ -77,7 +77,7 @@ impl Page {
             certificates => rigid_certificates(comparison),
             compliant => compliant_certificates(comparison),
             quality => comparison.quality.as_ref().map(quality_rows),
-            inputs => origin(&[&vehicle.source, &experiment.source]),
+            inputs => origin(&[&vehicle.source, source]),
             seed => experiment.sensors.map(|sensors| sensors.seed),
             certified => comparison.runs.first().filter(|_| !comparison.bound_pa.is_empty()).map(|run| &run.entry.name),
         })?;
@@ -97,7 +97,7 @@ pub(crate) fn change(ours: f64, theirs: f64) -> String {
 /// The results in sentences, also where an observer is worse than the open loop.
 pub fn findings(comparison: &Comparison) -> Vec<String> {
     let Some(open_loop) = comparison.open_loop() else { return Vec::new() };
-    let observers = comparison.runs.iter().filter(|run| run.entry.kind != config::ObserverKind::OpenLoop);
+    let observers = comparison.runs.iter().filter(|run| run.entry.kind != car::ObserverKind::OpenLoop);
     let mut sentences: Vec<String> = observers
         .map(|run| {
             let parts: Vec<String> = [Phase::TorquePhase, Phase::InertiaPhase]

@@ -4,7 +4,7 @@
 //! another lightness for observers of one kind. They follow from the experiment's entry alone, so that an observer has the
 //! same colour in every figure. Entries of one kind and design, as with other gains, differ in their dashes.
 
-use config::{GainMethod, ObserverEntry, ObserverKind};
+use car::{GainMethod, ObserverEntry, ObserverKind};
 
 /// Black: the truth of the main quantity.
 const BLACK: &str = "#000000";

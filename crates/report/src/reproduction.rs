@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use config::{Study, Vehicle};
+use config::{ExperimentFile, Study, VehicleFile};
 use minijinja::{Value, context};
 use study::statements::{BoundCheck, Case, Figure, Settings, Unit};
 use study::{Chapter, Comparison, Statement};
@@ -30,7 +30,12 @@ impl Reproduction {
     ///
     /// # Errors
     /// None in a released program; the tests render the template.
-    pub fn of(chapter: &Chapter, vehicle: &Vehicle, study: &Study) -> Result<Self, PageError> {
+    pub fn of(
+        chapter: &Chapter,
+        vehicle: &VehicleFile,
+        experiments: &[ExperimentFile; 4],
+        study: &Study,
+    ) -> Result<Self, PageError> {
         let mut figures: Vec<(String, String)> = (chapter.experiments.iter())
             .map(|comparison| {
                 // E1 and E2 show the whole shift, E3 and E4 their observers.
@@ -42,8 +47,8 @@ impl Reproduction {
             })
             .collect();
         let maps = map_figures(vehicle, &design::rigid_model(vehicle));
-        let experiments: Vec<_> = (chapter.experiments.iter().zip(&figures))
-            .map(|(comparison, (_, svg))| {
+        let experiments: Vec<_> = (chapter.experiments.iter().zip(&figures).zip(experiments))
+            .map(|((comparison, (_, svg)), file)| {
                 context! {
                     name => &comparison.experiment.name,
                     title => &comparison.experiment.title,
@@ -51,8 +56,8 @@ impl Reproduction {
                     scores => score_rows(comparison),
                     quality => comparison.quality.as_ref().map(quality_rows),
                     seed => comparison.experiment.sensors.map(|sensors| sensors.seed),
-                    source => comparison.experiment.source.path.shown().to_string(),
-                    sha256 => comparison.experiment.source.sha256(),
+                    source => file.source.path.shown().to_string(),
+                    sha256 => file.source.sha256(),
                 }
             })
             .collect();

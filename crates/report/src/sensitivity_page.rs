@@ -1,6 +1,6 @@
 //! The page of how errors of models and readings act on the estimated pressure.
 
-use config::Vehicle;
+use config::VehicleFile;
 use minijinja::{Value, context};
 use study::PhaseSensitivity;
 use study::sensitivity::{ShaftEffect, ValveEffect, View};
@@ -15,7 +15,7 @@ pub fn sensitivity_page(
     phases: &[PhaseSensitivity],
     valve: &[ValveEffect],
     shaft: &[ShaftEffect],
-    vehicle: &Vehicle,
+    vehicle: &VehicleFile,
 ) -> Result<String, PageError> {
     let rows = phases.iter().map(|phase| {
         let largest = phase.effects.iter().map(|e| (e.bound * e.pressure_pa_per_unit).abs()).fold(0.0, f64::max);

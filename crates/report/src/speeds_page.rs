@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use config::{Source, TURBINE_SIDE_INERTIA_KG_M2};
+use car::TURBINE_SIDE_INERTIA_KG_M2;
+use config::Source;
 use fit::drive::{ConverterFit, DriveRecord, Moment, ShiftTorque};
 use fit::{Series as Readings, Verdict};
 use logs::Shift;

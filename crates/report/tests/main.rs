@@ -4,7 +4,8 @@
 
 use std::path::Path;
 
-use config::{Experiment, ObserverKind, Study, Vehicle};
+use car::ObserverKind;
+use config::{ExperimentFile, Study, VehicleFile};
 use observer::Estimate;
 use report::figure::{Axis, Panel, Weight};
 use report::shift_figure::{observers_figure, shift_figure};
@@ -14,7 +15,7 @@ use study::campaign::{Metric, PHASES, factor_values};
 use study::{Bench, Comparison, Row, Status, Summary, compare};
 
 fn e1() -> Comparison {
-    compare(&Vehicle::built_in().unwrap(), &Experiment::e1().unwrap()).unwrap()
+    compare(&VehicleFile::built_in().unwrap(), &ExperimentFile::e1().unwrap()).unwrap()
 }
 
 fn panel(panels: &[Panel], quantity: &str) -> Panel {
@@ -115,7 +116,7 @@ fn a_study_without_runs_has_a_page() {
 
 #[test]
 fn the_bench_page_has_a_column_for_each_observer_even_without_a_ranking() {
-    let (vehicle, experiment) = (Vehicle::built_in().unwrap(), Experiment::bench().unwrap());
+    let (vehicle, experiment) = (VehicleFile::built_in().unwrap(), ExperimentFile::bench().unwrap());
     let cell = |name: &str| BenchCell {
         observer: name.to_owned(),
         torque_phase_rms_pa: 1e4,

@@ -14,8 +14,9 @@
 use std::error::Error;
 use std::path::Path;
 
-use config::{Car, Drive, Sensors};
-use design::ErrorBudget;
+use car::Drive;
+use car::ErrorBudget;
+use config::{CarFile, DriveFile};
 use study::any_shift::learnt_coverage::{Coverage, LearntDrive, Quantity, Sampled, SampledCar, TorqueErrors, learn};
 
 const CARS: [&str; 5] = ["eight_speed", "six_speed", "four_speed", "ten_speed", "dual_clutch"];
@@ -27,11 +28,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let names: Vec<String> = arguments.collect();
     let names = if names.is_empty() { CARS.map(str::to_owned).to_vec() } else { names };
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let sensors = Sensors::read(&root.join("experiments/bench.toml"))?.ok_or("the bench has no sensors")?;
-    let drive = Drive { repetitions, ..Drive::read(&root.join("drives/city.toml"))? };
+    let sensors = config::read_sensors(&root.join("experiments/bench.toml"))?.ok_or("the bench has no sensors")?;
+    let drive = Drive { repetitions, ..DriveFile::read(&root.join("drives/city.toml"))?.drive };
     let what = if cars == 0 { Sampled::Nothing } else { Sampled::Budget };
     for name in names {
-        let car = Car::read(&root.join(format!("vehicles/{name}.toml")))?;
+        let car = CarFile::read(&root.join(format!("vehicles/{name}.toml")))?;
         let drives = (1..=u64::from(cars.max(1))).map(|seed| {
             let sampled = SampledCar::new(&car, &ErrorBudget::of_car(&car), what, seed);
             learn(&car, &sampled, &drive, &sensors, (parts, seed))

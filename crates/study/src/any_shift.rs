@@ -33,8 +33,9 @@ mod thinned;
 pub mod tour;
 pub mod worth_a_look;
 
-use config::{Car, Sensors, ShiftClutch};
-use design::{ElementErrors, ErrorBudget, ShiftTables, any_shift_filter};
+use car::{Car, Sensors, ShiftClutch};
+use car::{ElementErrors, ErrorBudget};
+use design::{ShiftTables, any_shift_filter};
 use drivetrain::{Cylinder, Passage};
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput};

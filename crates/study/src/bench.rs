@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use config::{ConfigError, Experiment, ObserverEntry, ObserverKind, Vehicle};
+use car::{Experiment, ObserverEntry, ObserverKind, Vehicle};
+use config::{ConfigError, ExperimentFile};
 use observer::{Estimate, KalmanFilter, Phase};
 use serde::Serialize;
 use trace::Trace;
@@ -140,7 +141,11 @@ impl Bench {
 /// # Errors
 /// The experiment has no scenario, or no open loop to rank against; simulation, design, or signals, see [`StudyError`].
 /// A shift that is not completed is a row, not an error.
-pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMut(&str)) -> Result<Bench, StudyError> {
+pub fn bench(
+    vehicle: &Vehicle,
+    experiment: &ExperimentFile,
+    mut progress: impl FnMut(&str),
+) -> Result<Bench, StudyError> {
     let open_loop = open_loop(experiment)?;
     let observers = self::observers(vehicle, experiment)?;
     let mut rows = Vec::new();
@@ -228,7 +233,7 @@ fn driven<'a>(
 ///
 /// # Errors
 /// The experiment has no scenario, or no open loop.
-pub fn open_loop(experiment: &Experiment) -> Result<usize, ConfigError> {
+pub fn open_loop(experiment: &ExperimentFile) -> Result<usize, ConfigError> {
     let missing = |key: &str, at: usize, message: &str| ConfigError::Meaning {
         path: experiment.source.path.clone(),
         line: experiment.source.line(at),

@@ -1,7 +1,8 @@
 //! Several observers on the same drive.
 
+use car::{Experiment, ObserverEntry, ObserverKind, Vehicle};
+use config::ConfigError;
 use config::study::RECORD_BEFORE_S;
-use config::{ConfigError, Experiment, ObserverEntry, ObserverKind, Vehicle};
 use design::{CompliantDesign, DesignError, RigidDesign, design_compliant, design_rigid};
 use observer::{Bounds, Estimate, Phase};
 use plant::PlantError;

@@ -3,7 +3,8 @@
 //! The car of the file makes a power-on upshift. Its readings at 100 Hz, without errors, are estimated with the file, and again with
 //! each default changed by its stated uncertainty, one way and the other.
 
-use config::{Change, DefaultTaken, Experiment, GainMethod, ObserverKind, Vehicle};
+use car::{GainMethod, ObserverKind, Vehicle};
+use config::{Change, DefaultTaken, ExperimentFile, VehicleFile};
 use drivetrain::Table1;
 use observer::{Estimate, Phase};
 use trace::Trace;
@@ -48,7 +49,7 @@ pub struct Influence {
 ///
 /// # Errors
 /// The car cannot be simulated.
-pub fn default_influences(vehicle: &Vehicle) -> Result<Option<Vec<Influence>>, StudyError> {
+pub fn default_influences(vehicle: &VehicleFile) -> Result<Option<Vec<Influence>>, StudyError> {
     let Some(readings) = readings(vehicle)? else { return Ok(None) };
     let nominal = OBSERVERS.map(|kind| estimates(vehicle, kind, &readings.trace));
     let mut found = Vec::new();
@@ -82,7 +83,7 @@ struct Shift {
 }
 
 fn readings(vehicle: &Vehicle) -> Result<Option<Shift>, StudyError> {
-    let mut experiment = Experiment::e1()?;
+    let mut experiment = ExperimentFile::e1()?;
     let ratio = vehicle.shift.ratio_offgoing() * vehicle.driveline.final_ratio;
     experiment.throttle = Table1::new(&[0.0, 0.2, 0.6], &[0.1, 0.1, THROTTLE]).unwrap_or(experiment.throttle);
     experiment.initial_vehicle_m_s = START_M_S;

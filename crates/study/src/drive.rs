@@ -1,6 +1,6 @@
 //! A simulated drive as a trace.
 
-use config::{Experiment, Vehicle};
+use car::{Experiment, Vehicle};
 use observer::Phase;
 use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::{Contact, Mode, Moment, PlantError, Powertrain, Sample, Simulation, Stage, simulate};

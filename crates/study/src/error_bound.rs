@@ -4,7 +4,8 @@
 //! `w = dy/dt - F - G z`, Eq. (2.24), with the true speeds, pressure and shaft torque: the difference between the
 //! acceleration of the simulated car and that of the model. Errors of the sensors are not included.
 
-use config::{Study, Varied, Vehicle, toml_string};
+use car::Vehicle;
+use config::{Study, Varied, toml_string};
 use design::compliant::{SPEED_UNITS_RAD_S, compliant_model};
 use design::enclosing::enclosing_matrix;
 use design::rigid_model;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::path::Path;
 
-use config::Vehicle;
+use car::Vehicle;
 use observer::{Input, Phase};
 use trace::{CsvRows, TraceError, signal};
 

@@ -1,6 +1,6 @@
 //! Any of the observers, built from a vehicle and an entry of an experiment file.
 
-use config::{GainMethod, GivenGains, ObserverEntry, ObserverKind, Sensors, Vehicle};
+use car::{GainMethod, GivenGains, ObserverEntry, ObserverKind, Sensors, Vehicle};
 use design::compliant::physical_gains;
 use design::{
     DesignError, Model, OffsetMissed, best_compliant, best_rigid, bounded, compliant_observer, design_discrete,
@@ -9,7 +9,7 @@ use design::{
 };
 use observer::{
     Bounds, CompliantObserver, Discretisation, Estimate, Estimator, ExtendedFilter, Input, Inversion, KalmanFilter,
-    RigidGains, RigidObserver, SlidingObserver, SuperTwisting, Tracker, UnscentedFilter,
+    RigidGains, RigidObserver, SlidingGains, SlidingObserver, SuperTwisting, Tracker, UnscentedFilter,
 };
 
 use crate::{EstimateColumns, RunColumns, run};
@@ -120,8 +120,24 @@ impl AnyObserver {
                 entry.sample_time_s,
                 sensors.filter(|_| entry.real_sensors),
             )?,
-            Some(GivenGains::Rigid(gains)) => Self::Rigid(rigid_observer(vehicle, gains)),
-            Some(GivenGains::Sliding(gains)) => Self::Sliding(sliding_observer(vehicle, gains)),
+            Some(GivenGains::Rigid { torque_phase_pa_s_rad, inertia_phase_pa_s_rad }) => {
+                let gains = RigidGains { torque_phase_pa_s_rad, inertia_phase_pa_s_rad };
+                Self::Rigid(rigid_observer(vehicle, gains))
+            }
+            Some(GivenGains::Sliding {
+                torque_speed_rad_s2,
+                torque_pressure_pa_s,
+                inertia_speed_rad_s2,
+                inertia_pressure_pa_s,
+            }) => {
+                let gains = SlidingGains {
+                    torque_speed_rad_s2,
+                    torque_pressure_pa_s,
+                    inertia_speed_rad_s2,
+                    inertia_pressure_pa_s,
+                };
+                Self::Sliding(sliding_observer(vehicle, gains))
+            }
             Some(GivenGains::CompliantNormalised(torque, inertia)) => {
                 Self::Compliant(Box::new(compliant_observer(vehicle, physical_gains(&torque, &inertia))))
             }

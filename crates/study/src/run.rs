@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use config::Vehicle;
+use car::Vehicle;
 use drivetrain::{CommandKind, ReducedShift};
 use observer::{Estimate, Estimator, Input, Reading};
 use trace::{Trace, TraceError, signal};

@@ -1,6 +1,6 @@
 //! Sampling of a recorded drive, with ideal or real sensors.
 
-use config::{ReadingErrors, Sensors, SpeedSensor, Vehicle};
+use car::{ReadingErrors, Sensors, SpeedSensor, Vehicle};
 use observer::Phase;
 use plant::sensors::{Channel, Readings, Rows, dealt, read_current, read_speed};
 use trace::{Column, Trace, Values, Word, signal};
@@ -109,6 +109,7 @@ fn shift_s(whole: &Trace) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use config::VehicleFile;
 
     #[test]
     fn every_tenth_sample_is_kept_at_a_tenth_of_the_rate() {
@@ -148,11 +149,11 @@ mod tests {
     }
 
     fn sensors() -> Sensors {
-        config::Experiment::bench().unwrap().sensors.unwrap()
+        config::ExperimentFile::bench().unwrap().sensors.unwrap()
     }
 
     fn read(sensors: &Sensors) -> Trace {
-        through_sensors(&drive(), 0.01, sensors, &Vehicle::built_in().unwrap())
+        through_sensors(&drive(), 0.01, sensors, &VehicleFile::built_in().unwrap())
     }
 
     /// The columns in which two traces differ.

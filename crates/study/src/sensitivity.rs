@@ -5,7 +5,7 @@
 //! The equivalent pressure error is the least-squares solution, the error of an observer that uses the speeds alone. An
 //! observer that uses the valve model alone has the error of the valve model.
 
-use config::Vehicle;
+use car::Vehicle;
 use design::budget::{grade_n_m, mass_n_m};
 use design::compliant::compliant_model;
 use design::rigid_model;
@@ -150,7 +150,7 @@ fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2
     if phase == Phase::InertiaPhase {
         columns.push(("slip reading, over 10 ms", "rad/s", bounds.slip_quantum_rad_s, [0.0, 1.0 / sample_s]));
     }
-    let rounding_rad_s = bounds.float32_rounding * vehicle.limits.speed_max_rad_s;
+    let rounding_rad_s = bounds.float32_rounding * vehicle.speed_max_rad_s;
     columns.push(("float32 rounding of a speed, over 10 ms", "rad/s", rounding_rad_s, [1.0 / sample_s, 0.0]));
     columns
 }
@@ -235,6 +235,7 @@ fn evaluate(vehicle: &Vehicle, phase: Phase, view: View, pressure: [f64; 2], col
 #[cfg(test)]
 mod tests {
     use super::*;
+    use config::VehicleFile;
 
     fn effect<'a>(phases: &'a [PhaseSensitivity], phase: Phase, view: View, error: &str) -> &'a ErrorEffect {
         let one = phases.iter().find(|p| p.phase == phase.name() && p.view == view).unwrap();
@@ -243,7 +244,7 @@ mod tests {
 
     #[test]
     fn the_known_facts_come_out() {
-        let phases = sensitivity(&Vehicle::built_in().unwrap());
+        let phases = sensitivity(&VehicleFile::built_in().unwrap());
         let influence = |phase: Phase| phases.iter().find(|p| p.phase == phase.name()).unwrap().influence_rad_s2_mpa;
         // The rigid model is nearly blind in the torque phase.
         assert!(influence(Phase::InertiaPhase) > 50.0 * influence(Phase::TorquePhase));

@@ -4,7 +4,7 @@
 //! both say about one shift. Pressures and torques are given for the shift that the vehicle file describes; of other shifts only
 //! the speeds tell something.
 
-use config::Vehicle;
+use car::Vehicle;
 use drivetrain::ReducedShift;
 use logs::shifts::Held;
 use logs::{Load, Shift};
@@ -482,6 +482,7 @@ fn unhealthy(samples: &[LogSample]) -> Vec<(Health, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use config::VehicleFile;
 
     const NO_INPUT: Input<f64> = Input::none(0.01);
 
@@ -515,7 +516,7 @@ mod tests {
     /// one, the work was twice what it is.
     #[test]
     fn the_slip_in_a_hole_is_between_those_at_its_ends() {
-        let reduced = &Vehicle::built_in().unwrap().shift;
+        let reduced = &VehicleFile::built_in().unwrap().shift;
         let slip = |step: u32| 100.0 - 5.0 * f64::from(step.min(20));
         let output_rad_s = 50.0;
         let bounds =
@@ -544,7 +545,7 @@ mod tests {
 
     #[test]
     fn a_refused_reading_does_no_friction_work() {
-        let reduced = &Vehicle::built_in().unwrap().shift;
+        let reduced = &VehicleFile::built_in().unwrap().shift;
         let work = |turbine: ChannelHealth, spike: f64| {
             let sample = |step: u32| {
                 let reading = |value: f64| Some(Reading::now(value));

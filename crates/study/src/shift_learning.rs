@@ -3,8 +3,9 @@
 //! A car that is not the one that filter and controller know makes shifts between neighbouring gears, up and down, with and
 //! without power, in a random order. After them each of its shifts is scored with what was learnt up to then.
 
-use config::{Car, Sensors};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Sensors};
+use design::{ShiftTables, any_shift_filter};
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
 use plant::car::{CarSample, CarShift};

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use config::{Experiment, GivenGains, ObserverKind, Study, Values, Vehicle};
-use observer::{Phase, RigidGains};
+use car::{GivenGains, ObserverKind};
+use config::{ExperimentFile, Study, Values, VehicleFile};
+use observer::Phase;
 use study::campaign::{Metric, PHASES, factor_values, scored_shift};
 use study::{Campaign, ShiftQuality, StudyError, Summary, Target, error_bound, execute, simulate_shift, worst_case};
 use trace::Trace;
@@ -210,7 +211,7 @@ fn the_model_error_is_of_the_chapters_order_and_a_design_reads_it() {
 
     let path = std::env::temp_dir().join(format!("wetclutch-bounds-{}.toml", std::process::id()));
     std::fs::write(&path, found.toml(&study)).unwrap();
-    let vehicle = Vehicle::read_with(&experiments().join("../vehicles/two_speed_at.toml"), &path);
+    let vehicle = VehicleFile::read_with(&experiments().join("../vehicles/two_speed_at.toml"), &path);
     std::fs::remove_file(path).unwrap();
     let vehicle = vehicle.unwrap();
     assert!((vehicle.inertia_phase.model_error_max_rad_s2 - inertia.rigid.largest).abs() < 0.1);
@@ -248,10 +249,10 @@ fn an_observer_whose_gain_is_absurd_is_the_open_loop() {
     let few = r#"observers = ["open loop"]"#;
     let all = r#"observers = ["Kalman", "peak-to-peak", "rigid", "compliant", "open loop"]"#;
     let mut study = study_of("settings.toml", &[(all, few), ("runs = 2000", "runs = 12")]);
-    let mut experiment = Experiment::clone(&study.experiment);
+    let mut experiment = ExperimentFile::clone(&study.experiment);
     let mut entry = experiment.observers[0].clone();
-    let gains = RigidGains { torque_phase_pa_s_rad: 1e200, inertia_phase_pa_s_rad: [1e200; 2] };
-    (entry.name, entry.kind, entry.gains) = ("wild".to_owned(), ObserverKind::Rigid, Some(GivenGains::Rigid(gains)));
+    let gains = GivenGains::Rigid { torque_phase_pa_s_rad: 1e200, inertia_phase_pa_s_rad: [1e200; 2] };
+    (entry.name, entry.kind, entry.gains) = ("wild".to_owned(), ObserverKind::Rigid, Some(gains));
     experiment.observers.insert(0, entry);
     study.experiment = Arc::new(experiment);
     let summary = summary(study);

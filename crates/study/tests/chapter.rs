@@ -2,15 +2,15 @@
 
 use std::sync::LazyLock;
 
-use config::{Experiment, Study, Vehicle};
+use config::{ExperimentFile, Study, VehicleFile};
 use observer::Phase;
 use study::statements::Case;
 use study::{Chapter, Comparison, Statement, reproduce};
 
 /// The experiments, and the statements in so many settings besides.
 fn chapter_in(settings: u64, threads: usize) -> Chapter {
-    let (vehicle, study) = (Vehicle::built_in().unwrap(), Study::plausible().unwrap());
-    reproduce(&vehicle, &Experiment::built_in().unwrap(), &study, settings, threads, || ()).unwrap()
+    let (vehicle, study) = (VehicleFile::built_in().unwrap().vehicle, Study::plausible().unwrap());
+    reproduce(&vehicle, &ExperimentFile::built_in().unwrap(), &study, settings, threads, || ()).unwrap()
 }
 
 /// The experiments without further settings.
@@ -61,8 +61,8 @@ fn the_setting_of_the_files_gives_the_verdicts_of_the_files() {
     std::fs::write(&path, text).unwrap();
     let study = Study::read(&path).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
-    let vehicle = Vehicle::built_in().unwrap();
-    let chapter = reproduce(&vehicle, &Experiment::built_in().unwrap(), &study, 1, 1, || ()).unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
+    let chapter = reproduce(&vehicle, &ExperimentFile::built_in().unwrap(), &study, 1, 1, || ()).unwrap();
     let share = |verdict: Option<bool>| verdict.map(|yes| f64::from(u8::from(yes)));
     for row in &chapter.statements {
         let shares = row.share_of_settings.unwrap();
@@ -137,8 +137,8 @@ fn the_chapters_compliant_gains_do_as_well_as_ours() {
 
 #[test]
 fn sensors_change_the_estimate_and_their_seed_changes_the_noise() {
-    let vehicle = Vehicle::built_in().unwrap();
-    let [_, _, _, mut e4] = Experiment::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
+    let [_, _, _, mut e4] = ExperimentFile::built_in().unwrap();
     let name = "compliant, 100 Hz, sensors";
     let first = study::compare(&vehicle, &e4).unwrap();
     e4.sensors.as_mut().unwrap().seed += 1;
@@ -149,11 +149,11 @@ fn sensors_change_the_estimate_and_their_seed_changes_the_noise() {
 
 /// The bench with this seed for the sensors' noise and the better ones of its observers.
 fn bench_with(seed: u64) -> study::Bench {
-    let mut experiment = Experiment::bench().unwrap();
+    let mut experiment = ExperimentFile::bench().unwrap();
     experiment.sensors.as_mut().unwrap().seed = seed;
     let kept = ["Kalman", "extended Kalman", "unscented", "inversion", "peak-to-peak", "open loop"];
     experiment.observers.retain(|entry| kept.contains(&entry.name.as_str()));
-    study::bench(&Vehicle::built_in().unwrap(), &experiment, |_| ()).unwrap()
+    study::bench(&VehicleFile::built_in().unwrap().vehicle, &experiment, |_| ()).unwrap()
 }
 
 /// The one with seed 1, which two tests look at.

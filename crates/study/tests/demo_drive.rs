@@ -1,13 +1,14 @@
 //! The drive of the demo: what the report claims about it, and a replay from measured signals alone.
 
-use config::{Experiment, Vehicle};
+use car::Vehicle;
+use config::{ExperimentFile, VehicleFile};
 use design::rigid_observer;
 use observer::{Estimate, Estimator, Phase};
 use study::{Comparison, ObserverRun, RunColumns, compare, run};
 use trace::{read_csv, signal, write_csv};
 
 fn comparison() -> (Vehicle, Comparison) {
-    let (vehicle, experiment) = (Vehicle::built_in().unwrap(), Experiment::e1().unwrap());
+    let (vehicle, experiment) = (VehicleFile::built_in().unwrap().vehicle, ExperimentFile::e1().unwrap().experiment);
     let comparison = compare(&vehicle, &experiment).unwrap();
     (vehicle, comparison)
 }

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use config::{Experiment, Study, Vehicle};
+use car::{Experiment, Vehicle};
+use config::{ExperimentFile, Study};
 use design::{bounded, kalman_filter, open_loop_maps, rigid_observer};
 use observer::{ChannelHealth, Estimate, Estimator, Health, Input, Phase, Reading, RigidGains};
 use study::sampling::through_sensors;
@@ -24,10 +25,10 @@ type Row = (Input<f64>, Phase, f64);
 impl Field {
     fn new() -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments/field.toml");
-        let experiment = Experiment::read(&path).unwrap();
-        let vehicle = experiment.read_vehicle().unwrap();
+        let experiment = ExperimentFile::read(&path).unwrap();
+        let vehicle = experiment.read_vehicle().unwrap().vehicle;
         let drive = simulate_drive(&vehicle, &experiment).unwrap();
-        Self { vehicle, experiment, drive }
+        Self { vehicle, experiment: experiment.experiment, drive }
     }
 
     fn rows(&self, scenario: &str) -> Vec<Row> {
@@ -404,7 +405,7 @@ fn the_command_of_the_offgoing_clutch_limits_what_it_carries() {
 #[test]
 fn a_clutch_without_oil_shows_as_a_flare() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments/fill.toml");
-    let experiment = Experiment::read(&path).unwrap();
+    let experiment = ExperimentFile::read(&path).unwrap();
     let vehicle = experiment.read_vehicle().unwrap();
     for (name, flares) in [("nominal", false), ("early fill", false), ("starved", true)] {
         let scenario = experiment.scenarios.iter().find(|known| known.name == name).unwrap();

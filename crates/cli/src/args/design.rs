@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use car::{GainMethod, SAMPLE_TIMES_S};
 use clap::{Args, ValueEnum};
-use config::{GainMethod, SAMPLE_TIMES_S};
 use design::Quantity;
 use observer::Phase;
 

@@ -1,6 +1,6 @@
 //! `wetclutch bench`.
 
-use config::{Experiment, Vehicle};
+use config::{ExperimentFile, VehicleFile};
 use report::bench_page;
 use report::tables::{coverage, number};
 use study::Bench;
@@ -18,10 +18,10 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
     }
     let (vehicle, experiment) = match &options.experiment {
         Some(path) => {
-            let experiment = Experiment::read(path)?;
+            let experiment = ExperimentFile::read(path)?;
             (experiment.read_vehicle()?, experiment)
         }
-        None => (Vehicle::built_in()?, Experiment::bench()?),
+        None => (VehicleFile::built_in()?, ExperimentFile::bench()?),
     };
     if options.threads.is_given() {
         warn_without_effect(

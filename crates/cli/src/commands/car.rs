@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use config::{Car, Kind, Source, TURBINE_SIDE_INERTIA_KG_M2};
+use car::{Car, TURBINE_SIDE_INERTIA_KG_M2};
+use config::{CarFile, Kind, Source};
 use trace::ShownPath as _;
 
 use super::gearbox;
@@ -10,20 +11,20 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Reads the vehicle file of a car with a gearbox that is to be simulated.
-pub(super) fn read_car(path: &Path) -> Result<Car, Failure> {
+pub(super) fn read_car(path: &Path) -> Result<CarFile, Failure> {
     if Source::read(path)?.kind()? == Kind::Vehicle {
         return Err(Failure::Input(format!(
             "{}: this vehicle file describes one shift, and not a gearbox\nhint: use one with `gearbox`, such as vehicles/eight_speed.toml",
             path.shown()
         )));
     }
-    let car = Car::read(path)?;
+    let car = CarFile::read(path)?;
     warn_of_slipping(&car);
     Ok(car)
 }
 
 /// Warns if the closed elements of a car that is to be simulated cannot hold what its engine gives: its shifts may not come to an end.
-pub(super) fn warn_of_slipping(car: &Car) {
+pub(super) fn warn_of_slipping(car: &CarFile) {
     if let Some(slipping) = car.slipping_elements() {
         output::note(&format!("warning: {slipping}"));
     }

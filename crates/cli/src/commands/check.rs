@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use car::{Experiment, GainMethod, Vehicle};
 use config::{
-    Car, CarStudy, ConfigError, Drive, Experiment, GainMethod, GearboxFile, Kind, Sensors, Source, Study, Values,
-    Vehicle, all_errors, check_learnt,
+    CarFile, CarStudy, ConfigError, DriveFile, ExperimentFile, GearboxFile, Kind, Source, Study, Values, VehicleFile,
+    all_errors, check_learnt,
 };
 use design::{longest_step_of, unstable_corners};
 use logs::ChannelMap;
@@ -84,13 +85,13 @@ fn check_file(options: &Check, file: &Path) -> Result<(), Failure> {
 fn read(kind: Kind, source: Source) -> Result<(), ConfigError> {
     match kind {
         Kind::Gearbox => GearboxFile::from_source(source).map(drop),
-        Kind::Car => Car::from_source(source).map(drop),
+        Kind::Car => CarFile::from_source(source).map(drop),
         Kind::CarStudy => CarStudy::from_source(source).map(drop),
-        Kind::Drive => Drive::from_source(source).map(drop),
-        Kind::Vehicle => Vehicle::from_source(source).map(drop),
-        Kind::Experiment => Experiment::from_source(source)?.read_vehicle().map(drop),
-        Kind::Overlay => Vehicle::check_overlay(&source),
-        Kind::Sensors => Sensors::from_source(&source).map(drop),
+        Kind::Drive => DriveFile::from_source(source).map(drop),
+        Kind::Vehicle => VehicleFile::from_source(source).map(drop),
+        Kind::Experiment => ExperimentFile::from_source(source)?.read_vehicle().map(drop),
+        Kind::Overlay => VehicleFile::check_overlay(&source),
+        Kind::Sensors => config::sensors_of(&source).map(drop),
         Kind::Study => Study::from_source(source).map(drop),
         Kind::Learnt => check_learnt(&source),
         Kind::ChannelMap => read_map(&source),
@@ -123,17 +124,17 @@ fn read_map(source: &Source) -> Result<(), ConfigError> {
 fn describe_file(options: &Check, file: &Path, (source, kind): (Source, Kind)) -> Result<(), Failure> {
     match kind {
         Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
-        Kind::Car => describe_whole_car(options, &Car::from_source(source)?),
+        Kind::Car => describe_whole_car(options, &CarFile::from_source(source)?),
         Kind::CarStudy => super::study::describe_cars(file),
-        Kind::Drive => describe_drive(&Drive::from_source(source)?, file),
+        Kind::Drive => describe_drive(&DriveFile::from_source(source)?, file),
         Kind::Vehicle => {
-            let vehicle = Vehicle::from_source(source)?;
+            let vehicle = VehicleFile::from_source(source)?;
             describe(&vehicle)?;
             warn(&vehicle.implausible());
             describe_defaults(&vehicle, options.all)
         }
         Kind::Experiment => {
-            let experiment = Experiment::from_source(source)?;
+            let experiment = ExperimentFile::from_source(source)?;
             let vehicle = experiment.read_vehicle()?;
             describe_experiment(&experiment)?;
             describe(&vehicle)?;
@@ -166,7 +167,7 @@ fn describe_file(options: &Check, file: &Path, (source, kind): (Source, Kind)) -
     }
 }
 
-fn describe_whole_car(options: &Check, car: &Car) -> Result<(), Failure> {
+fn describe_whole_car(options: &Check, car: &CarFile) -> Result<(), Failure> {
     let sensors = sensors_or_bench(options.sensors.as_deref())?;
     describe_car(car)?;
     describe_gearbox(car)?;

@@ -1,6 +1,7 @@
 //! What `wetclutch check` says about the defaults of a vehicle file.
 
-use config::{Car, Change, DefaultTaken, Sensors, Vehicle};
+use car::Sensors;
+use config::{CarFile, Change, DefaultTaken, VehicleFile};
 use study::any_shift::influence::{CarInfluence, ErrorOfEstimate, ValueFrom, car_influences};
 use study::{Influence, default_influences};
 use trace::units;
@@ -16,7 +17,7 @@ const AT_TURBINE: [&str; 2] = ["converter.", "engine.inertia"];
 const LONGEST: usize = 24;
 
 /// Lists the defaults of a vehicle file, those that matter most to an estimate first.
-pub(super) fn describe_defaults(vehicle: &Vehicle, all: bool) -> Result<(), Failure> {
+pub(super) fn describe_defaults(vehicle: &VehicleFile, all: bool) -> Result<(), Failure> {
     let taken = &vehicle.defaults_taken;
     if taken.is_empty() {
         return Ok(());
@@ -54,7 +55,7 @@ fn short_value(taken: &DefaultTaken) -> String {
 }
 
 /// Lists the defaults of a vehicle file with a gearbox, and the values that matter most to an estimate.
-pub(super) fn describe_car_values(car: &Car, sensors: &Sensors, all: bool) -> Result<(), Failure> {
+pub(super) fn describe_car_values(car: &CarFile, sensors: &Sensors, all: bool) -> Result<(), Failure> {
     let taken = &car.defaults_taken;
     if taken.is_empty() && !all {
         return Ok(());

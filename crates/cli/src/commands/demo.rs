@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use config::{Experiment, Vehicle};
+use car::Vehicle;
+use config::{ExperimentFile, VehicleFile};
 use report::Page;
 use report::page::findings;
 use report::tables::phase_name;
@@ -25,12 +26,12 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     let folder = &options.output;
     writable(folder, &FILES)?;
     let [report, trace, measured_only, estimate] = FILES.map(|name| folder.join(name));
-    let (vehicle, mut experiment) = (Vehicle::built_in()?, Experiment::e1()?);
+    let (vehicle, mut experiment) = (VehicleFile::built_in()?, ExperimentFile::e1()?);
     // The gains that E1 gives are the chapter's; the demo designs its own.
     experiment.observers.retain(|entry| entry.gains.is_none());
     output::note(&format!("simulating {} s of driving; designing and running the observers", experiment.duration_s));
     let comparison = compare(&vehicle, &experiment)?;
-    let page = Page::of(&comparison, &vehicle)?;
+    let page = Page::of(&comparison, &vehicle, &experiment.source)?;
 
     write_text(&report, &page.html)?;
     for (name, svg) in &page.figures {

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use config::{Car, Drive, Source};
-use design::ErrorBudget;
+use car::ErrorBudget;
+use car::{Car, Drive};
+use config::{DriveFile, Source};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
 use report::matrix_page::kind_rows;
@@ -30,11 +31,10 @@ const NAME: &str = "drive";
 
 pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     let car = read_car(vehicle)?;
-    let drive = options.drive.as_deref().map(Drive::read).transpose()?;
+    let drive = options.drive.as_deref().map(DriveFile::read).transpose()?;
     let folder = &options.output;
     writable(folder, &[PAGE, SHIFTS])?;
-    let speeds = drive.iter().filter_map(|drive| drive.trace.as_ref());
-    keeps_inputs(folder, NAME, speeds.map(|trace| &trace.path))?;
+    keeps_inputs(folder, NAME, drive.iter().filter_map(|drive| drive.speeds.as_ref()))?;
     let mut random = Random(options.seed);
     let draw = ShiftDraw::within(&car, &ErrorBudget::of_car(&car), || random.uniform());
     let model = CarModel::new(draw.car(&car)).map_err(|error| Failure::Input(error.to_string()))?;
@@ -42,7 +42,7 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     let name = match &drive {
         Some(drive) => {
             output::note(&format!("driving \"{}\", {:.0} s", drive.name, drive.duration_s()));
-            let drive = Drive { sample_time_s: RECORD_S, ..drive.clone() };
+            let drive = Drive { sample_time_s: RECORD_S, ..drive.drive.clone() };
             simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| recording.push(sample))?;
             drive.name
         }

@@ -1,6 +1,7 @@
 //! `wetclutch design`.
 
-use config::{GainMethod, Kind, Source, Vehicle};
+use car::{GainMethod, Vehicle};
+use config::{Kind, Source, VehicleFile};
 use design::compliant::{CompliantRequirement, best_compliant_phase, compliant_requirement, physical_gains};
 use design::open_loop::is_open_loop;
 use design::rigid::best_phase;
@@ -27,28 +28,36 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
         return Err(Failure::Input(message.to_owned()));
     }
     let vehicle = match &options.bounds {
-        Some(bounds) => Vehicle::read_with(&options.vehicle, bounds)?,
-        None => Vehicle::read(&options.vehicle)?,
+        Some(bounds) => VehicleFile::read_with(&options.vehicle, bounds)?,
+        None => VehicleFile::read(&options.vehicle)?,
     };
-    let missed = of_vehicle(&vehicle, options, &[])?;
+    let missed = of_vehicle(&vehicle, &vehicle.source, options, &[])?;
     not_met(missed, options)
 }
 
-/// Prints the gains for a vehicle under its name and lines about it; returns the requirements that they do not meet.
-pub(super) fn of_vehicle(vehicle: &Vehicle, options: &Design, about: &[String]) -> Result<Vec<OffsetMissed>, Failure> {
+/// Prints the gains for a vehicle of a file under its name and lines about it; returns the requirements that they do not meet.
+pub(super) fn of_vehicle(
+    vehicle: &Vehicle,
+    source: &Source,
+    options: &Design,
+    about: &[String],
+) -> Result<Vec<OffsetMissed>, Failure> {
     options_apply(options)?;
     let mut object = Map::new();
     let mut text = Vec::new();
     let mut all_missed = Vec::new();
     for &phase in options.phases() {
-        let (json, lines) = of_phase(vehicle, phase, options, &mut all_missed)?;
+        let (mut json, lines) = of_phase(vehicle, phase, options, &mut all_missed)?;
+        if options.observer != DesignChoice::Sliding {
+            json["vehicle_sha256"] = json!(source.sha256());
+        }
         object.insert(phase.name().to_owned(), json);
         text.extend(lines);
     }
     if options.json {
         output::json(&object)?;
     } else {
-        output::line(&format!("{} ({})", vehicle.name, vehicle.source.path.shown()))?;
+        output::line(&format!("{} ({})", vehicle.name, source.path.shown()))?;
         for line in about {
             output::line(line)?;
         }
@@ -56,7 +65,7 @@ pub(super) fn of_vehicle(vehicle: &Vehicle, options: &Design, about: &[String]) 
         for line in &text {
             output::line(line)?;
         }
-        output::line(&format!("vehicle file sha256 {}", vehicle.source.sha256()))?;
+        output::line(&format!("vehicle file sha256 {}", source.sha256()))?;
     }
     Ok(all_missed)
 }

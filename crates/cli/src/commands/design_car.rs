@@ -1,6 +1,7 @@
 //! `wetclutch design` of a car with a gearbox: one of its shifts, or a table of all upshifts.
 
-use config::{Car, OneShiftError, Vehicle};
+use car::{Car, OneShiftError, Vehicle};
+use config::CarFile;
 use design::{DiscreteCertificate, Model, Quantity, design_discrete_phase};
 use observer::Phase;
 use report::tables::phase_name;
@@ -29,17 +30,14 @@ pub(super) fn of_car(options: &Design) -> Result<(), Failure> {
                 .to_owned(),
         ));
     }
-    let car = Car::read(&options.vehicle)?;
+    let car = CarFile::read(&options.vehicle)?;
     let path = options.vehicle.shown();
-    let named = |error: OneShiftError| match error {
-        OneShiftError::Config(error) => error.into(),
-        error => Failure::Input(format!("{path}: {error}")),
-    };
+    let named = |error: OneShiftError| Failure::Input(format!("{path}: {error}"));
     match &options.shift {
         Some(shift) => {
             let gears = car.shift_named(shift).map_err(named)?;
             let vehicle = car.of_shift(gears).map_err(named)?;
-            let missed = of_vehicle(&vehicle, options, &about(&car, &vehicle, gears))?;
+            let missed = of_vehicle(&vehicle, &car.source, options, &about(&car, &vehicle, gears))?;
             if options.offset_max.is_some() {
                 return not_met(missed, options);
             }
@@ -106,7 +104,7 @@ impl<E: Into<Failure>> From<E> for TableError {
 }
 
 /// The bounds of all upshifts from each forward gear to the next.
-fn table(car: &Car, options: &Design) -> Result<(), TableError> {
+fn table(car: &CarFile, options: &Design) -> Result<(), TableError> {
     let method = options.method.unwrap_or(MethodChoice::PeakToPeak);
     let model = model_of(options, method)?;
     let quantity = options.bound_on.map_or(Quantity::ClutchTorque, Quantity::from);
@@ -124,7 +122,7 @@ fn table(car: &Car, options: &Design) -> Result<(), TableError> {
                 let certificates = options.phases().iter().map(design).collect::<Result<_, _>>()?;
                 rows.push(Row { gears, oncoming: oncoming_name(car, gears), vehicle, certificates });
             }
-            Err(error @ (OneShiftError::NoConverter | OneShiftError::Config(_))) => {
+            Err(error @ OneShiftError::NoConverter) => {
                 return Err(TableError::Shift(error));
             }
             Err(error) => without.push(error.to_string().lines().next().unwrap_or_default().to_owned()),
@@ -201,7 +199,7 @@ impl Row<'_> {
 }
 
 fn print(
-    car: &Car,
+    car: &CarFile,
     options: &Design,
     (model, method, quantity): (Model, MethodChoice, Quantity),
     rows: &[Row<'_>],

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use config::{Car, Experiment, Sensors};
+use car::{Car, Sensors};
+use config::ExperimentFile;
 use report::matrix_page::{failures, kind_rows, matrix_page, shift_cells, shift_rows, without_tables};
 use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::{Cell, ShownPath as _};
@@ -57,7 +58,7 @@ pub(super) fn sensors_or_bench(path: Option<&Path>) -> Result<Sensors, Failure> 
 
 /// The toothed wheels of the built-in bench.
 pub(super) fn bench_sensors() -> Result<Sensors, Failure> {
-    let sensors = Experiment::bench()?.sensors;
+    let sensors = ExperimentFile::bench()?.sensors;
     sensors.ok_or_else(|| Failure::Work("the built-in bench has no sensors".to_owned()))
 }
 

@@ -1,6 +1,6 @@
 //! `wetclutch reproduce`.
 
-use config::{Experiment, Study, Vehicle};
+use config::{ExperimentFile, Study, VehicleFile};
 use report::Reproduction;
 use report::reproduction::{agreeing, ours};
 use study::Chapter;
@@ -15,14 +15,14 @@ use crate::output;
 pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
     const FILES: [&str; 3] = ["reproduction.html", "reproduction.md", "reproduction.json"];
     writable(&options.output, &FILES)?;
-    let (vehicle, study) = (Vehicle::built_in()?, Study::plausible()?);
+    let (vehicle, study) = (VehicleFile::built_in()?, Study::plausible()?);
     let settings = options.settings.map_or(study.runs, |settings| u64::from(settings).min(study.runs));
     output::note(&format!("running experiments E1 to E4, and again in {settings} settings"));
     let bar = progress(settings, 0);
-    let experiments = Experiment::built_in()?;
+    let experiments = ExperimentFile::built_in()?;
     let chapter = study::reproduce(&vehicle, &experiments, &study, settings, options.threads.count(), || bar.inc(1))?;
     bar.finish_and_clear();
-    let reproduction = Reproduction::of(&chapter, &vehicle, &study)?;
+    let reproduction = Reproduction::of(&chapter, &vehicle, &experiments, &study)?;
     let json = format!("{:#}\n", numbers(&chapter));
     let texts = [&reproduction.html, &reproduction.markdown, &json];
     for (name, text) in FILES.iter().zip(texts) {

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use config::{Car, ErrorBudget, Kind, Source, Vehicle};
+use car::{Car, ErrorBudget};
+use config::{Kind, Source, VehicleFile};
 use report::car_sensitivity_page::{BOUND_AND_DEVIATION, car_sensitivity_page, hidden_phases, sensitivity_rows};
 use report::sensitivity_page;
 use serde_json::json;
@@ -22,8 +23,8 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
     let vehicle = match &options.vehicle {
         Some(path) if Source::read(path)?.kind()? == Kind::Car => return of_car(options, path),
         _ if options.sensors.is_some() => return Err(sensors_without_effect()),
-        Some(path) => Vehicle::read(path)?,
-        None => Vehicle::built_in()?,
+        Some(path) => VehicleFile::read(path)?,
+        None => VehicleFile::built_in()?,
     };
     let (phases, valve, shaft) = (find(&vehicle), valve_alone(&vehicle), shaft_level(&vehicle));
     if let Some(folder) = &options.output {

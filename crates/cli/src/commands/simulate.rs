@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use config::{Experiment, Kind, Sensors, Source, Vehicle};
+use car::{Experiment, Sensors, Vehicle};
+use config::{ExperimentFile, Kind, Source};
 use study::drive::{DriveColumns, DriveRow, Recording};
 use study::sampling::through_sensors;
 use study::{ShiftRating, ShiftSample};
@@ -23,7 +24,7 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
             format!("{}: an experiment names its vehicle file\nhint: --vehicle is for a drive file", vehicle.shown());
         return Err(Failure::Input(message));
     }
-    let experiment = Experiment::read(&options.experiment)?;
+    let experiment = ExperimentFile::read(&options.experiment)?;
     let vehicle = experiment.read_vehicle()?;
     let (experiment, name) = chosen(experiment, options)?;
     for name in [format!("{name}.csv"), format!("{name}_measured.csv")] {
@@ -71,7 +72,7 @@ enum Measured<'a> {
 }
 
 impl<'a> Measured<'a> {
-    fn create(path: PathBuf, vehicle: &'a Vehicle, experiment: &'a Experiment) -> Result<Self, Failure> {
+    fn create(path: PathBuf, vehicle: &'a Vehicle, experiment: &'a ExperimentFile) -> Result<Self, Failure> {
         let Some(sensors) = &experiment.sensors else {
             let table = Table::create(path, vehicle, |name| signal::MEASURABLE.contains(&name))?;
             return Ok(Self::Exact(Box::new(table)));
@@ -160,7 +161,7 @@ pub(super) fn size_note(duration_s: f64, step_s: f64, row_bytes: f64) -> Option<
 }
 
 /// The selected drive, and the name of its files.
-fn chosen(experiment: Experiment, options: &Simulate) -> Result<(Experiment, String), Failure> {
+fn chosen(mut experiment: ExperimentFile, options: &Simulate) -> Result<(ExperimentFile, String), Failure> {
     let name = experiment.name.to_lowercase();
     let names = || experiment.scenarios.iter().map(|scenario| scenario.name.as_str()).collect::<Vec<_>>().join("\n  ");
     let Some(wanted) = &options.scenario else {
@@ -172,7 +173,9 @@ fn chosen(experiment: Experiment, options: &Simulate) -> Result<(Experiment, Str
     match experiment.scenarios.iter().find(|scenario| scenario.name == *wanted) {
         Some(scenario) => {
             // With a dot, a scenario called `measured` has files of its own.
-            Ok((experiment.with_scenario(scenario), format!("{name}.{}", scenario.file_name())))
+            let name = format!("{name}.{}", scenario.file_name());
+            experiment.experiment = experiment.with_scenario(scenario);
+            Ok((experiment, name))
         }
         None => {
             let path = experiment.source.path.shown();

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use config::{Car, Drive, Sensors};
+use car::{Car, Drive, Sensors};
+use config::DriveFile;
 use drivetrain::CommandKind;
 use plant::car::{
     CarCalibration, CarError, CarModel, CarSample, ElementSample, OverSpeed, ShiftStage, simulate_car_drive,
@@ -24,27 +25,28 @@ use crate::output;
 const ROW_BYTES: f64 = 500.0;
 
 pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
-    let drive = Drive::read(&options.experiment)?;
+    let file = DriveFile::read(&options.experiment)?;
     let car = match &options.vehicle {
         Some(vehicle) => read_car(vehicle)?,
-        None => drive.read_vehicle().inspect(warn_of_slipping)?,
+        None => file.read_vehicle().inspect(warn_of_slipping)?,
     };
     if options.scenario.is_some() {
         let message = format!("{}: a drive has no scenarios\nhint: leave --scenario out", options.experiment.shown());
         return Err(Failure::Input(message));
     }
+    let drive = &file.drive;
     if let Some(note) = size_note(drive.duration_s(), drive.sample_time_s, ROW_BYTES) {
         output::note(&note);
     }
     let name = drive.name.to_lowercase();
     let inputs = std::iter::once(&options.experiment).chain(&options.vehicle);
-    keeps_inputs(&options.output, &name, inputs.chain(drive.trace.iter().map(|trace| &trace.path)))?;
-    let model = CarModel::new(car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
+    keeps_inputs(&options.output, &name, inputs.chain(&file.speeds))?;
+    let model = CarModel::new(car.car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
     let mut tables =
         DriveTables::create(&options.output, &name, &car, drive.sensors.as_ref().zip(Some(drive.sample_time_s)))?;
     let mut sensed = drive.sensors.as_ref().map(|sensors| SensedDrive::new(&car, sensors, drive.sample_time_s));
     let recorded_s = sensed.as_ref().map_or(drive.sample_time_s, SensedDrive::record_s);
-    let recorded = Drive { sample_time_s: recorded_s, ..drive };
+    let recorded = Drive { sample_time_s: recorded_s, ..drive.clone() };
     let mut written = Ok(());
     let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &recorded, |sample| {
         // After a write error the simulation continues to its end without writing: this takes seconds.
@@ -337,7 +339,7 @@ impl Table {
 }
 
 /// Prints what a drive file describes.
-pub(super) fn describe_drive(drive: &Drive, path: &Path) -> Result<(), Failure> {
+pub(super) fn describe_drive(drive: &DriveFile, path: &Path) -> Result<(), Failure> {
     let given = match &drive.trace {
         Some(trace) => format!("by {} speeds", trace.points()),
         None => format!("in {} segments", drive.segments.len()),

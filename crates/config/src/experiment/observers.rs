@@ -1,107 +1,14 @@
 //! Checked observers of an experiment file.
 
-use std::ops::RangeInclusive;
-
-use observer::{Discretisation, RigidGains, SlidingGains};
-use serde::{Deserialize, Serialize};
+use car::{Discretisation, GivenGains, ObserverEntry, ObserverKind, SAMPLE_TIMES_S};
 use toml::Spanned;
 
 use super::raw::{RawDiscretisation, RawGains, RawObserver, RawSignals};
 use crate::ConfigError;
 use crate::check::{Check, Number, Numbers};
 
-/// Kinds of observers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ObserverKind {
-    /// The valve model alone.
-    OpenLoop,
-    /// The valve's maps alone, with the middle of the delay budget.
-    OpenLoopMaps,
-    /// Rigid reduced-order observer.
-    Rigid,
-    /// Reduced-order observer with elastic drive shafts.
-    Compliant,
-    /// Full-order sliding-mode observer.
-    Sliding,
-    /// Kalman filter with unknown torques, scale and delays of the readings as states.
-    Kalman,
-    /// Extended Kalman filter on six states as textbooks have it, every reading of the moment.
-    Extended,
-    /// Unscented Kalman filter on the same six states, with the lag of the readings.
-    Unscented,
-    /// Super-twisting observer with implicit discretisation.
-    SuperTwisting,
-    /// The pressure that explains the last change of the speeds.
-    Inversion,
-}
-
-/// How the gains of a reduced-order observer are chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum GainMethod {
-    /// The chapter's five steps, in continuous time: the smallest gain that decays as required.
-    #[default]
-    Iss,
-    /// The smallest gain that decays as required over a sample; the rest are for a sample time too, with every error of
-    /// the budget in their bounds, and are the open loop where no gain beats that.
-    IssDiscrete,
-    /// The smallest bound on the error.
-    PeakToPeak,
-    /// The same with a gain that follows the friction coefficient.
-    Scheduled,
-    /// The smallest width of a range that is carried along with the estimate.
-    Interval,
-}
-
-impl GainMethod {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::Iss, Self::IssDiscrete, Self::PeakToPeak, Self::Scheduled, Self::Interval];
-}
-
-/// Gains given in the file in place of designed ones.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum GivenGains {
-    /// Of the rigid observer.
-    Rigid(RigidGains<f64>),
-    /// Of the sliding-mode observer, such as Eq. (2.57), (2.58) and (2.60).
-    Sliding(SlidingGains<f64>),
-    /// Of the compliant observer, in the chapter's normalised units, such as Eq. (2.87) and (2.88): torque
-    /// phase, inertia phase.
-    CompliantNormalised([[f64; 2]; 2], [[f64; 3]; 2]),
-}
-
 /// Sample time of an observer that gives none, s: the usual period of a transmission controller.
 const SAMPLE_TIME_S: f64 = 0.01;
-
-/// Sample times that an observer may have, s.
-pub const SAMPLE_TIMES_S: RangeInclusive<f64> = 1e-4..=0.2;
-
-/// One observer of an experiment.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ObserverEntry {
-    /// Its name in tables and figures.
-    pub name: String,
-    /// What it is.
-    pub kind: ObserverKind,
-    /// How its gains are chosen, if it is a reduced-order observer and they are designed.
-    pub method: GainMethod,
-    /// Its sample time, s.
-    pub sample_time_s: f64,
-    /// How it is carried over a sample.
-    pub discretisation: Discretisation,
-    /// Whether it gets the signals of the experiment's sensors.
-    pub real_sensors: bool,
-    /// Gains in place of designed ones.
-    pub gains: Option<GivenGains>,
-}
-
-impl ObserverEntry {
-    /// How its name begins columns and ends file names: without blanks, commas and slashes.
-    pub fn column(&self) -> String {
-        self.name.replace([' ', ',', '/', '\\'], "_")
-    }
-}
 
 /// No two observers may have the same columns.
 pub(super) fn distinct(
@@ -186,16 +93,16 @@ fn gains(
         || raw.inertia_pressure_pa_s.is_some();
     let compliant = raw.torque_phase_normalised.is_some() || raw.inertia_phase_normalised.is_some();
     match (kind, rigid, sliding, compliant) {
-        (ObserverKind::Rigid, _, false, false) => Ok(GivenGains::Rigid(RigidGains {
+        (ObserverKind::Rigid, _, false, false) => Ok(GivenGains::Rigid {
             torque_phase_pa_s_rad: number("torque_phase_pa_s_rad", &raw.torque_phase_pa_s_rad, -1e8..=1e8)?,
             inertia_phase_pa_s_rad: pair("inertia_phase_pa_s_rad", &raw.inertia_phase_pa_s_rad, -1e8..=1e8)?,
-        })),
-        (ObserverKind::Sliding, false, _, false) => Ok(GivenGains::Sliding(SlidingGains {
+        }),
+        (ObserverKind::Sliding, false, _, false) => Ok(GivenGains::Sliding {
             torque_speed_rad_s2: number("torque_speed_rad_s2", &raw.torque_speed_rad_s2, 0.0..=1e6)?,
             torque_pressure_pa_s: number("torque_pressure_pa_s", &raw.torque_pressure_pa_s, -1e10..=1e10)?,
             inertia_speed_rad_s2: pair("inertia_speed_rad_s2", &raw.inertia_speed_rad_s2, 0.0..=1e6)?,
             inertia_pressure_pa_s: pair("inertia_pressure_pa_s", &raw.inertia_pressure_pa_s, -1e10..=1e10)?,
-        })),
+        }),
         (ObserverKind::Compliant, false, false, _) => {
             let rows = |name: &str, value| check.required(&of, at, name, Option::as_ref(value));
             let (torque, inertia) = ("torque_phase_normalised", "inertia_phase_normalised");

@@ -1,10 +1,10 @@
 //! The keys of an experiment file.
 
+use car::{GainMethod, ObserverKind};
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::off_nominal::RawOffNominal;
-use super::{GainMethod, ObserverKind};
 use crate::check::{Number, Numbers, Word};
 
 #[derive(Deserialize)]

@@ -2,105 +2,17 @@
 
 use std::ops::RangeInclusive;
 
-use drivetrain::road::GRAVITY_M_S2;
-use drivetrain::{CommandKind, RoadLoad};
-use observer::FillBudget;
+use car::error_budget::{
+    BACKLASH_RAD, CHANNEL_SKEW_S, COMMAND_AGE_S, ENGINE, HYSTERESIS_PA, STIFFNESS_FACTOR, WHEEL_DELAY_S, WHEEL_SCALE,
+};
+use car::{ErrorBounds, ShiftClutch};
 use toml::Spanned;
 
 use super::car_bounds::contain_delay;
-use super::error_budget::{ENGINE, HYSTERESIS_PA, STIFFNESS, WHEEL_SCALE, around};
 use super::raw::RawErrorBounds;
-use super::{HYSTERESES_PA, ShiftClutch, fill_bounds, valves};
+use super::{HYSTERESES_PA, fill_bounds, valves};
+use crate::ConfigError;
 use crate::check::{Check, Number, Numbers};
-use crate::{ConfigError, Sensors};
-
-/// Age of a command where the file says nothing, s [chosen]: one time step of any log at 20 Hz or more.
-const COMMAND_AGE_S: f64 = 0.05;
-
-/// The error budget: bounds on the errors of the observers' model of the car.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ErrorBounds {
-    /// Turbine torque from the converter's maps, N m.
-    pub turbine_torque_n_m: f64,
-    /// The same as a share of the torque.
-    pub turbine_torque_share: f64,
-    /// Torque that an error of the turbine-side inertia is worth in the inertia phase, N m. Zero in a file with `[gear_train]`: its bound
-    /// on the turbine torque is for both.
-    pub inertia_torque_n_m: f64,
-    /// Pressure from the valve model alone, Pa.
-    pub pressure_pa: f64,
-    /// Mass of the vehicle, kg.
-    pub mass_kg: f64,
-    /// Grade, rad.
-    pub grade_rad: f64,
-    /// Largest drive-shaft torque of a shift, N m: a mass error acts in its proportion.
-    pub shaft_torque_n_m: f64,
-    /// Torque at the gearbox output that the rigid model leaves out (torsion, tyre slip, grade), N m.
-    pub output_torque_n_m: f64,
-    /// Torque left in the offgoing clutch when it has let go, N m.
-    pub offgoing_torque_n_m: f64,
-    /// Time from its first slip until no more than that is left, s.
-    pub offgoing_drain_s: f64,
-    /// Error of the change of the turbine speed from one sample to the next, rad/s.
-    pub turbine_quantum_rad_s: f64,
-    /// Error of the change of the output speed from one sample to the next, rad/s.
-    pub output_quantum_rad_s: f64,
-    /// Error of the change of the slip from one sample to the next, rad/s.
-    pub slip_quantum_rad_s: f64,
-    /// Error of the change of the wheel speed from one sample to the next, rad/s.
-    pub wheel_quantum_rad_s: f64,
-    /// Greatest age of a reading, s.
-    pub sampling_delay_s: f64,
-    /// Rounding of one operation in single precision, as a share.
-    pub float32_rounding: f64,
-    /// Pressure above the kiss point in a shift, at which errors of gain and friction are weighed, Pa.
-    pub shift_pressure_pa: f64,
-    /// Rate of the pressure in a shift, at which errors of lag and delay are weighed, Pa/s.
-    pub shift_ramp_pa_s: f64,
-    /// Least and greatest factor on the lag of the oncoming clutch's valve.
-    pub valve_lag_factor: [f64; 2],
-    /// Least and greatest factor on its gain.
-    pub valve_gain_factor: [f64; 2],
-    /// Its least and greatest delay, s.
-    pub valve_delay_s: [f64; 2],
-    /// Greatest half-width of its hysteresis, Pa.
-    pub valve_hysteresis_pa: f64,
-    /// Greatest time between a command and the sample that first shows it, s.
-    pub command_age_s: f64,
-    /// Least and greatest line pressure, Pa.
-    pub line_pressure_pa: [f64; 2],
-    /// Limits of the oncoming clutch's piston stroke, if it is part of the budget.
-    pub fill: Option<FillBudget<f64>>,
-    /// Least and greatest factor on the friction of the oncoming clutch.
-    pub friction_factor: [f64; 2],
-    /// Error of a reading of the valve's command, A or %.
-    pub command: f64,
-    /// Error of a reading of the slip, rad/s, its age included.
-    pub slip_rad_s: f64,
-    /// Highest pressure that the supply can give, Pa.
-    pub pressure_max_pa: f64,
-    /// Error of the scale of the wheel speed, as a share: tyres that are worn, or of another size.
-    pub wheel_scale: f64,
-    /// Largest delay of the wheel speed, s.
-    pub wheel_delay_s: f64,
-    /// Largest delay of the turbine speed and of the output speed, each against the other, s.
-    pub channel_skew_s: f64,
-    /// Error of the torque that the engine controller reports, as a share.
-    pub engine_torque_share: f64,
-    /// Least and greatest factor on the stiffness of the drive shafts.
-    pub shaft_stiffness_factor: [f64; 2],
-    /// Twist over which the driveline carries no torque, rad at the wheels.
-    pub backlash_rad: f64,
-}
-
-/// Delay of the wheel speed, s: filter and bus of the brakes' controller.
-const WHEEL_DELAY_S: f64 = 0.03;
-/// Delay of turbine against output speed, s: one cycle of a bus.
-const CHANNEL_SKEW_S: f64 = 0.01;
-/// Factors on the stiffness of the drive shafts.
-const STIFFNESS_FACTOR: [f64; 2] = around(STIFFNESS);
-/// Twist without torque, rad at the wheels [chosen].
-const BACKLASH_RAD: f64 = 0.03;
 
 /// The keys of the error budget that any file may leave out, with the values that they then have.
 pub(super) const OPTIONAL: [(&str, &[f64]); 8] = [
@@ -190,27 +102,6 @@ pub(super) fn contain_vehicle(
 ) -> Result<(), ConfigError> {
     let stated = (bounds.valve_delay_s, &raw.valve_delay_s);
     contain_delay(check, "design.error_bounds.valve_delay_s", stated, &oncoming.valve)
-}
-
-impl ErrorBounds {
-    /// The same for readings by these sensors: a command of this kind errs at least by what its sensor does.
-    #[must_use]
-    pub fn read_by(mut self, kind: CommandKind, sensors: &Sensors) -> Self {
-        if let (CommandKind::Current, Some(current)) = (kind, &sensors.current) {
-            self.command = self.command.max(current.error_max_a());
-        }
-        self
-    }
-
-    /// What a grade at its bound does at the wheels of a car with this load, N m.
-    pub fn grade_n_m(&self, road: &RoadLoad<f64>) -> f64 {
-        road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * self.grade_rad.sin()
-    }
-
-    /// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its share.
-    pub fn mass_n_m(&self, road: &RoadLoad<f64>) -> f64 {
-        self.mass_kg / road.mass_kg * self.shaft_torque_n_m
-    }
 }
 
 /// Least and greatest of a factor on a value of the file.

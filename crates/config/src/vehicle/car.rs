@@ -6,22 +6,23 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use drivetrain::{Clutch, ClutchValve, Converter, Driveline, Engine, RoadLoad, Table1, Tyre};
+use ::car::{Car, CarErrorBounds, ElementErrorBounds, LockUp, ShiftClutch, ratios_alone};
+use drivetrain::{Clutch, ClutchValve, Table1};
 use geartrain::{ElementKind, Gearbox, GearboxElement};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::car_bounds::{self, CarErrorBounds, ElementErrorBounds, RawCarErrorBounds, RawElementErrorBounds};
+use super::car_bounds::{self, RawCarErrorBounds, RawElementErrorBounds};
 use super::fill::{self, RawFill};
 use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFriction, RawOil, RawRoad, RawTyre};
 use super::short::{car_defaults, car_defaults_taken, of_default};
 use super::{
-    DefaultTaken, HYSTERESES_PA, RETURN_SPRINGS_N, ShiftClutch, backlash, converter, driveline, engine,
-    oil_temperature, ratios_alone, road, tyre, valves,
+    DefaultTaken, HYSTERESES_PA, RETURN_SPRINGS_N, backlash, converter, driveline, engine, oil_temperature, road, tyre,
+    valves,
 };
 use crate::check::{Check, Number, Word};
 use crate::source::Layers;
-use crate::{ConfigError, GearboxFile, Kind, Source};
+use crate::{ConfigError, GearboxFile, Kind, Source, file_of};
 
 /// What a vehicle file leaves out.
 const DEFAULTS: (&str, &str) = ("vehicles/eight_speed.toml", include_str!("../../../../vehicles/eight_speed.toml"));
@@ -37,60 +38,20 @@ const WHOLE_CLUTCH_VALVE: &str = "the valve of one element is given whole, with 
 const WHOLE_LOCK_UP: &str = "[lock_up] has `capacity_n_m`, `first_gear`, `on_input_rad_s`, `off_input_rad_s` and `ramp_s`, and \
                              may have `slip_rad_s`: vehicles/eight_speed.toml explains them";
 
-/// The lock-up clutch of the converter, and when it is closed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LockUp {
-    /// Torque that it holds when it is closed, N m.
-    pub capacity_n_m: f64,
-    /// Lowest gear in which it is closed.
-    pub first_gear: usize,
-    /// Speed of the gearbox input above which it is closed, rad/s.
-    pub on_rad_s: f64,
-    /// Speed of the gearbox input below which it is opened, rad/s.
-    pub off_rad_s: f64,
-    /// Time in which it closes, s.
-    pub ramp_s: f64,
-    /// Slip that is kept, rad/s; zero where the clutch is to lock.
-    pub slip_rad_s: f64,
-}
-
-/// A car with all the gears and elements of its gearbox.
+/// A vehicle file with a gearbox file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Car {
-    /// The file.
+pub struct CarFile {
+    /// What they describe.
+    pub car: Car,
+    /// The vehicle file.
     pub source: Source,
-    /// Its name for people.
-    pub name: String,
-    /// The gearbox. Without a stick diagram the car can be estimated, and not simulated; with ratios alone, torques at the turbine are estimated,
-    /// with masses of the shifts that are assumed where its file has none.
-    pub gearbox: Gearbox,
-    /// The friction elements, in the order of the gearbox's elements; `None` for dogs and one-way clutches.
-    pub clutches: Vec<Option<ShiftClutch>>,
-    /// Line pressure, Pa: that of an element that holds a gear.
-    pub line_pressure_pa: f64,
-    /// The engine.
-    pub engine: Engine<f64>,
-    /// The torque converter; without one the engine turns the input shaft of the gearbox.
-    pub converter: Option<Converter<f64>>,
-    /// The lock-up clutch of the converter, if there is one.
-    pub lock_up: Option<LockUp>,
-    /// Differential, drive shafts, wheels.
-    pub driveline: Driveline<f64>,
-    /// Backlash between gearbox and wheels, rad at the wheel.
-    pub backlash_rad: f64,
-    /// The driven tyres.
-    pub tyre: Tyre<f64>,
-    /// Vehicle body and road.
-    pub road: RoadLoad<f64>,
-    /// Temperature of the oil, degC.
-    pub oil_temperature_degc: f64,
-    /// Bounds on the errors of these values that the file has.
-    pub error_bounds: CarErrorBounds,
     /// What the file leaves out, so that it is as in `vehicles/eight_speed.toml`, scaled if the file has `engine.max_torque_n_m`.
     pub defaults_taken: Vec<DefaultTaken>,
 }
 
-impl Car {
+file_of!(CarFile, car: Car);
+
+impl CarFile {
     /// The eight-speed automatic that ships with the program.
     ///
     /// # Errors
@@ -159,7 +120,7 @@ impl Car {
         let clutches = clutches(&check, &raw, valve, &gearbox, line_pressure_pa, oil_temperature_degc)?;
         let mut error_bounds = error_bounds(&check, &raw, &gearbox, &clutches)?;
         error_bounds.inertia_share = error_bounds.inertia_share.or(assumed);
-        Ok(Self {
+        let car = Car {
             error_bounds,
             name: check.title("name", &raw.name)?,
             clutches,
@@ -180,19 +141,9 @@ impl Car {
             tyre: tyre(&check, &raw.tyre)?,
             road: road(&check, &raw.vehicle)?,
             oil_temperature_degc,
-            defaults_taken: car_defaults_taken(&source, defaults, matches!(raw.launch, RawLaunch::Converter))?,
-            source,
-        })
-    }
-
-    /// The car with another friction of all clutches, times `factor`.
-    #[must_use]
-    pub fn with_friction(mut self, factor: f64) -> Self {
-        for clutch in self.clutches.iter_mut().flatten() {
-            clutch.clutch.friction = clutch.clutch.friction.scaled(factor);
-            clutch.clutch.static_friction *= factor;
-        }
-        self
+        };
+        let defaults_taken = car_defaults_taken(&source, defaults, matches!(raw.launch, RawLaunch::Converter))?;
+        Ok(Self { car, source, defaults_taken })
     }
 }
 

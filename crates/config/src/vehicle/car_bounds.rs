@@ -2,50 +2,13 @@
 
 use serde::Deserialize;
 
+use car::{CarErrorBounds, ElementErrorBounds, ShiftClutch};
 use drivetrain::{ClutchValve, CommandKind};
 
+use super::HYSTERESES_PA;
 use super::valves::DUTY_CYCLES;
-use super::{HYSTERESES_PA, ShiftClutch};
 use crate::ConfigError;
 use crate::check::{Check, Number, Numbers};
-
-/// Bounds on the errors of a car's file; none where the file says nothing.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct CarErrorBounds {
-    /// Of the converter's capacity, as a share.
-    pub converter_share: Option<f64>,
-    /// Of the engine torque that the engine's controller reports, as a share.
-    pub engine_torque_share: Option<f64>,
-    /// Of the turbine-side inertia of a shift, as a share.
-    pub inertia_share: Option<f64>,
-    /// Of the stiffness of the drive shafts, as a share.
-    pub shaft_stiffness_share: Option<f64>,
-    /// Of the scale of the wheel speed, as a share.
-    pub wheel_scale_share: Option<f64>,
-    /// Of the mass of the car as it is driven, as a share.
-    pub mass_share: Option<f64>,
-    /// By how much the torques of the valve models err, over what the bounds of the elements say.
-    pub valve_error_scale: Option<f64>,
-    /// Of each element, in the order of the gearbox's elements.
-    pub elements: Vec<ElementErrorBounds>,
-}
-
-/// Bounds on the errors of one friction element and its valve; none where the file says nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ElementErrorBounds {
-    /// Least and greatest factor on the friction.
-    pub friction_factor: Option<[f64; 2]>,
-    /// Least and greatest factor on the gain of the valve.
-    pub valve_gain_factor: Option<[f64; 2]>,
-    /// Least and greatest factor on its lag.
-    pub valve_lag_factor: Option<[f64; 2]>,
-    /// Its least and greatest delay, s.
-    pub valve_delay_s: Option<[f64; 2]>,
-    /// Greatest half-width of its hysteresis, Pa.
-    pub valve_hysteresis_pa: Option<f64>,
-    /// Maximum error of a reading of its command, A or %.
-    pub command: Option<f64>,
-}
 
 /// `[error_bounds]`.
 #[derive(Deserialize, Default)]

@@ -2,16 +2,16 @@
 
 use std::ops::RangeInclusive;
 
+use car::stroke::{PLATEAU_FACTOR, RESISTANCE_FACTOR, VOLUME_FACTOR, capacity, oil_temperatures, standard};
+use car::{FillBudget, OIL_TEMPERATURES_DEGC, ShiftClutch};
 use drivetrain::Cylinder;
 use drivetrain::oil::viscosity_m2_s;
-use observer::FillBudget;
 use serde::Deserialize;
 
-use super::{OIL_TEMPERATURES_DEGC, ShiftClutch};
 use crate::ConfigError;
 use crate::check::{Check, Number, Numbers};
 
-/// Limits of the oncoming clutch's stroke. What is left out is within the tolerances below of the car's own cylinder.
+/// Limits of the oncoming clutch's stroke. What is left out is within the usual tolerances of the car's own cylinder.
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawFillBounds {
@@ -24,21 +24,6 @@ pub(super) struct RawFillBounds {
     leak_m3_s_pa: Option<Number>,
     capacity_m3_pa: Option<Number>,
 }
-
-/// Factors on the stroke's volume [chosen]: clearance of the pack, and what drained from a parked clutch.
-const VOLUME_FACTOR: [f64; 2] = [0.75, 1.25];
-/// Factors on the pressures at both ends of the plateau [chosen]: spring, seal friction, centrifugal pressure.
-const PLATEAU_FACTOR: [f64; 2] = [0.9, 1.1];
-/// Factors on the resistance of the passages [chosen]: 10 % of an orifice's area.
-const RESISTANCE_FACTOR: [f64; 2] = [0.8, 1.25];
-/// How far the oil may be from the temperature of the file, K [chosen].
-const OIL_K: f64 = 15.0;
-/// Share of the pump's flow that is left at least [chosen]: another clutch fills at the same time.
-const FLOW_SHARE: f64 = 0.5;
-/// Factors on leak and hydraulic capacity [chosen].
-const LEAK_FACTOR: f64 = 2.0;
-/// The same of the capacity.
-const CAPACITY_FACTOR: f64 = 1.5;
 
 /// The limits of the oncoming clutch's stroke; none for a clutch without a stroke, unless the budget has a table for it.
 pub(super) fn bounds(
@@ -78,32 +63,6 @@ pub(super) fn bounds(
         leak_m3_s_pa: number("leak_m3_s_pa", &raw.leak_m3_s_pa, standard.leak_m3_s_pa, leak..=1e-9)?,
         capacity_m3_pa: number("capacity_m3_pa", &raw.capacity_m3_pa, standard.capacity_m3_pa, capacity..=1e-8)?,
     }))
-}
-
-/// The limits of a cylinder's stroke within the tolerances above.
-pub(super) fn standard(cylinder: &Cylinder<f64>, oil_degc: f64) -> FillBudget<f64> {
-    let [cold, hot] = oil_temperatures(oil_degc);
-    FillBudget {
-        volume_m3: VOLUME_FACTOR.map(|factor| factor * cylinder.stroke_m3),
-        preload_pressure_pa: PLATEAU_FACTOR.map(|factor| factor * cylinder.preload_pa),
-        kiss_pressure_pa: PLATEAU_FACTOR.map(|factor| factor * cylinder.kiss_pa),
-        supply: RESISTANCE_FACTOR.map(|factor| cylinder.supply.with_resistance_factor(factor)),
-        exhaust: RESISTANCE_FACTOR.map(|factor| cylinder.exhaust.with_resistance_factor(factor)),
-        viscosity_m2_s: [viscosity_m2_s(hot), viscosity_m2_s(cold)],
-        flow_max_m3_s: FLOW_SHARE * cylinder.flow_max_m3_s,
-        leak_m3_s_pa: LEAK_FACTOR * cylinder.leak_m3_s_pa,
-        capacity_m3_pa: CAPACITY_FACTOR * capacity(cylinder),
-    }
-}
-
-fn oil_temperatures(oil_degc: f64) -> [f64; 2] {
-    [oil_degc - OIL_K, oil_degc + OIL_K]
-        .map(|degc| degc.clamp(*OIL_TEMPERATURES_DEGC.start(), *OIL_TEMPERATURES_DEGC.end()))
-}
-
-/// The greater of the capacities with the piston on its stop and at the plates, m^3/Pa.
-fn capacity(cylinder: &Cylinder<f64>) -> f64 {
-    cylinder.capacity_m3_pa.max(cylinder.home_capacity_m3_pa)
 }
 
 fn key_of(key: &str) -> String {

@@ -3,22 +3,20 @@
 mod budget;
 mod car;
 mod car_bounds;
-mod car_capacity;
 mod clutch;
-mod error_budget;
 mod fill;
 mod fill_bounds;
 mod gear_train;
 mod plausible;
-mod ratios_alone;
 mod raw;
 pub mod short;
+mod slipping;
 mod valves;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use drivetrain::{Converter, Driveline, Engine, ReducedShift, RoadLoad, Table2, TableError, Tyre, Valve};
-use observer::{InputLimits, Supervisor};
+use ::car::{CompliantRequirement, DesignRequirement, FilterSettings, OIL_TEMPERATURES_DEGC, PhaseSlips, Vehicle};
+use drivetrain::{Converter, Driveline, Engine, RoadLoad, Table2, TableError, Tyre};
 
 use drivetrain::oil::WARM_OIL_DEGC;
 use drivetrain::table::{MAX_COLUMNS, MAX_POINTS};
@@ -28,23 +26,15 @@ use crate::check::{Check, Number, Numbers, significant};
 use crate::source::Layers;
 use crate::study::Change;
 use crate::tree::Tree;
-use crate::{ConfigError, Kind, Source};
-pub use budget::ErrorBounds;
-pub use car::{Car, LockUp};
-pub use car_bounds::{CarErrorBounds, ElementErrorBounds};
-pub use clutch::ShiftClutch;
+use crate::{ConfigError, Kind, Source, file_of};
+pub use car::CarFile;
 pub(crate) use clutch::{FRICTION_FACES, HYSTERESES_PA, PISTON_AREAS_M2, PLATE_RADII_M, RETURN_SPRINGS_N};
-pub use error_budget::{ElementErrors, ErrorBudget};
-pub use ratios_alone::TURBINE_SIDE_INERTIA_KG_M2;
 use raw::{
     RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawFilter, RawObserver, RawOil,
     RawRequirement, RawRoad, RawTyre, RawVehicleFile,
 };
-pub use short::{DefaultTaken, OneShiftError};
+pub use short::DefaultTaken;
 use short::{Short, of_default, refuse_facts};
-
-/// Largest drive-shaft torque over what the tyres can pass to the road [chosen]: wheels that spin up take more for a moment.
-const SHAFT_OVER_TYRES: f64 = 2.0;
 
 /// Masses of vehicles, kg.
 const MASSES_KG: std::ops::RangeInclusive<f64> = 200.0..=60e3;
@@ -52,135 +42,23 @@ const MASSES_KG: std::ops::RangeInclusive<f64> = 200.0..=60e3;
 const WHEEL_RADII_M: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 /// Ratios from gearbox to wheels.
 const FINAL_RATIOS: std::ops::RangeInclusive<f64> = 0.5..=10.0;
-/// Temperatures of transmission oil, degC.
-pub(crate) const OIL_TEMPERATURES_DEGC: std::ops::RangeInclusive<f64> = -40.0..=150.0;
 /// Backlash of the driveline at the wheel, rad.
 pub(crate) const BACKLASHES_RAD: std::ops::RangeInclusive<f64> = 0.0..=0.5;
 
-/// Ranges of what varies in the observer's model; their corners span the polytope of Eq. (2.46).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Uncertainty {
-    /// Friction coefficient of the oncoming clutch, least and greatest.
-    pub friction: (f64, f64),
-    /// What varies in the valve.
-    pub valve: ValveUncertainty,
-}
-
-/// What varies in the observers' valve model.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ValveUncertainty {
-    /// Nothing.
-    None,
-    /// The time constant of a proportional valve, s, least and greatest.
-    TimeConstant((f64, f64)),
-    /// The operating points of a pulse-width valve, at which it is linearised: size of the pressure drop between its
-    /// settled pressure and the cylinder, Pa, lower and upper limit.
-    PressureDrop((f64, f64)),
-}
-
-/// What the gain design must reach in one phase.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DesignRequirement {
-    /// Time in which an initial error must be gone, s: `4 / kappa2`.
-    pub settling_time_s: f64,
-    /// `kappa1`, 1/s, if it is given and not to be found by the design.
-    pub kappa1_per_s: Option<f64>,
-    /// Bound on the model error `|w|`, rad/s^2.
-    pub model_error_max_rad_s2: f64,
-    /// Largest acceptable offset of the pressure estimate, Pa.
-    pub offset_max_pa: f64,
-}
-
-/// What the gain design of the compliant observer must reach in one phase.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CompliantRequirement {
-    /// Time in which an initial error must be gone, s: `4 / kappa2`.
-    pub settling_time_s: f64,
-    /// `kappa1`, 1/s, if it is given and not to be found by the design.
-    pub kappa1_per_s: Option<f64>,
-    /// Largest acceptable offset of the pressure estimate, Pa.
-    pub offset_max_pa: f64,
-    /// `H` for `|w| <= 1`, normalised, if it is given and not to follow from the error bounds: a row for each output
-    /// of the phase; what is beyond them is zero.
-    pub error_matrix: Option<[[f64; 3]; 3]>,
-}
-
-/// The Kalman filter's model of the unknown torques, in addition to the error bounds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FilterSettings {
-    /// Standard deviation of the turbine torque, as a share.
-    pub turbine_share: f64,
-    /// Time after which that share is another during a shift, s.
-    pub turbine_share_s: f64,
-    /// Standard deviation of the rate of twist outside a shift, rad/s: how far the readings of output and wheel disagree.
-    pub twist_rate_rad_s: f64,
-    /// Time for which an error of the valve model persists, s.
-    pub valve_rate_s: f64,
-    /// How fast the torque of the offgoing clutch changes while it holds, N m per root second: about 0.7 of what it holds at the
-    /// greatest engine torque.
-    pub offgoing_n_m: f64,
-    /// Time constant with which it goes once the clutch has let go, s.
-    pub offgoing_release_s: f64,
-    /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
-    pub output_least_rad_s: f64,
-}
-
-/// A vehicle: everything the plant, the observers and the design need to know.
+/// A vehicle file of one shift.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Vehicle {
+pub struct VehicleFile {
+    /// What it describes.
+    pub vehicle: Vehicle,
     /// The file.
     pub source: Source,
-    /// Its name for people.
-    pub name: String,
-    /// The engine.
-    pub engine: Engine<f64>,
-    /// The torque converter.
-    pub converter: Converter<f64>,
-    /// The bare gear train, reduced to the shift.
-    pub shift: ReducedShift<f64>,
-    /// Inertia `I_o` of the output shaft in [`Self::shift`], kg m^2.
-    pub output_inertia_kg_m2: f64,
-    /// The clutch that lets go.
-    pub offgoing: ShiftClutch,
-    /// The clutch that engages, whose pressure is estimated.
-    pub oncoming: ShiftClutch,
-    /// Differential, drive shafts, wheels.
-    pub driveline: Driveline<f64>,
-    /// Backlash between gearbox and wheels, rad at the wheel. Observers do not know it.
-    pub backlash_rad: f64,
-    /// Temperature of the oil, degC.
-    pub oil_temperature_degc: f64,
-    /// The driven tyres.
-    pub tyre: Tyre<f64>,
-    /// Vehicle body and road.
-    pub road: RoadLoad<f64>,
-    /// The observers' model of the oncoming clutch's valve.
-    pub observer_valve: Valve<f64>,
-    /// What varies in the observers' model.
-    pub uncertainty: Uncertainty,
-    /// Thresholds of the phase supervisor.
-    pub supervisor: Supervisor<f64>,
-    /// What counts as a measurement.
-    pub limits: InputLimits<f64>,
-    /// Requirement in the torque phase.
-    pub torque_phase: DesignRequirement,
-    /// Requirement in the inertia phase.
-    pub inertia_phase: DesignRequirement,
-    /// Requirement on the compliant observer in the torque phase.
-    pub compliant_torque_phase: CompliantRequirement,
-    /// Requirement on the compliant observer in the inertia phase.
-    pub compliant_inertia_phase: CompliantRequirement,
-    /// The error budget.
-    pub error_bounds: ErrorBounds,
-    /// The Kalman filter's model of the unknown torques.
-    pub filter: FilterSettings,
-    /// Time in which the estimated shaft torque leans towards its steady value outside the shift, s.
-    pub shaft_settling_s: f64,
     /// What the file leaves out.
     pub defaults_taken: Vec<DefaultTaken>,
 }
 
-impl Vehicle {
+file_of!(VehicleFile, vehicle: Vehicle);
+
+impl VehicleFile {
     /// The car of one shift that a command takes where it is given no vehicle file: that of `vehicles/two_speed_at.toml`.
     ///
     /// # Errors
@@ -208,14 +86,15 @@ impl Vehicle {
     pub fn read_with(path: &Path, overlay: &Path) -> Result<Self, ConfigError> {
         // Of a short file, the values go over its defaults too.
         let Self { source, defaults_taken, .. } = Self::read(path)?;
-        Ok(Self { defaults_taken, ..Self::laid_over(source, &Source::read(overlay)?)? })
+        let (vehicle, source) = Self::laid_over(source, &Source::read(overlay)?)?;
+        Ok(Self { vehicle, source, defaults_taken })
     }
 
-    fn laid_over(source: Source, over: &Source) -> Result<Self, ConfigError> {
+    fn laid_over(source: Source, over: &Source) -> Result<(Vehicle, Source), ConfigError> {
         let layers = Layers { source: &source, over: Some(over) };
-        let vehicle = Self::of_file(&Check { layers }, &layers.parse()?)?;
+        let vehicle = of_file(&Check { layers }, &layers.parse()?)?;
         let path = format!("{} with {}", source.path.to_string_lossy(), over.path.to_string_lossy());
-        Ok(Self { source: Source { path: path.into(), text: source.text + &over.text }, ..vehicle })
+        Ok((vehicle, Source { path: path.into(), text: source.text + &over.text }))
     }
 
     /// Checks a file of values for a vehicle file by laying it over the built-in vehicle. Where its values do not go with
@@ -242,116 +121,103 @@ impl Vehicle {
         }
         if let Some(short) = Short::of(&source)? {
             let layers = short.layers(&source);
-            let vehicle = Self::of_file(&Check { layers }, &layers.parse()?)
+            let vehicle = of_file(&Check { layers }, &layers.parse()?)
                 .map_err(|error| of_default(error, &short.defaults, &source))?;
             let (source, defaults_taken) = short.complete(&source)?;
-            return Ok(Self { source, defaults_taken, ..vehicle });
+            return Ok(Self { vehicle, source, defaults_taken });
         }
-        let vehicle = Self::of_file(&Check::of(&source), &source.parse_as(Kind::Vehicle)?)?;
-        Ok(Self { defaults_taken: short::left_out(&source)?, source, ..vehicle })
+        let vehicle = of_file(&Check::of(&source), &source.parse_as(Kind::Vehicle)?)?;
+        Ok(Self { vehicle, defaults_taken: short::left_out(&source)?, source })
     }
 
     /// The vehicle with another value at a key: `change` of what stands there by `value`. Names of a list's items are keys.
     ///
     /// # Errors
     /// There is no such value, or the changed one is not one that a vehicle file may have.
-    pub fn changed(&self, key: &str, change: Change, value: f64) -> Result<Self, ConfigError> {
+    pub fn changed(&self, key: &str, change: Change, value: f64) -> Result<Vehicle, ConfigError> {
         let mut tree = Tree::of(&self.source)?;
         let path: Vec<String> = key.split('.').map(str::to_owned).collect();
         let wrong = |message| Check::of(&self.source).meaning(key, 0, message, None);
         tree.change(&path, change, value).map_err(wrong)?;
-        Self::from_tree(&self.source, &tree)
+        of_tree(&self.source, &tree)
     }
 
-    /// The vehicle of a file some of whose values may have been changed.
+    /// The same of a file with these values in place of its own.
     pub(crate) fn from_tree(source: &Source, tree: &Tree) -> Result<Self, ConfigError> {
-        let vehicle = Self::checked(&Check::of(source), &tree.read(source)?)?;
-        Ok(Self { source: source.clone(), ..vehicle })
-    }
-
-    /// The vehicle of a file as it was written, which is within its own error bounds; its source is left to be filled in.
-    fn of_file(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Self, ConfigError> {
-        let vehicle = Self::checked(check, raw)?;
-        let stated = raw.design.error_bounds.get_ref();
-        budget::contain_vehicle(check, stated, &vehicle.error_bounds, &vehicle.oncoming)?;
-        Ok(vehicle)
-    }
-
-    /// The vehicle that these values describe, whose source is left to be filled in.
-    fn checked(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Self, ConfigError> {
-        refuse_facts(check, raw)?;
-        let gear = gear_train::check(check, raw)?;
-        let oil_temperature_degc = oil_temperature(check, &raw.oil)?;
-        let clutch = |name: &str| clutch::check(check, name, raw, oil_temperature_degc);
-        // A clutch that this shift leaves alone is checked like the others.
-        for name in raw.clutch.keys() {
-            clutch(name)?;
-        }
-        let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
-        let (driveline, tyre) = (driveline(check, &raw.driveline)?, tyre(check, &raw.tyre)?);
-        let error_bounds =
-            budget::error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
-        let road = road(check, &raw.vehicle)?;
-        let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
-        let limits =
-            limits(check, &raw.observer, &error_bounds, SHAFT_OVER_TYRES * tyre.max_force_n * road.wheel_radius_m)?;
-        let command_max = limits.command_max + error_bounds.command;
-        valves::clutch_can_engage(check, &oncoming, &limits, raw.observer.command_max.span().start)?;
-        for (name, clutch) in [(&gear.offgoing, &offgoing), (&gear.oncoming, &oncoming)] {
-            valves::settled_pressure_rises(
-                check,
-                &format!("clutch.{name}.valve"),
-                &clutch.valve,
-                &raw.clutch[name].valve,
-                command_max,
-            )?;
-        }
-        let observer_valve = valves::observer_valve(check, &raw.observer.valve, &oncoming.valve)?;
-        let command_kind = observer_valve.command_kind();
-        let supervisor = supervisor(check, &raw.observer, kiss_pressure_pa)?;
-        Ok(Self {
-            name: check.title("name", &raw.name)?,
-            engine: engine(check, &raw.engine)?,
-            converter: converter(check, &raw.converter)?,
-            shift: gear.reduced,
-            output_inertia_kg_m2: gear.output_inertia_kg_m2,
-            offgoing,
-            oncoming,
-            driveline,
-            backlash_rad: backlash(check, &raw.driveline)?,
-            oil_temperature_degc,
-            tyre,
-            road,
-            observer_valve,
-            uncertainty: valves::uncertainty(check, &raw.observer.uncertainty, command_kind)?,
-            supervisor,
-            limits,
-            torque_phase: requirement(check, "design.torque_phase", &raw.design.torque_phase)?,
-            inertia_phase: requirement(check, "design.inertia_phase", &raw.design.inertia_phase)?,
-            compliant_torque_phase: compliant(check, "torque_phase", &raw.design.compliant.torque_phase)?,
-            compliant_inertia_phase: compliant(check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
-            error_bounds,
-            filter: filter(check, &raw.observer.filter)?,
-            shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
-            source: Source { path: PathBuf::new(), text: String::new() },
-            defaults_taken: Vec::new(),
-        })
+        let vehicle = of_tree(source, tree)?;
+        Ok(Self { vehicle, source: source.clone(), defaults_taken: Vec::new() })
     }
 }
 
-/// What a reading or an estimate of this car can be.
-fn limits(
-    check: &Check<'_>,
-    raw: &RawObserver,
-    bounds: &ErrorBounds,
-    shaft_torque_max_n_m: f64,
-) -> Result<InputLimits<f64>, ConfigError> {
-    Ok(InputLimits {
-        speed_max_rad_s: check.number("observer.speed_max_rad_s", &raw.speed_max_rad_s, 100.0..=5e3)?,
-        command_max: check.number("observer.command_max", &raw.command_max, 0.1..=100.0)?,
-        command_error: bounds.command,
-        pressure_max_pa: bounds.pressure_max_pa,
-        shaft_torque_max_n_m,
+/// The vehicle of a file some of whose values may have been changed.
+fn of_tree(source: &Source, tree: &Tree) -> Result<Vehicle, ConfigError> {
+    checked(&Check::of(source), &tree.read(source)?)
+}
+
+/// The vehicle of a file as it was written, which is within its own error bounds.
+fn of_file(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Vehicle, ConfigError> {
+    let vehicle = checked(check, raw)?;
+    let stated = raw.design.error_bounds.get_ref();
+    budget::contain_vehicle(check, stated, &vehicle.error_bounds, &vehicle.oncoming)?;
+    Ok(vehicle)
+}
+
+/// The vehicle that these values describe.
+fn checked(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Vehicle, ConfigError> {
+    refuse_facts(check, raw)?;
+    let gear = gear_train::check(check, raw)?;
+    let oil_temperature_degc = oil_temperature(check, &raw.oil)?;
+    let clutch = |name: &str| clutch::check(check, name, raw, oil_temperature_degc);
+    // A clutch that this shift leaves alone is checked like the others.
+    for name in raw.clutch.keys() {
+        clutch(name)?;
+    }
+    let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
+    let (driveline, tyre) = (driveline(check, &raw.driveline)?, tyre(check, &raw.tyre)?);
+    let error_bounds =
+        budget::error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
+    let road = road(check, &raw.vehicle)?;
+    let speed_max_rad_s = check.number("observer.speed_max_rad_s", &raw.observer.speed_max_rad_s, 100.0..=5e3)?;
+    let command_max = check.number("observer.command_max", &raw.observer.command_max, 0.1..=100.0)?;
+    let commanded = (command_max, error_bounds.pressure_max_pa);
+    valves::clutch_can_engage(check, &oncoming, commanded, raw.observer.command_max.span().start)?;
+    for (name, clutch) in [(&gear.offgoing, &offgoing), (&gear.oncoming, &oncoming)] {
+        valves::settled_pressure_rises(
+            check,
+            &format!("clutch.{name}.valve"),
+            &clutch.valve,
+            &raw.clutch[name].valve,
+            command_max + error_bounds.command,
+        )?;
+    }
+    let observer_valve = valves::observer_valve(check, &raw.observer.valve, &oncoming.valve)?;
+    let command_kind = observer_valve.command_kind();
+    let phase_slips = phase_slips(check, &raw.observer)?;
+    Ok(Vehicle {
+        name: check.title("name", &raw.name)?,
+        engine: engine(check, &raw.engine)?,
+        converter: converter(check, &raw.converter)?,
+        shift: gear.reduced,
+        output_inertia_kg_m2: gear.output_inertia_kg_m2,
+        offgoing,
+        oncoming,
+        driveline,
+        backlash_rad: backlash(check, &raw.driveline)?,
+        oil_temperature_degc,
+        tyre,
+        road,
+        observer_valve,
+        uncertainty: valves::uncertainty(check, &raw.observer.uncertainty, command_kind)?,
+        phase_slips,
+        speed_max_rad_s,
+        command_max,
+        torque_phase: requirement(check, "design.torque_phase", &raw.design.torque_phase)?,
+        inertia_phase: requirement(check, "design.inertia_phase", &raw.design.inertia_phase)?,
+        compliant_torque_phase: compliant(check, "torque_phase", &raw.design.compliant.torque_phase)?,
+        compliant_inertia_phase: compliant(check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
+        error_bounds,
+        filter: filter(check, &raw.observer.filter)?,
+        shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
     })
 }
 
@@ -484,13 +350,12 @@ fn road(check: &Check<'_>, raw: &RawRoad) -> Result<RoadLoad<f64>, ConfigError> 
     })
 }
 
-fn supervisor(check: &Check<'_>, raw: &RawObserver, kiss_pressure_pa: f64) -> Result<Supervisor<f64>, ConfigError> {
+fn phase_slips(check: &Check<'_>, raw: &RawObserver) -> Result<PhaseSlips, ConfigError> {
     let raw = &raw.supervisor;
     let number = |key: &str, value: &crate::check::Number, range| {
         check.number(format_args!("observer.supervisor.{key}"), value, range)
     };
-    Ok(Supervisor {
-        kiss_pressure_pa,
+    Ok(PhaseSlips {
         release_slip_rad_s: number("release_slip_rad_s", &raw.release_slip_rad_s, 0.1..=100.0)?,
         lock_slip_rad_s: number("lock_slip_rad_s", &raw.lock_slip_rad_s, 0.1..=100.0)?,
         lock_hold_s: number("lock_hold_s", &raw.lock_hold_s, 0.0..=1.0)?,

@@ -2,11 +2,12 @@
 //!
 //! A range that no car leaves makes a value an error; the usual ranges here are narrower, and relative to the size of the car.
 
+use car::ShiftClutch;
 use drivetrain::road::GRAVITY_M_S2;
 use drivetrain::{ClutchValve, Converter, Driveline, Engine, RoadLoad, Tyre};
 use geartrain::Finding;
 
-use super::{Car, ShiftClutch, Vehicle};
+use super::{CarFile, VehicleFile};
 
 /// What a car is judged by.
 struct Parts<'v> {
@@ -35,7 +36,7 @@ struct Judged {
     hint: &'static str,
 }
 
-impl Vehicle {
+impl VehicleFile {
     /// What is unusual about the values, each with its key, the usual range and a hint.
     pub fn implausible(&self) -> Vec<String> {
         let clutches = [("offgoing", &self.offgoing), ("oncoming", &self.oncoming)];
@@ -47,7 +48,7 @@ impl Vehicle {
             road: &self.road,
             ratio: self.shift.ratio_offgoing().abs().max(self.shift.ratio_oncoming().abs()),
             clutches: clutches.map(|(name, clutch)| (format!("the {name} clutch"), clutch)).into(),
-            pressure_max_pa: self.limits.pressure_max_pa,
+            pressure_max_pa: self.error_bounds.pressure_max_pa,
         }
         .implausible()
         .into_iter()
@@ -67,7 +68,7 @@ impl Vehicle {
             Judged {
                 key: "design.error_bounds.pressure_max_pa".to_owned(),
                 what: "over the pressure of the valve at the end of its maps",
-                value: self.limits.pressure_max_pa / valve.settled_pressure(full),
+                value: self.error_bounds.pressure_max_pa / valve.settled_pressure(full),
                 usual: [1.0, 10.0],
                 hint: "no pressure above it is held possible: it is the highest one that the supply gives, in Pa; 1 MPa is 1e6 Pa",
             },
@@ -83,7 +84,7 @@ impl Vehicle {
     }
 }
 
-impl Car {
+impl CarFile {
     /// What is unusual about the values, each with its key, the usual range and a hint.
     pub fn implausible(&self) -> Vec<String> {
         let named = self.gearbox.elements.iter().zip(&self.clutches);
@@ -255,7 +256,7 @@ mod tests {
         let text = include_str!("../../../../vehicles/two_speed_at.toml");
         assert!(text.contains(of), "{of}");
         let source = Source::built_in("x.toml", &text.replacen(of, to, 1));
-        Vehicle::from_source(source).unwrap().implausible().join("\n")
+        VehicleFile::from_source(source).unwrap().implausible().join("\n")
     }
 
     #[test]
@@ -264,8 +265,8 @@ mod tests {
         for entry in std::fs::read_dir(vehicles).unwrap() {
             let path = entry.unwrap().path();
             let mut said = match Source::read(&path).unwrap().kind().unwrap() {
-                crate::Kind::Car => Car::read(&path).unwrap().implausible(),
-                _ => Vehicle::read(&path).unwrap().implausible(),
+                crate::Kind::Car => CarFile::read(&path).unwrap().implausible(),
+                _ => VehicleFile::read(&path).unwrap().implausible(),
             };
             // Teeth of real gearboxes.
             said.retain(|said| !said.contains("ring less sun is"));
@@ -285,7 +286,7 @@ mod tests {
                 valve: ValveKind::Proportional,
             };
             let text = short_file(&facts, true).unwrap();
-            let said = Vehicle::from_source(Source::built_in("x.toml", &text)).unwrap().implausible();
+            let said = VehicleFile::from_source(Source::built_in("x.toml", &text)).unwrap().implausible();
             assert_eq!(said, Vec::<String>::new(), "{mass_kg} kg");
         }
     }

@@ -2,12 +2,11 @@
 
 use std::ops::RangeInclusive;
 
+use car::{ShiftClutch, Uncertainty, ValveUncertainty};
 use drivetrain::{ClutchValve, CommandKind, PulseWidth, Valve, ValveMaps};
-use observer::InputLimits;
 use toml::Spanned;
 
 use super::raw::{RawClutchValve, RawErrorBounds, RawUncertainty, RawValve, RawValveKind};
-use super::{ShiftClutch, Uncertainty, ValveUncertainty};
 use crate::ConfigError;
 use crate::check::{Check, Key, Number, Numbers};
 
@@ -140,12 +139,12 @@ pub(super) fn settled_pressure_rises(
 pub(super) fn clutch_can_engage(
     check: &Check<'_>,
     oncoming: &ShiftClutch,
-    limits: &InputLimits<f64>,
+    (command_max, pressure_max_pa): (f64, f64),
     at: usize,
 ) -> Result<(), ConfigError> {
     let kiss_pa = oncoming.clutch.kiss_pressure();
-    let most_pa = oncoming.valve.settled_pressure(limits.command_max);
-    if most_pa.min(limits.pressure_max_pa) > kiss_pa {
+    let most_pa = oncoming.valve.settled_pressure(command_max);
+    if most_pa.min(pressure_max_pa) > kiss_pa {
         return Ok(());
     }
     let (unit, full) = match oncoming.valve.command_kind() {
@@ -154,9 +153,9 @@ pub(super) fn clutch_can_engage(
     };
     let message = format!(
         "at {} {unit} the settled pressure is {:.4} MPa, `pressure_max_pa` is {:.4} MPa, and the kiss point is {:.4} MPa",
-        limits.command_max,
+        command_max,
         1e-6 * most_pa,
-        1e-6 * limits.pressure_max_pa,
+        1e-6 * pressure_max_pa,
         1e-6 * kiss_pa
     );
     Err(check.meaning("observer.command_max", at, message, Some(format!("`command_max` is {full}"))))

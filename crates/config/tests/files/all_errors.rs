@@ -1,6 +1,8 @@
 //! All errors of a file at once.
 
-use config::{Car, ConfigError, Drive, Experiment, GearboxFile, Sensors, Source, Vehicle, all_errors, check_learnt};
+use config::{
+    CarFile, ConfigError, DriveFile, ExperimentFile, GearboxFile, Source, VehicleFile, all_errors, check_learnt,
+};
 
 use super::{BENCH, EXPERIMENT, VEHICLE, line_of};
 
@@ -17,11 +19,11 @@ fn has(errors: &[String], text: &str, part: &str, begin: &str) -> bool {
 }
 
 fn vehicle(source: Source) -> Result<(), ConfigError> {
-    Vehicle::from_source(source).map(drop)
+    VehicleFile::from_source(source).map(drop)
 }
 
 fn experiment(source: Source) -> Result<(), ConfigError> {
-    Experiment::from_source(source).map(drop)
+    ExperimentFile::from_source(source).map(drop)
 }
 
 #[test]
@@ -80,18 +82,18 @@ fn every_kind_of_file_names_all_of_its_errors() {
         (gearbox.replacen("level", "lvel", 1), &|source| GearboxFile::from_source(source).map(drop), &["lvel"]),
         (
             drive.replacen("sample_time_s", "sample_tme_s", 1),
-            &|source| Drive::from_source(source).map(drop),
+            &|source| DriveFile::from_source(source).map(drop),
             &["sample_tme_s"],
         ),
         (learnt.to_owned(), &|source| check_learnt(&source), &["shifs", "refused"]),
         (
             sensors.replacen("periods", "periodes", 1).replacen("seed", "sed", 1),
-            &|source| Sensors::from_source(&source).map(drop),
+            &|source| config::sensors_of(&source).map(drop),
             &["periodes", "sed ="],
         ),
         (
             over.to_owned(),
-            &|source| Vehicle::check_overlay(&source),
+            &|source| VehicleFile::check_overlay(&source),
             &["mass_kgg", "turbine_torque_share", "friction_factor"],
         ),
         (
@@ -112,7 +114,7 @@ fn every_kind_of_file_names_all_of_its_errors() {
 fn the_errors_of_a_file_that_another_one_names_are_said_once() {
     let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml"));
     let source = Source::read(path).unwrap();
-    let read = |source| Car::from_source(source).map(drop);
+    let read = |source| CarFile::from_source(source).map(drop);
     let text = source.text.replacen("mass_kg = ", "mas_kg = ", 1).replacen("8hp.toml", "none.toml", 1);
     let found = all_errors(&Source { text, ..source.clone() }, &read);
     assert_eq!(found.len(), 2, "{found:#?}");

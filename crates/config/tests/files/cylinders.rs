@@ -1,18 +1,18 @@
 //! Pistons with a stroke.
 
-use config::{Source, Vehicle};
+use config::{Source, VehicleFile};
 
 use super::line_of;
 
 const STROKE: &str = include_str!("../../../../vehicles/two_speed_stroke.toml");
 
-fn stroke_vehicle(text: &str) -> Vehicle {
-    Vehicle::from_source(Source::built_in("vehicle.toml", text)).unwrap()
+fn stroke_vehicle(text: &str) -> VehicleFile {
+    VehicleFile::from_source(Source::built_in("vehicle.toml", text)).unwrap()
 }
 
 #[test]
 fn the_car_with_a_stroke_differs_from_the_built_in_one_in_nothing_else() {
-    let (built_in, mut stroke) = (Vehicle::built_in().unwrap(), stroke_vehicle(STROKE));
+    let (built_in, mut stroke) = (VehicleFile::built_in().unwrap(), stroke_vehicle(STROKE));
     assert!(stroke.offgoing.has_stroke && stroke.oncoming.has_stroke);
     assert!(!built_in.offgoing.has_stroke && !built_in.oncoming.has_stroke);
     (stroke.source, stroke.name) = (built_in.source.clone(), built_in.name.clone());
@@ -44,7 +44,7 @@ fn wrong_values_of_a_cylinder_are_named_with_their_line() {
     let error = |from: &str, to: &str| {
         assert!(STROKE.contains(from), "{from}");
         let text = STROKE.replacen(from, to, 1);
-        Vehicle::from_source(Source::built_in("v.toml", &text)).unwrap_err().to_string()
+        VehicleFile::from_source(Source::built_in("v.toml", &text)).unwrap_err().to_string()
     };
     let line = line_of(STROKE, "stroke_m = ");
     assert_eq!(

@@ -1,12 +1,12 @@
 //! Experiment files.
 
-use config::{Experiment, Source, Vehicle};
+use config::{ExperimentFile, Source, VehicleFile};
 
 use super::{EXPERIMENT, VEHICLE, line_of};
 
 fn experiment_error(from: &str, to: &str) -> String {
     assert!(EXPERIMENT.contains(from), "{from}");
-    Experiment::from_source(Source::built_in("e.toml", &EXPERIMENT.replacen(from, to, 1))).unwrap_err().to_string()
+    ExperimentFile::from_source(Source::built_in("e.toml", &EXPERIMENT.replacen(from, to, 1))).unwrap_err().to_string()
 }
 
 #[test]
@@ -55,10 +55,10 @@ fn every_number_of_given_gains_lies_in_a_range_and_is_named() {
 fn forward_euler_beyond_the_time_constant_of_the_valve_is_refused() {
     let euler = EXPERIMENT
         .replace("kind = \"open-loop\"\nsample_time_s = 0.001", "kind = \"open-loop\"\ndiscretisation = \"euler\"");
-    let experiment = Experiment::from_source(Source::built_in("e.toml", &euler)).unwrap();
+    let experiment = ExperimentFile::from_source(Source::built_in("e.toml", &euler)).unwrap();
     let told = |time_constant_s: &str| {
         let text = VEHICLE.replace("time_constant_s = 0.04 ", &format!("time_constant_s = {time_constant_s} "));
-        experiment.check_observers(&Vehicle::from_source(Source::built_in("v.toml", &text)).unwrap())
+        experiment.check_observers(&VehicleFile::from_source(Source::built_in("v.toml", &text)).unwrap())
     };
     told("0.04").unwrap();
     told("0.01").unwrap();
@@ -71,8 +71,8 @@ fn forward_euler_beyond_the_time_constant_of_the_valve_is_refused() {
 #[test]
 fn an_observer_cannot_be_faster_than_the_signals() {
     let text = EXPERIMENT.replace("sample_time_s = 0.001 # of the", "sample_time_s = 0.002 # of the");
-    let experiment = Experiment::from_source(Source::built_in("e.toml", &text)).unwrap();
-    let error = experiment.check_observers(&Vehicle::built_in().unwrap()).unwrap_err().to_string();
+    let experiment = ExperimentFile::from_source(Source::built_in("e.toml", &text)).unwrap();
+    let error = experiment.check_observers(&VehicleFile::built_in().unwrap()).unwrap_err().to_string();
     assert!(
         error.contains("`observer \"rigid ISS\"`: a sample time of 0.001 s is shorter than the 0.002 s"),
         "{error}"
@@ -81,8 +81,8 @@ fn an_observer_cannot_be_faster_than_the_signals() {
 
 #[test]
 fn the_experiments_that_ship_go_with_the_vehicle_that_ships() {
-    let vehicle = Vehicle::built_in().unwrap();
-    for experiment in Experiment::built_in().unwrap().iter().chain([&Experiment::bench().unwrap()]) {
+    let vehicle = VehicleFile::built_in().unwrap();
+    for experiment in ExperimentFile::built_in().unwrap().iter().chain([&ExperimentFile::bench().unwrap()]) {
         experiment.check_observers(&vehicle).unwrap();
     }
 }
@@ -106,14 +106,14 @@ fn an_experiments_name_must_be_one_of_a_file() {
     }
     for name in ["E1", "E1 on a grade", "Übung_2-b.1", &"n".repeat(80)] {
         let text = EXPERIMENT.replacen("name = \"E1\"", &format!("name = {name:?}"), 1);
-        assert_eq!(Experiment::from_source(Source::built_in("e.toml", &text)).unwrap().name, name);
+        assert_eq!(ExperimentFile::from_source(Source::built_in("e.toml", &text)).unwrap().name, name);
     }
 }
 
 #[test]
 fn the_files_of_the_field_ship_and_are_right() {
     let experiments = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
-    let field = Experiment::read(&experiments.join("field.toml")).unwrap();
+    let field = ExperimentFile::read(&experiments.join("field.toml")).unwrap();
     field.read_vehicle().unwrap();
     assert_eq!(field.draws, 10);
     // Every scenario but the nominal one changes the sensors, and nothing else.
@@ -124,7 +124,7 @@ fn the_files_of_the_field_ship_and_are_right() {
         assert_eq!(varied.off_nominal, nominal.off_nominal, "{}", scenario.name);
     }
     // Its sensors are those of the bench.
-    assert_eq!(field.sensors, Experiment::bench().unwrap().sensors);
+    assert_eq!(field.sensors, ExperimentFile::bench().unwrap().sensors);
     let combined = config::Study::read(&experiments.join("combined.toml")).unwrap();
     assert_eq!((combined.runs, combined.record_before_s), (2000, 7.0));
 }
@@ -133,10 +133,10 @@ fn the_files_of_the_field_ship_and_are_right() {
 fn what_the_observers_do_not_know_changes_the_simulated_car_alone() {
     let with = |differences: &str| {
         let text = EXPERIMENT.replacen("[shift]", &format!("[off_nominal]\n{differences}\n\n[shift]"), 1);
-        Experiment::from_source(Source::built_in("e.toml", &text)).unwrap()
+        ExperimentFile::from_source(Source::built_in("e.toml", &text)).unwrap()
     };
-    let nominal = Vehicle::built_in().unwrap();
-    assert_eq!(with("").simulated_vehicle(&nominal), nominal);
+    let nominal = VehicleFile::built_in().unwrap();
+    assert_eq!(with("").simulated_vehicle(&nominal), nominal.vehicle);
     let car = |differences: &str| with(differences).simulated_vehicle(&nominal);
     let shafts = car("shaft_stiffness_factor = 0.8\nbacklash_rad = 0.03");
     assert_eq!((shafts.driveline.shaft_stiffness_n_m_rad, shafts.backlash_rad), (0.8 * 13e3, 0.03));
@@ -162,9 +162,10 @@ fn what_the_observers_do_not_know_changes_the_simulated_car_alone() {
 fn a_tip_out_closes_the_throttle_and_leaves_the_rest_of_the_profile() {
     let with = |times: &str| {
         let text = EXPERIMENT.replacen("[shift]", &format!("[off_nominal]\ntip_out_s = {times}\n\n[shift]"), 1);
-        Experiment::from_source(Source::built_in("e.toml", &text))
+        ExperimentFile::from_source(Source::built_in("e.toml", &text))
     };
-    let (own, tipped) = (Experiment::e1().unwrap().driver_throttle(), with("[0.5, 1.5]").unwrap().driver_throttle());
+    let (own, tipped) =
+        (ExperimentFile::e1().unwrap().driver_throttle(), with("[0.5, 1.5]").unwrap().driver_throttle());
     for time in [0.0, 0.2, 0.4, 0.5, 1.6, 2.0, 9.0] {
         assert!((tipped.at(time) - own.at(time)).abs() < 1e-15, "{time}");
     }

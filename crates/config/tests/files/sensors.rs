@@ -1,19 +1,19 @@
 //! The sensors of an experiment and of its scenarios.
 
-use config::{Experiment, ReadingErrors, Source, Vehicle};
+use config::{ExperimentFile, ReadingErrors, Source, VehicleFile};
 
 use super::{BENCH, line_of};
 
 /// The bench with lines added to the table of its wheel sensor.
-fn with_wheel(lines: &str) -> Result<Experiment, config::ConfigError> {
+fn with_wheel(lines: &str) -> Result<ExperimentFile, config::ConfigError> {
     let text = BENCH.replacen("noise_rad_s = 0.02\n", &format!("noise_rad_s = 0.02\n{lines}\n"), 1);
     assert!(text != BENCH);
-    Experiment::from_source(Source::built_in("e.toml", &text))
+    ExperimentFile::from_source(Source::built_in("e.toml", &text))
 }
 
 fn bench_error(from: &str, to: &str) -> String {
     assert!(BENCH.contains(from), "{from}");
-    Experiment::from_source(Source::built_in("e.toml", &BENCH.replacen(from, to, 1))).unwrap_err().to_string()
+    ExperimentFile::from_source(Source::built_in("e.toml", &BENCH.replacen(from, to, 1))).unwrap_err().to_string()
 }
 
 #[test]
@@ -22,13 +22,13 @@ fn observers_are_never_told_the_errors_of_a_sensor() {
     let experiment = with_wheel(errors).unwrap();
     let (real, told) = (experiment.sensors.unwrap(), experiment.sensors_told.unwrap());
     assert_eq!((real.wheel.errors.scale, real.wheel.errors.outliers), (1.02, 2.0));
-    assert_eq!(told, Experiment::bench().unwrap().sensors_told.unwrap());
+    assert_eq!(told, ExperimentFile::bench().unwrap().sensors_told.unwrap());
     assert_eq!(told.wheel.errors, ReadingErrors::NONE);
 }
 
 #[test]
 fn a_sensor_without_error_keys_has_no_errors() {
-    let sensors = Experiment::bench().unwrap().sensors.unwrap();
+    let sensors = ExperimentFile::bench().unwrap().sensors.unwrap();
     assert_eq!(sensors, sensors.without_errors());
     assert_eq!((sensors.wheel.offset_s, sensors.row_offset_s, sensors.outliers), (0.0, 0.0, 0.0));
 }
@@ -38,7 +38,7 @@ fn a_scenario_changes_what_it_names_of_the_sensors_and_nothing_that_observers_ar
     let scenario = "[[scenario]]\nname = \"worn\"\nrow_time_s = 0.005\nsensors.missing_share = 0.03\n\
                     sensors.turbine.missing_share = 0.0\nsensors.wheel.scale = 1.01\nsensors.wheel.delay_s = 0.02\n";
     let text = [BENCH, scenario].concat();
-    let experiment = Experiment::from_source(Source::built_in("e.toml", &text)).unwrap();
+    let experiment = ExperimentFile::from_source(Source::built_in("e.toml", &text)).unwrap();
     let varied = experiment.with_scenario(experiment.scenarios.last().unwrap());
     let (before, after) = (experiment.sensors.unwrap(), varied.sensors.unwrap());
     assert_eq!((after.wheel.errors.scale, after.wheel.delay_s, after.wheel.teeth), (1.01, 0.02, before.wheel.teeth));
@@ -77,7 +77,7 @@ fn a_wrong_error_of_a_sensor_is_named_with_its_place() {
 fn a_wrong_scenario_of_the_sensors_is_named_with_its_place() {
     let wrong = |experiment: &str, lines: &str| {
         let text = [experiment, "[[scenario]]\nname = \"x\"\n", lines, "\n"].concat();
-        let error = Experiment::from_source(Source::built_in("e.toml", &text)).unwrap_err().to_string();
+        let error = ExperimentFile::from_source(Source::built_in("e.toml", &text)).unwrap_err().to_string();
         let line = text.lines().count();
         assert!(error.starts_with(&format!("e.toml:{line}: ")), "{error}");
         error
@@ -100,9 +100,9 @@ fn rows_of_a_scenario_that_forward_euler_cannot_carry_are_refused() {
     let text = [BENCH, rows].concat();
     let euler = text.replacen("sensors = \"real\"", "sensors = \"real\"\ndiscretisation = \"euler\"", 1);
     assert!(euler != text);
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap();
     let checked =
-        |text: &str| Experiment::from_source(Source::built_in("e.toml", text)).unwrap().check_observers(&vehicle);
+        |text: &str| ExperimentFile::from_source(Source::built_in("e.toml", text)).unwrap().check_observers(&vehicle);
     checked(&text).unwrap();
     assert!(checked(&euler).unwrap_err().to_string().contains("a sample time of 0.1 s is longer than"));
 }

@@ -1,6 +1,6 @@
 //! Study files.
 
-use config::{Experiment, Vehicle};
+use config::{ExperimentFile, VehicleFile};
 
 use super::{EXPERIMENT, Folder, VEHICLE};
 
@@ -65,7 +65,7 @@ fn a_study_changes_other_experiments_as_far_as_they_have_what_it_varies() {
     let study = config::Study::plausible().unwrap();
     let values: Vec<f64> = study.factors.iter().map(|factor| factor.values.ends()[0]).collect();
     let value = |name: &str| values[study.factors.iter().position(|factor| factor.name == name).unwrap()];
-    for experiment in Experiment::built_in().unwrap() {
+    for experiment in ExperimentFile::built_in().unwrap() {
         let varied = study.varied_experiment(&experiment, &values).unwrap();
         assert_eq!(*varied.throttle.values().last().unwrap(), value("throttle"), "{}", experiment.name);
         assert_eq!(varied.shift.lead_s, value("lead_s"));
@@ -75,9 +75,9 @@ fn a_study_changes_other_experiments_as_far_as_they_have_what_it_varies() {
         }
         // What makes it this experiment stays.
         assert_eq!((&varied.name, varied.off_nominal), (&experiment.name, experiment.off_nominal));
-        assert_eq!((varied.observers, varied.sensors_told), (experiment.observers, experiment.sensors_told));
+        assert_eq!((&varied.observers, varied.sensors_told), (&experiment.observers, experiment.sensors_told));
     }
-    let [e1, ..] = Experiment::built_in().unwrap();
+    let [e1, ..] = ExperimentFile::built_in().unwrap();
     let at = study.factors.iter().position(|factor| factor.name == "throttle").unwrap();
     let mut wrong = values.clone();
     wrong[at] = 1.5;
@@ -89,7 +89,7 @@ fn a_study_changes_other_experiments_as_far_as_they_have_what_it_varies() {
 #[test]
 fn the_plausible_settings_contain_that_of_the_files() {
     let study = config::Study::plausible().unwrap();
-    let (vehicle, [e1, ..]) = (Vehicle::built_in().unwrap(), Experiment::built_in().unwrap());
+    let (vehicle, [e1, ..]) = (VehicleFile::built_in().unwrap(), ExperimentFile::built_in().unwrap());
     let road = &vehicle.road;
     for (name, nominal) in [
         ("inertia_kg_m2", vehicle.engine.inertia_kg_m2),

@@ -1,18 +1,18 @@
 //! Vehicle files.
 
-use config::{Source, Vehicle};
+use config::{Source, VehicleFile};
 
 use super::{VEHICLE, line_of};
 
 /// The error for the built-in vehicle with one piece of its text replaced.
 fn vehicle_error(from: &str, to: &str) -> String {
     assert!(VEHICLE.contains(from), "{from}");
-    Vehicle::from_source(Source::built_in("vehicle.toml", &VEHICLE.replacen(from, to, 1))).unwrap_err().to_string()
+    VehicleFile::from_source(Source::built_in("vehicle.toml", &VEHICLE.replacen(from, to, 1))).unwrap_err().to_string()
 }
 
 #[test]
 fn chapter_parameters_of_table_2_1_are_those_of_the_built_in_vehicle() {
-    let v = Vehicle::built_in().unwrap();
+    let v = VehicleFile::built_in().unwrap();
     assert_eq!((v.road.mass_kg, v.road.wheel_radius_m, v.road.front_area_m2), (1500.0, 0.3, 2.0));
     assert_eq!((v.engine.inertia_kg_m2, v.engine.drag_n_m_s), (0.17, 0.047));
     assert_eq!((v.driveline.final_ratio, v.driveline.shaft_stiffness_n_m_rad), (3.0, 13e3));
@@ -124,7 +124,7 @@ fn a_gain_map_whose_pressure_falls_with_the_current_is_refused() {
     let map = "gain = { current_a = [0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0], ";
     let far =
         VEHICLE.replace(map, &map.replace("0.7, 1.0", "0.7, 5.0")).replace(gains, &gains.replace("1.10e6", "0.9e6"));
-    Vehicle::from_source(Source::built_in("vehicle.toml", &far)).unwrap();
+    VehicleFile::from_source(Source::built_in("vehicle.toml", &far)).unwrap();
 }
 
 #[test]
@@ -175,16 +175,16 @@ fn a_budget_that_leaves_out_its_own_car_is_refused() {
 }
 
 /// The built-in vehicle with these keys in place of `command_age_s`, and with this table of its stroke's limits.
-fn with_budget(keys: &str, fill: &str) -> Result<Vehicle, String> {
+fn with_budget(keys: &str, fill: &str) -> Result<VehicleFile, String> {
     let from = VEHICLE.find("command_age_s").unwrap();
     let to = from + VEHICLE[from..].find("float32_rounding").unwrap();
     let text = format!("{}{keys}\n{}\n[design.error_bounds.fill]\n{fill}\n", &VEHICLE[..from], &VEHICLE[to..]);
-    Vehicle::from_source(Source::built_in("vehicle.toml", &text)).map_err(|error| error.to_string())
+    VehicleFile::from_source(Source::built_in("vehicle.toml", &text)).map_err(|error| error.to_string())
 }
 
 #[test]
 fn what_a_budget_leaves_out_of_valve_and_stroke_has_defaults_and_what_it_holds_is_checked() {
-    assert!(Vehicle::built_in().unwrap().error_bounds.fill.is_none());
+    assert!(VehicleFile::built_in().unwrap().error_bounds.fill.is_none());
     let bounds = with_budget("", "").unwrap().error_bounds;
     assert_eq!((bounds.valve_hysteresis_pa, bounds.command_age_s), (10e3, 0.05));
     assert_eq!(bounds.line_pressure_pa, [bounds.pressure_max_pa; 2]);

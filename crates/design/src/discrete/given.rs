@@ -1,7 +1,7 @@
 //! Gains that are not made for a sample time: given ones, and those of continuous time. Whether an error grows from sample to
 //! sample, and the longest step over which it shrinks.
 
-use config::{GainMethod, GivenGains, ObserverEntry, ObserverKind, SAMPLE_TIMES_S, Vehicle};
+use car::{GainMethod, GivenGains, ObserverEntry, ObserverKind, SAMPLE_TIMES_S, Vehicle};
 use nalgebra::DMatrix;
 use observer::{Discretisation, Phase};
 
@@ -37,15 +37,15 @@ fn given(entry: &ObserverEntry) -> Option<Gains> {
         DMatrix::from_row_iterator(1, gain.len(), normalised)
     };
     let (model, torque, inertia) = match &entry.gains {
-        Some(GivenGains::Rigid(gains)) => {
-            (Model::Rigid, rigid(&[gains.torque_phase_pa_s_rad]), rigid(&gains.inertia_phase_pa_s_rad))
+        Some(GivenGains::Rigid { torque_phase_pa_s_rad, inertia_phase_pa_s_rad }) => {
+            (Model::Rigid, rigid(&[*torque_phase_pa_s_rad]), rigid(inertia_phase_pa_s_rad))
         }
         Some(GivenGains::CompliantNormalised(torque, inertia)) => (
             Model::Compliant,
             DMatrix::from_row_slice(2, 2, torque.as_flattened()),
             DMatrix::from_row_slice(2, 3, inertia.as_flattened()),
         ),
-        Some(GivenGains::Sliding(_)) | None => return None,
+        Some(GivenGains::Sliding { .. }) | None => return None,
     };
     Some(Gains { model, phases: [(Phase::TorquePhase, torque), (Phase::InertiaPhase, inertia)] })
 }

@@ -32,7 +32,7 @@ pub(crate) mod search;
 mod smallest_gain;
 pub(crate) mod system;
 
-use config::{GainMethod, SAMPLE_TIMES_S, Vehicle};
+use car::{GainMethod, SAMPLE_TIMES_S, Vehicle};
 use nalgebra::DMatrix;
 use observer::{CompliantGains, Phase, RigidGains, Schedule};
 use serde::Serialize;
@@ -108,8 +108,6 @@ pub struct DiscreteCertificate {
     pub torque_n_m_mpa: f64,
     /// Directions of slip for which it holds: with backward slip the gain on the pressure changes its sign with `G`.
     pub slip_directions: &'static str,
-    /// SHA-256 of the vehicle file.
-    pub vehicle_sha256: String,
 }
 
 /// A gain.
@@ -226,7 +224,6 @@ fn certified(
         solver,
         margins: found.margins,
         slip_directions: BOTH_DIRECTIONS,
-        vehicle_sha256: vehicle.source.sha256(),
     })
 }
 

@@ -1,6 +1,6 @@
 //! The size of an error in which a certificate says that it shrinks, and the longest step over which it does.
 
-use config::{SAMPLE_TIMES_S, Vehicle};
+use car::{SAMPLE_TIMES_S, Vehicle};
 use nalgebra::{DMatrix, DVector};
 use observer::{Discretisation, Phase};
 

@@ -99,7 +99,8 @@ fn with_margin(
 
 #[cfg(test)]
 mod tests {
-    use config::{GainMethod, Vehicle};
+    use car::{GainMethod, Vehicle};
+    use config::VehicleFile;
     use observer::Phase;
 
     use super::super::{Model, Quantity, design_discrete_phase, rounded};
@@ -107,7 +108,7 @@ mod tests {
 
     #[test]
     fn the_discrete_twin_has_the_reference_gain() {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let phase = Phase::TorquePhase;
         let mut system = ErrorSystem::of(&vehicle, Model::Compliant, Quantity::Pressure, phase, 0.01);
         system.h = DMatrix::from_row_slice(2, 2, &[2.38, 0.0, 0.0, 0.13]);
@@ -121,7 +122,7 @@ mod tests {
 
     #[test]
     fn the_rigid_twin_contracts_and_yields_to_the_open_loop_where_it_must() {
-        let vehicle = Vehicle::built_in().unwrap();
+        let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let design = |vehicle: &Vehicle, phase| {
             design_discrete_phase(vehicle, Model::Rigid, GainMethod::IssDiscrete, Quantity::Pressure, phase, 0.01)
                 .unwrap()

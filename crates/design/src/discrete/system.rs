@@ -28,7 +28,7 @@
 //!
 //! so that it depends on how much the friction changes from sample to sample, see [`ErrorSystem::friction_step`].
 
-use config::Vehicle;
+use car::Vehicle;
 use nalgebra::{DMatrix, DVector};
 use observer::{Discretisation, Phase};
 
@@ -114,7 +114,7 @@ impl ErrorSystem {
         let mut through_gain: Vec<Cause> = (accelerations.into_iter())
             .map(|Cause { name, column }| Cause { name, column: column * sample_time_s })
             .collect();
-        let rounding = ROUNDINGS * vehicle.error_bounds.float32_rounding * vehicle.limits.speed_max_rad_s;
+        let rounding = ROUNDINGS * vehicle.error_bounds.float32_rounding * vehicle.speed_max_rad_s;
         through_gain.extend((0..outputs.len()).map(|i| Cause {
             name: "float32 rounding",
             column: unit_vector(outputs.len(), i) * (rounding / SPEED_UNITS_RAD_S[outputs[i]]),

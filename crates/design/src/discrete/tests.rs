@@ -1,5 +1,7 @@
 //! Designs for a sample time: bounds that hold, and what they depend on.
 
+use config::VehicleFile;
+
 use super::*;
 
 const SAMPLE_S: f64 = 0.01;
@@ -7,7 +9,7 @@ const METHODS: [GainMethod; 4] =
     [GainMethod::IssDiscrete, GainMethod::PeakToPeak, GainMethod::Scheduled, GainMethod::Interval];
 
 fn vehicle() -> Vehicle {
-    Vehicle::built_in().expect("the built-in vehicle is valid")
+    VehicleFile::built_in().expect("the built-in vehicle is valid").vehicle
 }
 
 fn inertia(method: GainMethod, model: Model) -> DiscreteCertificate {
@@ -183,12 +185,12 @@ fn an_interval_gain_keeps_the_sign_of_an_error() {
     }
 }
 
-type Change<'a> = (&'a str, &'a dyn Fn(&mut config::ErrorBounds));
+type Change<'a> = (&'a str, &'a dyn Fn(&mut car::ErrorBounds));
 
 #[test]
 fn every_entry_of_the_budget_is_in_a_bound() {
     let nominal = inertia(GainMethod::PeakToPeak, Model::Rigid);
-    let bound_with = |change: &dyn Fn(&mut config::ErrorBounds)| {
+    let bound_with = |change: &dyn Fn(&mut car::ErrorBounds)| {
         let mut vehicle = vehicle();
         change(&mut vehicle.error_bounds);
         let (model, method, quantity) = (Model::Rigid, GainMethod::PeakToPeak, Quantity::ClutchTorque);
@@ -211,7 +213,7 @@ fn every_entry_of_the_budget_is_in_a_bound() {
         assert!(bound_with(change) > 1.001 * nominal.best_gain_bound_pa, "{name}");
     }
     // The load hardly shows in the inertia phase; it does in a gain on the wheel's speed.
-    let iss = |change: &dyn Fn(&mut config::ErrorBounds)| {
+    let iss = |change: &dyn Fn(&mut car::ErrorBounds)| {
         let mut vehicle = vehicle();
         change(&mut vehicle.error_bounds);
         let quantity = Quantity::ClutchTorque;
@@ -219,7 +221,7 @@ fn every_entry_of_the_budget_is_in_a_bound() {
         design_discrete_phase(&vehicle, model, method, quantity, phase, SAMPLE_S).unwrap().best_gain_bound_pa
     };
     let base = iss(&|_| ());
-    let loads: [&dyn Fn(&mut config::ErrorBounds); 3] =
+    let loads: [&dyn Fn(&mut car::ErrorBounds); 3] =
         [&|b| b.mass_kg *= 2.0, &|b| b.grade_rad *= 2.0, &|b| b.wheel_quantum_rad_s *= 2.0];
     assert!(loads.iter().all(|change| iss(change) > 1.001 * base));
 }

@@ -4,7 +4,7 @@
 
 pub(crate) mod sampled;
 
-use config::Vehicle;
+use config::VehicleFile;
 use design::{design_rigid, rigid_observer};
 use observer::{Phase, RigidObserver, RigidState, Sample, SampleEstimator};
 
@@ -12,7 +12,7 @@ pub(crate) const ENGINE_RAD_S: f64 = 370.0;
 pub(crate) const DT_S: f64 = 1e-4;
 
 pub(crate) fn observer() -> RigidObserver<f64> {
-    let vehicle = Vehicle::built_in().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
     rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains())
 }
 

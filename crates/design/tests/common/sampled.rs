@@ -1,6 +1,6 @@
 //! A car whose readings, torques and valve err within the error budget, with the rigid observer of a sample time on it.
 
-use config::Vehicle;
+use car::Vehicle;
 use design::budget::{grade_n_m, mass_n_m};
 use design::{ValveErrors, rigid_observer};
 use observer::{Phase, RigidGains, SampleEstimator, Schedule};

@@ -9,7 +9,7 @@
 //! In the inertia phase of a power-on upshift the offgoing clutch is open and the sum is the oncoming one's. `alpha` of the gearbox is not needed for
 //! the work. The torque ratio of the converter and `M11` are not known here: they lie in ranges, which make the ranges of the results.
 
-use config::TURBINE_SIDE_INERTIA_KG_M2;
+use car::TURBINE_SIDE_INERTIA_KG_M2;
 use logs::{Direction, Load, Shift};
 
 use super::converter::ConverterFit;

@@ -1,6 +1,6 @@
 //! What driving in a gear needs of a car.
 
-use config::Vehicle;
+use car::Vehicle;
 use design::ShiftTables;
 use drivetrain::{Converter, Driveline, RoadLoad, Tyre};
 use observer::any_shift::MAX_ELEMENTS;
@@ -61,7 +61,7 @@ impl DrivenCar {
     /// A car with a gearbox. The inertia of each gear has one part: that of the first shift to or from it, as the `M11` of a pair of gears
     /// whose place `pair` knows.
     pub(crate) fn with_gearbox(
-        car: &config::Car,
+        car: &car::Car,
         tables: &ShiftTables<f64>,
         pair: &dyn Fn(usize, usize) -> Option<usize>,
     ) -> Self {
@@ -122,7 +122,7 @@ impl DrivenCar {
 }
 
 /// The elements that are open in a gear; none where the gear train is not known.
-fn open_elements(car: &config::Car, gear: usize) -> Option<Vec<OpenElement>> {
+fn open_elements(car: &car::Car, gear: usize) -> Option<Vec<OpenElement>> {
     let train = car.gearbox.train.as_ref()?;
     let gear = car.gearbox.gears.get(gear)?;
     let is_held = |at: usize| gear.holding.iter().any(|holding| holding.element == at);

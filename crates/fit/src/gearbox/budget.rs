@@ -1,7 +1,7 @@
 //! The error bounds of a fitted file: what the fit leaves open of each quantity.
 
-use config::{Car, ShiftClutch};
-use design::{ElementErrors, ErrorBudget};
+use car::{Car, ShiftClutch};
+use car::{ElementErrors, ErrorBudget};
 
 use super::file::{Written, list};
 use super::fitting::GearboxFit;

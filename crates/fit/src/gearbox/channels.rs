@@ -1,6 +1,6 @@
 //! The channels of output and engine speed against that of the turbine speed, and shifts with their readings at the right times.
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 
 use super::shift_log::ShiftLog;

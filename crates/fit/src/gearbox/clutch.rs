@@ -3,7 +3,7 @@
 //! A piston with a stroke is carried from the commands that were kept from before the shift: an element that is applied again before it is empty has
 //! oil left, and kisses earlier.
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 use drivetrain::Cylinder;
 use nalgebra::{DMatrix, DVector};

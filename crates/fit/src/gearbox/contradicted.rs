@@ -1,6 +1,6 @@
 //! Measured pressures that contradict the commands of their valves: no valve of the file's bounds makes them.
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 
 use super::quantities::Quantities;

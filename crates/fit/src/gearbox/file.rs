@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use config::{Car, Source, toml_string};
+use config::{CarFile, Source, toml_string};
 use drivetrain::{ClutchValve, Table1};
 use trace::ShownPath as _;
 
@@ -25,7 +25,13 @@ impl GearboxFit {
     ///
     /// # Errors
     /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
-    pub fn vehicle_file(&self, car: &Car, path: &Path, logs: &str, checked: Option<&HeldOut>) -> Result<Car, FitError> {
+    pub fn vehicle_file(
+        &self,
+        car: &CarFile,
+        path: &Path,
+        logs: &str,
+        checked: Option<&HeldOut>,
+    ) -> Result<CarFile, FitError> {
         let mut text = Written::new(&car.source.text)?;
         self.write_converter(&mut text, car)?;
         self.write_drag(&mut text, car)?;
@@ -57,12 +63,12 @@ impl GearboxFit {
     ///
     /// # Errors
     /// None that the given file does not have itself.
-    pub fn kept_file(&self, car: &Car, path: &Path, reason: &str) -> Result<Car, FitError> {
+    pub fn kept_file(&self, car: &CarFile, path: &Path, reason: &str) -> Result<CarFile, FitError> {
         let text = Written::new(&car.source.text)?;
         written(text, car, path, &kept(reason))
     }
 
-    fn write_converter(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
+    fn write_converter(&self, text: &mut Written, car: &CarFile) -> Result<(), FitError> {
         let Some(converter) = &car.converter else { return Ok(()) };
         let capacity = converter.capacity_n_m_s2.scaled(self.unknown(Quantity::Input).exp());
         let ratio = self.unknown(Quantity::TorqueRatio).exp();
@@ -72,7 +78,7 @@ impl GearboxFit {
     }
 
     /// The drag of the elements of which the logs tell it.
-    fn write_drag(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
+    fn write_drag(&self, text: &mut Written, car: &CarFile) -> Result<(), FitError> {
         for (place, name) in self.quantities.elements.iter().enumerate() {
             let element = car.gearbox.elements.iter().position(|element| element.name == *name);
             let known = element.and_then(|at| car.clutches[at].as_ref());
@@ -86,7 +92,7 @@ impl GearboxFit {
     }
 
     /// Mass, road load and engine, where driving between shifts tells them: no ratio between torques in shifts depends on them.
-    fn write_vehicle(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
+    fn write_vehicle(&self, text: &mut Written, car: &CarFile) -> Result<(), FitError> {
         let values = [
             (Quantity::Mass, "vehicle", "mass_kg", car.road.mass_kg),
             (Quantity::Rolling, "vehicle", "rolling_moment_n_m", car.road.rolling_moment_n_m),
@@ -115,7 +121,7 @@ impl GearboxFit {
         self.verdict(quantity) != Verdict::NotTold
     }
 
-    fn write_element(&self, text: &mut Written, car: &Car, element: usize, place: usize) -> Result<(), FitError> {
+    fn write_element(&self, text: &mut Written, car: &CarFile, element: usize, place: usize) -> Result<(), FitError> {
         let Some(Some(known)) = car.clutches.get(element) else { return Ok(()) };
         let name = car.gearbox.elements[element].name.as_str();
         let table = ["clutch", name];
@@ -141,7 +147,7 @@ impl GearboxFit {
         &self,
         text: &mut Written,
         name: &str,
-        known: &config::ShiftClutch,
+        known: &car::ShiftClutch,
         place: usize,
         spring_n: f64,
     ) -> Result<(), FitError> {
@@ -169,7 +175,7 @@ impl GearboxFit {
         &self,
         text: &mut Written,
         name: &str,
-        known: &config::ShiftClutch,
+        known: &car::ShiftClutch,
         place: usize,
     ) -> Result<(), FitError> {
         let valve = known.valve.changed(self.unknown(Quantity::Lag(place)).exp(), self.gain_factor(place), None);
@@ -240,12 +246,12 @@ impl GearboxFit {
 }
 
 /// The file with a text, as it is to stand at `path`, with a line at its head.
-fn written(mut text: Written, car: &Car, path: &Path, head: &str) -> Result<Car, FitError> {
+fn written(mut text: Written, car: &CarFile, path: &Path, head: &str) -> Result<CarFile, FitError> {
     let gearbox = gearbox_path(car)?;
     text.set_gearbox(car, path, &gearbox)?;
     let source = Source { path: path.to_owned(), text: headed(head, &text.finish()) };
     let gearbox = if gearbox.exists() { Source::read(&gearbox)? } else { return Err(no_gearbox(&gearbox)) };
-    Car::from_sources(source, gearbox).map_err(|error| {
+    CarFile::from_sources(source, gearbox).map_err(|error| {
         FitError::Work(format!(
             "the fitted values are not those of a possible car: {error}\n\
              hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
@@ -308,7 +314,7 @@ impl Written {
     }
 
     /// Keeps the gearbox file where it is when the vehicle file moves to another folder.
-    fn set_gearbox(&mut self, car: &Car, path: &Path, gearbox: &Path) -> Result<(), FitError> {
+    fn set_gearbox(&mut self, car: &CarFile, path: &Path, gearbox: &Path) -> Result<(), FitError> {
         let folder = |path: &Path| match path.parent() {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
             _ => PathBuf::from("."),
@@ -345,7 +351,7 @@ pub(super) fn list(values: &[f64]) -> String {
 }
 
 /// The gearbox file of a vehicle file.
-fn gearbox_path(car: &Car) -> Result<PathBuf, FitError> {
+fn gearbox_path(car: &CarFile) -> Result<PathBuf, FitError> {
     let table: toml::Table =
         car.source.text.parse().map_err(|error: toml::de::Error| FitError::input(error.to_string()))?;
     let named = table.get("gearbox").and_then(toml::Value::as_str).unwrap_or_default();

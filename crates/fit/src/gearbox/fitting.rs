@@ -1,7 +1,8 @@
 //! The fit of a car to its shifts.
 
-use config::Car;
-use design::{ErrorBudget, ShiftTables};
+use car::Car;
+use car::ErrorBudget;
+use design::ShiftTables;
 use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
@@ -375,12 +376,13 @@ impl GearboxFit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use design::ErrorBudget;
+    use car::ErrorBudget;
+    use config::CarFile;
 
     #[test]
     fn an_inertia_that_is_far_off_and_not_told_is_that_of_the_file() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let car = Car::read(&root.join("vehicles/eight_speed.toml")).unwrap();
+        let car = CarFile::read(&root.join("vehicles/eight_speed.toml")).unwrap();
         let tables = ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
         let quantities = Quantities::of(&car, &tables, &[], [false; 2]);
         let place = quantities.place(Quantity::Inertia(3)).unwrap();

@@ -1,7 +1,8 @@
 //! The quantities of a fit, and what is known of them before.
 
-use config::Car;
-use design::{ErrorBudget, ShiftTables, any_shift_filter, shift_uncertainty};
+use car::Car;
+use car::ErrorBudget;
+use design::{ShiftTables, any_shift_filter, shift_uncertainty};
 use nalgebra::DMatrix;
 use observer::any_shift::AnyShiftFilter;
 

@@ -1,6 +1,6 @@
 //! From the steps of a log to its shifts.
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 use observer::Reading;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftClutch, ShiftInput};

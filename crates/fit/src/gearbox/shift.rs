@@ -1,6 +1,6 @@
 //! The model of one shift while both of its clutches slip.
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 use drivetrain::ShiftKind;
 use drivetrain::clutch::drag_torque;

@@ -1,6 +1,6 @@
 //! What was measured in a shift, and when both of its clutches slipped.
 
-use config::Car;
+use car::Car;
 use drivetrain::ShiftKind;
 use observer::any_shift::ShiftRow;
 

@@ -9,8 +9,9 @@
 //! makes less of it for the kiss point; but the model follows a command with noise, whose play is narrower than that of the true one. So the
 //! kiss point, a pressure, has at least the deviation of the hysteresis itself.
 
-use config::Car;
-use design::{ErrorBudget, ShiftTables};
+use car::Car;
+use car::ErrorBudget;
+use design::ShiftTables;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::quantities::{KISS_UNIT_PA, Quantity};

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 
 use super::command_delay::{said_of_commands, with_commands_earlier};

@@ -3,7 +3,7 @@
 //! Without an offset of its own the sensor would give another valve gain: 10 kPa are 7 % of it at a pressure of 150 kPa. Where a log has no such
 //! readings, the offset is a quantity of the fit ([`Quantity::PressureOffset`](super::Quantity)).
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 
 use super::quantities::deviation_of;

@@ -1,8 +1,9 @@
 //! Cars drawn at random, their shifts behind sensors, and what a fit is compared with.
 #![allow(dead_code, clippy::unwrap_used, reason = "shared by several tests; a test may panic")]
 
-use config::vehicle::ShiftClutch;
-use config::{Experiment, Sensors, Source, Vehicle};
+use car::ShiftClutch;
+use car::{Sensors, Vehicle};
+use config::{ExperimentFile, Source, VehicleFile};
 use drivetrain::{ClutchValve, Table1};
 use fit::{Driving, Fit, Map, Parameter, ReadingAges, Series, ShiftRecord};
 use plant::hybrid::RELATIVE_TOLERANCE;
@@ -59,7 +60,7 @@ pub(crate) enum Logs {
 
 /// A car that differs from its file in every parameter.
 pub(crate) struct TestCar {
-    pub(crate) file: Vehicle,
+    pub(crate) file: VehicleFile,
     pub(crate) car: Vehicle,
     pub(crate) sensors: Sensors,
     /// The unknowns of a perfect fit.
@@ -115,17 +116,17 @@ fn draw_fill(clutch: &mut ShiftClutch, draw: &mut Draw) -> f64 {
 
 impl TestCar {
     pub(crate) fn drawn(seed: u64) -> Self {
-        Self::of(Vehicle::built_in().unwrap(), seed)
+        Self::of(VehicleFile::built_in().unwrap(), seed)
     }
 
     /// A car whose pistons have a stroke.
     pub(crate) fn with_stroke(seed: u64) -> Self {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_stroke.toml");
-        Self::of(Vehicle::read(std::path::Path::new(path)).unwrap(), seed)
+        Self::of(VehicleFile::read(std::path::Path::new(path)).unwrap(), seed)
     }
 
     /// A car that differs from this file.
-    pub(crate) fn of(file: Vehicle, seed: u64) -> Self {
+    pub(crate) fn of(file: VehicleFile, seed: u64) -> Self {
         let mut draw = Draw::new(seed);
         let mut truth = Vec::new();
         let mut factor = |draw: &mut Draw, parameter: Parameter, least: f64, greatest: f64| {
@@ -149,7 +150,7 @@ impl TestCar {
             }
         }
         let source = Source { text: head.to_owned() + &with_inertias, ..file.source.clone() };
-        let mut car = Vehicle::from_source(source).unwrap();
+        let mut car = VehicleFile::from_source(source).unwrap().vehicle;
         let friction = factor(&mut draw, Parameter::Friction, 0.8, 1.2);
         car.oncoming.clutch.friction = car.oncoming.clutch.friction.scaled(friction);
         car.oncoming.clutch.static_friction *= friction;
@@ -176,7 +177,7 @@ impl TestCar {
         });
         let at_rest = car.oncoming.clutch.friction.at(0.0);
         car.oncoming.clutch.static_friction = car.oncoming.clutch.static_friction.max(1.0001 * at_rest);
-        let mut sensors = Experiment::bench().unwrap().sensors.unwrap();
+        let mut sensors = ExperimentFile::bench().unwrap().sensors.unwrap();
         let valve_late_s = draw.between(0.0, 0.015);
         if let ClutchValve::Proportional(maps) = &mut car.oncoming.valve {
             maps.delay_s = mapped(&maps.delay_s, |_, delay_s| delay_s + valve_late_s);
@@ -265,7 +266,7 @@ impl TestCar {
 
     /// The file takes the place of the car: nothing is off but the signals.
     pub(crate) fn with_the_right_file(mut self) -> Self {
-        self.car = self.file.clone();
+        self.car = self.file.vehicle.clone();
         for (parameter, value) in &mut self.truth {
             let is_of_car = !parameter.is_of_signals();
             *value = if is_of_car { 0.0 } else { *value };
@@ -327,7 +328,7 @@ impl TestCar {
 
     /// One drive, whose shift is recorded at full rate: throttle, mass, grade and speed are drawn.
     pub(crate) fn drive(&mut self) -> Trace {
-        let mut experiment = Experiment::e1().unwrap();
+        let mut experiment = ExperimentFile::e1().unwrap();
         let throttle = self.draw.between(0.15, 0.6);
         let speed_m_s = self.draw.between(4.0, 7.0);
         experiment.throttle = Table1::new(&[0.0, 0.2, 0.6], &[0.1, 0.1, throttle]).unwrap();
@@ -471,7 +472,7 @@ impl TestCar {
         let mass = draw.factor(0.06);
         let mut log: Option<Trace> = None;
         for part in 0..parts {
-            let mut experiment = Experiment::e1().unwrap();
+            let mut experiment = ExperimentFile::e1().unwrap();
             let times: Vec<f64> = (0..20).map(|at| PART_S / 20.0 * (f64::from(at) + draw.between(0.0, 0.5))).collect();
             let releases = |at: usize| self.releases && at >= 10 && at % 4 < 2;
             let position = |at: usize| if releases(at) { 0.0 } else { draw.between(0.08, 0.5) };

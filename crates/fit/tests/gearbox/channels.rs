@@ -1,6 +1,7 @@
 //! Scale and delays of the channels, and the stiffness of the drive shafts.
 
-use config::Car;
+use car::Car;
+use config::CarFile;
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, fit};
 use fit::{Known, ReadingAges, Verdict};
 use observer::Reading;
@@ -12,7 +13,7 @@ fn drawn(seed: u64) -> Drawn {
     Drawn::of(car("eight_speed.toml"), seed, Case::Usual).with_channels()
 }
 
-fn fitted(drawn: &Drawn, drive: &config::Drive) -> GearboxFit {
+fn fitted(drawn: &Drawn, drive: &car::Drive) -> GearboxFit {
     let (recorded, _) = drawn.driven(&hilly(drive, drawn.seed));
     fit(&drawn.file, &drawn.tables(), &recorded.shifts, &recorded.driving, &mut |_| ()).unwrap()
 }
@@ -21,7 +22,7 @@ fn holds(known: &Known, truth: f64) -> bool {
     (known.value - truth).abs() <= 2.0 * known.sd
 }
 
-fn written(drawn: &Drawn, fit: &GearboxFit) -> Car {
+fn written(drawn: &Drawn, fit: &GearboxFit) -> CarFile {
     fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap()
 }
 
@@ -139,7 +140,7 @@ fn a_closed_lock_up_clutch_tells_the_delay_of_the_engine_speed_and_the_ratio_a_w
 #[test]
 fn a_slip_controlled_lock_up_clutch_tells_nothing_of_the_engine_speed() {
     let mut drawn = Drawn::of(car("eight_speed.toml"), 33, Case::Usual);
-    drawn.file.lock_up = Some(config::LockUp {
+    drawn.file.lock_up = Some(car::LockUp {
         capacity_n_m: 300.0,
         first_gear: 3,
         on_rad_s: 140.0,

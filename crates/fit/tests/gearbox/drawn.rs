@@ -3,8 +3,10 @@
 use std::cell::RefCell;
 use std::path::Path;
 
-use config::{Car, Drive, DriveSegment, Sensors};
-use design::{ErrorBudget, ShiftTables};
+use car::ErrorBudget;
+use car::{Car, Drive, DriveSegment, Sensors};
+use config::{CarFile, DriveFile};
+use design::ShiftTables;
 use fit::gearbox::{Quantities, Quantity, Recorded, Recorder, ShiftLog};
 use fit::{ReadingAges, Series};
 use observer::Reading;
@@ -58,18 +60,18 @@ pub(crate) fn root() -> &'static Path {
 }
 
 /// A car of the repository.
-pub(crate) fn car(name: &str) -> Car {
-    Car::read(&root().join("vehicles").join(name)).unwrap()
+pub(crate) fn car(name: &str) -> CarFile {
+    CarFile::read(&root().join("vehicles").join(name)).unwrap()
 }
 
 /// Sensors of the bench.
 pub(crate) fn sensors() -> Sensors {
-    Sensors::read(&root().join("experiments/bench.toml")).unwrap().unwrap()
+    config::read_sensors(&root().join("experiments/bench.toml")).unwrap().unwrap()
 }
 
 /// The drive in town, so many times.
 pub(crate) fn city(repetitions: u32) -> Drive {
-    Drive { repetitions, ..Drive::read(&root().join("drives/city.toml")).unwrap() }
+    Drive { repetitions, ..DriveFile::read(&root().join("drives/city.toml")).unwrap().drive }
 }
 
 /// A drive on a road whose grade is drawn by this seed, with as many segments as its repetitions have together.
@@ -149,7 +151,7 @@ pub(crate) enum Case {
 /// A car as its file has it, and as it is.
 #[derive(Clone)]
 pub(crate) struct Drawn {
-    pub(crate) file: Car,
+    pub(crate) file: CarFile,
     pub(crate) truth: Car,
     pub(crate) seed: u64,
     draw: ShiftDraw,
@@ -197,7 +199,7 @@ impl ReportedErrors {
 
 impl Drawn {
     /// A car drawn by this seed.
-    pub(crate) fn of(file: Car, seed: u64, case: Case) -> Self {
+    pub(crate) fn of(file: CarFile, seed: u64, case: Case) -> Self {
         let mut random = Random(seed);
         let share = if case == Case::Right { 0.0 } else { 1.0 };
         let mut within = |bound: f64| share * bound * (2.0 * random.uniform() - 1.0);
@@ -270,8 +272,9 @@ impl Drawn {
 
     /// With a file whose error bounds say that no valve has a hysteresis.
     pub(crate) fn without_hysteresis(mut self) -> Self {
-        let bounds = &mut self.file.error_bounds.elements;
-        bounds.resize(self.file.clutches.len(), Default::default());
+        let car = &mut self.file.car;
+        let bounds = &mut car.error_bounds.elements;
+        bounds.resize(car.clutches.len(), Default::default());
         bounds.iter_mut().for_each(|own| own.valve_hysteresis_pa = Some(0.0));
         self
     }

@@ -1,7 +1,8 @@
 //! What the filter of `estimate` says of a drive with a vehicle file.
 
-use config::{Car, Drive};
-use design::{ErrorBudget, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Drive};
+use design::any_shift_filter;
 use plant::car::CarModel;
 use study::any_shift::drive::{DriveScorer, ScoredDrive};
 

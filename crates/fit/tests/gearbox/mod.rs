@@ -7,8 +7,10 @@ mod pressures;
 
 use std::path::Path;
 
-use config::{Car, CarErrorBounds, Source};
-use design::{ErrorBudget, any_shift_filter, shift_uncertainty};
+use car::ErrorBudget;
+use car::{Car, CarErrorBounds};
+use config::{CarFile, Source};
+use design::{any_shift_filter, shift_uncertainty};
 use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
@@ -104,7 +106,7 @@ fn the_fitted_file_keeps_the_text_and_has_the_values_of_the_fit() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fitted.toml");
     let moved = fit.vehicle_file(&drawn.file, &folder, "a drive", None).unwrap();
     std::fs::write(&folder, &moved.source.text).unwrap();
-    assert_eq!(Car::read(&folder).unwrap().clutches, moved.clutches);
+    assert_eq!(CarFile::read(&folder).unwrap().clutches, moved.clutches);
 }
 
 #[test]
@@ -217,7 +219,7 @@ fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
     let gearbox = || Source::read(&given.source.path.parent().unwrap().join("../gearboxes/8hp.toml")).unwrap();
     let with = |more: &str| {
         let source = Source { text: format!("{}\n{more}\n", given.source.text), ..given.source.clone() };
-        Car::from_sources(source, gearbox())
+        CarFile::from_sources(source, gearbox())
     };
     let other = with("[clutch.E]\nreturn_spring_n = 700\n[turbine_inertia_kg_m2]\n\"1-2\" = 0.09").unwrap();
     let at = other.gearbox.elements.iter().position(|element| element.name == "E").unwrap();
@@ -253,19 +255,19 @@ fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     let gearbox = Source::read(&given.source.path.parent().unwrap().join("../gearboxes/8hp.toml")).unwrap();
     let more = "[clutch.E.error_bounds]\nvalve_lag_factor = [0.9, 1.2]\n[error_bounds]\nconverter_share = 0.04\nwheel_scale_share = 0.01\n";
     let source = Source { text: format!("{}\n{more}", given.source.text), ..given.source.clone() };
-    let own = Car::from_sources(source, gearbox).unwrap();
+    let own = CarFile::from_sources(source, gearbox).unwrap();
     let at = own.gearbox.elements.iter().position(|element| element.name == "E").unwrap();
-    let [of_given, of_own] = [&given, &own].map(ErrorBudget::of_car);
+    let [of_given, of_own] = [&given.car, &own.car].map(ErrorBudget::of_car);
     assert_eq!(of_own.element(at).unwrap().valve_lag_factor, [0.9, 1.2]);
     assert_eq!(of_own.element(at).unwrap().friction_factor, of_given.element(at).unwrap().friction_factor);
     let elements = of_own.elements.clone();
     assert_eq!(of_own, ErrorBudget { converter: 0.04, wheel_scale: 0.01, elements, ..of_given });
-    let tables = [&given, &own].map(tables);
+    let tables = [&given.car, &own.car].map(tables);
     let budget = |car: usize| tables[car].tables().elements[tables[car].place(at).unwrap()].budget.unwrap();
     assert_eq!((budget(0).lag_factor, budget(1).lag_factor), ([0.5, 1.5], [0.9, 1.2]));
     // What the valves err by over their bounds is for the filter alone, and not for the ranges.
     let bounds = CarErrorBounds { valve_error_scale: Some(0.5), ..own.error_bounds.clone() };
-    let trusted = Car { error_bounds: bounds, ..own.clone() };
+    let trusted = Car { error_bounds: bounds, ..own.car.clone() };
     let filter = |car: &Car| any_shift_filter(car, &tables[1], &ErrorBudget::of_car(car), None).uncertainty;
     let [usual, half] = [&own, &trusted].map(filter);
     assert_eq!([half.torque_share, half.kiss_point_pa], [0.5 * usual.torque_share, 0.5 * usual.kiss_point_pa]);
@@ -284,7 +286,7 @@ fn the_ranges_of_a_fitted_file_hold_and_are_narrower() {
         let fit = fitted(&drawn, &fitted_shifts);
         let file = |checked| fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", checked).unwrap();
         let unchecked = file(None);
-        let both = ((&drawn.file, &drawn.tables()), (&unchecked, &tables(&unchecked)));
+        let both = ((&drawn.file.car, &drawn.tables()), (&unchecked.car, &tables(&unchecked)));
         let checked = fit.validate(both.0, both.1, &held_out).unwrap();
         let file = file(Some(&checked));
         assert_eq!(file.error_bounds.valve_error_scale.is_some(), unchecked.error_bounds.valve_error_scale.is_none());
@@ -293,9 +295,9 @@ fn the_ranges_of_a_fitted_file_hold_and_are_narrower() {
             let table = format!("[clutch.{name}.error_bounds]");
             assert_eq!(file.source.text.contains(&table), fit.elements_seen[place], "{name}");
         }
-        let bounds = [&drawn.file, &file].map(ErrorBudget::of_car);
+        let bounds = [&drawn.file.car, &file.car].map(ErrorBudget::of_car);
         assert!(bounds[1].converter <= bounds[0].converter && bounds[1].inertia <= bounds[0].inertia, "{bounds:?}");
-        let found = estimated::estimated(&drawn, &city(1), &[drawn.file.clone(), file, unchecked]);
+        let found = estimated::estimated(&drawn, &city(1), &[drawn.file.car.clone(), file.car, unchecked.car]);
         // Where held-out shifts say that the valves err less than the bounds, the filter is better for it.
         assert!(found[1].square < found[2].square && found[1].square < found[0].square, "{found:?}");
         assert!(found[1].square < 1.2 * found[1].square_of_valves, "{found:?}");

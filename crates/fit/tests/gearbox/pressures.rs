@@ -1,6 +1,6 @@
 //! What is between a command and the plates: pistons with a stroke, and valves with a hysteresis.
 
-use config::Car;
+use car::Car;
 use fit::gearbox::{GearboxFit, Quantity, Recorded, Recorder, ShiftLog, open_loop};
 use fit::{ReadingAges, Series};
 use observer::Reading;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use config::{Car, Drive, ShiftPlan, ShiftSchedule};
+use car::{Car, Drive, ShiftPlan, ShiftSchedule};
 
 use super::controller::CarCalibration;
 use super::follow::{Follower, SpeedError};

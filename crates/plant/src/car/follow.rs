@@ -1,7 +1,7 @@
 //! A driver who follows a speed: with the road load and the wanted acceleration the torque at the wheels is known, from it the
 //! throttle or the brake.
 
-use config::SpeedTrace;
+use car::SpeedTrace;
 
 use super::model::{CarModel, CarState};
 use super::run::{BRAKE_OVER_TYRES, Driver};

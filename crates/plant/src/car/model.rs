@@ -1,6 +1,6 @@
 //! The equations of the car.
 
-use config::{Car, ShiftClutch};
+use car::{Car, ShiftClutch};
 use drivetrain::Driveline;
 use drivetrain::clutch::drag_torque;
 use geartrain::ElementKind;

@@ -1,6 +1,6 @@
 //! Car, valves and shift controller together, one control period after another.
 
-use config::Car;
+use car::Car;
 
 use super::controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController};
 use super::integrate::{CarError, CarIntegrator, CarStep};

@@ -1,6 +1,6 @@
 //! One shift of a car.
 
-use config::Car;
+use car::Car;
 use drivetrain::PeakJerk;
 use geartrain::{Change, Gearbox};
 

@@ -2,7 +2,7 @@
 //!
 //! Each kind of error has random numbers of its own, so that one kind changes neither the noise nor another kind.
 
-use config::ReadingErrors;
+use car::ReadingErrors;
 
 use super::{Noise, Readings, Rows};
 

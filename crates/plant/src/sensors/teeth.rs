@@ -3,7 +3,7 @@
 //! Thousands of teeth pass, but a reading needs the times of two of them. Tooth `n` passes when the wheel has turned by `n`
 //! pitches since the begin of the record; its time is computed when a reading asks for it.
 
-use config::SpeedSensor;
+use car::SpeedSensor;
 
 use super::{Channel, SAME_TIME_S, STANDSTILL_S};
 
@@ -138,7 +138,7 @@ impl<'a> Teeth<'a> {
 
 #[cfg(test)]
 mod tests {
-    use config::ReadingErrors;
+    use car::ReadingErrors;
 
     use super::*;
 

@@ -1,10 +1,11 @@
 //! Whole drives.
 
-use config::{Car, Drive, Source};
+use car::{Car, Drive};
+use config::{CarFile, DriveFile, Source};
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, Driver, simulate_car_drive};
 
 fn drive(text: &str) -> Drive {
-    Drive::from_source(Source::built_in("drive.toml", text)).unwrap()
+    DriveFile::from_source(Source::built_in("drive.toml", text)).unwrap().drive
 }
 
 fn samples(car: &Car, drive: &Drive) -> Result<Vec<CarSample>, CarError> {
@@ -152,7 +153,7 @@ fn a_one_way_clutch_drives_and_freewheels() {
     let text = text.replace(gear, "name = \"1\", engaged = [\"FWD\", \"OWC\"]")
         + "\n[[element]]\nname = \"OWC\"\nkind = \"one-way-clutch\"\ninput = \"housing\"\noutput = \"car\"\n";
     let source = Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
-    let car = Car::from_sources(source, Source::built_in("g.toml", &text)).unwrap();
+    let car = CarFile::from_sources(source, Source::built_in("g.toml", &text)).unwrap().car;
     let text = "name = \"d\"\nstart = { gear = \"1\", vehicle_m_s = 6.0 }\nshift = []\n\
                 segment = [{ duration_s = 2, throttle = 0.2 }, { duration_s = 3, throttle = 0.0 }, \
                 { duration_s = 2, throttle = 0.3 }]\n";
@@ -171,7 +172,8 @@ fn the_lock_up_clutch_closes_in_its_gears_and_opens_for_shifts() {
     let gearbox = include_str!("../../../../gearboxes/8hp.toml");
     let text = "name = \"car\"\ngearbox = \"g.toml\"\n[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\n\
                 on_input_rad_s = 140\noff_input_rad_s = 110\nramp_s = 0.6\n";
-    let car = Car::from_sources(Source::built_in("car.toml", text), Source::built_in("g.toml", gearbox)).unwrap();
+    let car =
+        CarFile::from_sources(Source::built_in("car.toml", text), Source::built_in("g.toml", gearbox)).unwrap().car;
     let samples = samples(&car, &drive("name = \"d\"\n[[segment]]\nduration_s = 25\nthrottle = 0.2\n")).unwrap();
     let lock_up = car.gearbox.elements.len();
     let slip = |sample: &CarSample| sample.torques.engine_rad_s - sample.torques.turbine_rad_s;
@@ -191,7 +193,8 @@ fn a_lock_up_clutch_with_slip_control_keeps_its_slip() {
     let gearbox = include_str!("../../../../gearboxes/8hp.toml");
     let text = "name = \"car\"\ngearbox = \"g.toml\"\n[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\n\
                 on_input_rad_s = 140\noff_input_rad_s = 110\nramp_s = 0.6\nslip_rad_s = 4.0\n";
-    let car = Car::from_sources(Source::built_in("car.toml", text), Source::built_in("g.toml", gearbox)).unwrap();
+    let car =
+        CarFile::from_sources(Source::built_in("car.toml", text), Source::built_in("g.toml", gearbox)).unwrap().car;
     // The throttle moves; the car of the controller's model and one whose engine gives a tenth less.
     let mut weak = car.clone();
     weak.engine.torque_n_m = weak.engine.torque_n_m.scaled(0.9);
@@ -248,7 +251,7 @@ fn wrong_requests_get_clear_errors() {
 fn a_driver_follows_the_published_cycles() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../drives/");
     for (name, duration_s, distance_m) in [("wltc_3b", 1800.0, 23_266.0), ("ftp_75", 1874.0, 17_769.0)] {
-        let drive = Drive::read(format!("{folder}{name}.toml").as_ref()).unwrap();
+        let drive = DriveFile::read(format!("{folder}{name}.toml").as_ref()).unwrap().drive;
         assert_eq!(drive.duration_s(), duration_s);
         for car in super::runs(super::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)) {
             let model = CarModel::new(car.clone()).unwrap();

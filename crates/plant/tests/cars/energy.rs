@@ -100,7 +100,7 @@ fn power_is_accounted_for_in_shifts_of_a_one_way_clutch() {
 #[test]
 fn a_lock_up_clutch_that_closes_and_opens_loses_its_friction_only() {
     let mut car = super::cars().swap_remove(0);
-    car.lock_up = Some(config::LockUp {
+    car.lock_up = Some(car::LockUp {
         capacity_n_m: 300.0,
         first_gear: 3,
         on_rad_s: 120.0,
@@ -117,7 +117,7 @@ fn a_lock_up_clutch_that_closes_and_opens_loses_its_friction_only() {
 #[test]
 fn power_is_accounted_for_in_launches_garage_shifts_and_withdrawn_shifts() {
     let mut worst: f64 = 0.0;
-    let mut run = |car: config::Car, vehicle_m_s: f64, driver: Driver, asked: &dyn Fn(&mut CarRun<'_>)| {
+    let mut run = |car: car::Car, vehicle_m_s: f64, driver: Driver, asked: &dyn Fn(&mut CarRun<'_>)| {
         let model = CarModel::new(car).unwrap();
         let gear = model.car.gearbox.forward_gears()[0];
         let state = model.in_gear(gear, None, vehicle_m_s, driver.throttle).unwrap();
@@ -152,7 +152,7 @@ fn power_is_accounted_for_in_launches_garage_shifts_and_withdrawn_shifts() {
     let mut slipping = cars().swap_remove(0);
     let (on_rad_s, off_rad_s) = (60.0, 50.0);
     slipping.lock_up =
-        Some(config::LockUp { capacity_n_m: 300.0, first_gear: 1, on_rad_s, off_rad_s, ramp_s: 0.5, slip_rad_s: 4.0 });
+        Some(car::LockUp { capacity_n_m: 300.0, first_gear: 1, on_rad_s, off_rad_s, ramp_s: 0.5, slip_rad_s: 4.0 });
     run(slipping, 6.0, driver(0.2, 0.0), &|_| {});
     println!("launches, garage and withdrawn shifts, most missing: {worst:.1e}");
     assert!(worst < 1e-4, "{worst:e}");

@@ -1,6 +1,6 @@
 //! From neutral to a gear at rest, and from one direction to the other.
 
-use config::Car;
+use car::Car;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, Driver};
 
 use super::{HeldGear, cars, with_stroke};

@@ -2,17 +2,19 @@
 
 #![expect(clippy::print_stdout, reason = "a test may")]
 
-use config::{Car, Source};
+use car::Car;
+use config::Source;
 use plant::car::{CarCalibration, CarSample};
 
 /// A vehicle file of two or three lines with a gearbox that ships with the program.
 macro_rules! car {
     ($gearbox:literal, $more:literal) => {
-        Car::from_sources(
+        config::CarFile::from_sources(
             Source::built_in("car.toml", concat!("name = \"car\"\ngearbox = \"", $gearbox, "\"\n", $more)),
             Source::built_in($gearbox, include_str!(concat!("../../../../", $gearbox))),
         )
         .unwrap()
+        .car
     };
 }
 
@@ -70,7 +72,7 @@ struct HeldGear {
 
 impl HeldGear {
     fn check(&mut self, car: &Car, sample: &CarSample, label: &str) {
-        let settled = |(at, clutch): (usize, &Option<config::ShiftClutch>)| {
+        let settled = |(at, clutch): (usize, &Option<car::ShiftClutch>)| {
             clutch.map_or(0.0, |clutch| clutch.valve.settled_pressure(sample.commands[at]))
         };
         let settled_pa: Vec<f64> = car.clutches.iter().enumerate().map(settled).collect();

@@ -165,7 +165,7 @@ fn a_shift_without_a_clutch_that_opens_or_closes_is_refused_with_a_hint() {
     assert!(text.contains(brake));
     let text = text.replace(brake, "name = \"INT\"\nkind = \"dog\"");
     let source = config::Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
-    let car = config::Car::from_sources(source, config::Source::built_in("g.toml", &text)).unwrap();
+    let car = config::CarFile::from_sources(source, config::Source::built_in("g.toml", &text)).unwrap().car;
     let model = CarModel::new(car).unwrap();
     let mut run = coasting(&model, 8.0);
     let error = run.request(model.car.gearbox.gear("2").unwrap()).unwrap_err().to_string();
@@ -177,7 +177,7 @@ fn a_shift_without_a_clutch_that_opens_or_closes_is_refused_with_a_hint() {
 }
 
 /// Other gearboxes with a one-way clutch beside the brake of 1st gear, given by the members that it connects.
-fn others() -> Vec<config::Car> {
+fn others() -> Vec<car::Car> {
     let files = [
         (include_str!("../../../config/tests/gearboxes/fn4a.toml"), "LR", "frc"),
         (include_str!("../../../config/tests/gearboxes/a340e.toml"), "B3", "rcar"),
@@ -191,7 +191,7 @@ fn others() -> Vec<config::Car> {
                 "\n[[element]]\nname = \"F\"\nkind = \"one-way-clutch\"\ninput = \"housing\"\noutput = \"{output}\"\n"
             );
         let source = config::Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
-        config::Car::from_sources(source, config::Source::built_in("g.toml", &text)).unwrap()
+        config::CarFile::from_sources(source, config::Source::built_in("g.toml", &text)).unwrap().car
     };
     files.map(car).into()
 }

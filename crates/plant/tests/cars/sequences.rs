@@ -1,6 +1,6 @@
 //! Skip shifts, requests that are withdrawn, and the throttle moved in mid-shift.
 
-use config::Car;
+use car::Car;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 
 use super::{HeldGear, cars, neighbours, runs, with_stroke};

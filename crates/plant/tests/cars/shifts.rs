@@ -1,6 +1,7 @@
 //! Every shift between neighbouring gears of every gearbox that ships with the program, in all four kinds.
 
-use config::{Car, Source};
+use car::Car;
+use config::Source;
 use plant::car::{CarCalibration, CarModel, CarShift, CarShiftQuality, simulate_car_shift};
 
 use super::{HeldGear, cars, neighbours, runs};

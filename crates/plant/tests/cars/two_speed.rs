@@ -1,6 +1,7 @@
 //! The two-speed car of the source chapter, simulated as any car, beside the plant of its own.
 
-use config::{Car, Experiment, Vehicle};
+use car::{Car, Vehicle};
+use config::{ExperimentFile, VehicleFile};
 use plant::car::{CarInputs, CarIntegrator, CarModel, CarState, CarValves};
 use plant::gear_train::MAX_ELEMENTS;
 use plant::{Sample, simulate};
@@ -21,8 +22,8 @@ fn as_any_car(vehicle: &Vehicle) -> Car {
 
 #[test]
 fn the_two_speed_plant_and_the_general_one_agree_under_the_same_commands() {
-    let vehicle = Vehicle::built_in().unwrap();
-    let mut experiment = Experiment::e1().unwrap();
+    let vehicle = VehicleFile::built_in().unwrap().vehicle;
+    let mut experiment = ExperimentFile::e1().unwrap().experiment;
     experiment.sample_time_s = experiment.shift.control_period_s;
     let mut samples: Vec<Sample> = Vec::new();
     simulate(&vehicle, &experiment, |sample| samples.push(*sample)).unwrap();

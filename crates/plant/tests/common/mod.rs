@@ -2,16 +2,17 @@
 
 #![allow(dead_code, reason = "each test uses a part of it")]
 
-use config::{Experiment, Vehicle};
+use car::{Experiment, Vehicle};
+use config::{ExperimentFile, VehicleFile};
 use drivetrain::{ClutchValve, Table1, Table2, ValveMaps};
 use plant::{Powertrain, Sample, Segment, Simulation};
 
 pub(crate) fn vehicle() -> Vehicle {
-    Vehicle::built_in().unwrap()
+    VehicleFile::built_in().unwrap().vehicle
 }
 
 pub(crate) fn e1() -> Experiment {
-    Experiment::e1().unwrap()
+    ExperimentFile::e1().unwrap().experiment
 }
 
 /// The built-in car with constants in place of all maps, so that its equations are smooth.

@@ -1,6 +1,6 @@
 //! Figures of a drive and of its shifts.
 
-use config::Car;
+use car::Car;
 use observer::Health;
 use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
 use study::any_shift::{ClutchRow, ShiftScoreRow, TruePhase};

@@ -3,7 +3,8 @@
 mod figures;
 mod shifts;
 
-use config::{Car, Source};
+use car::Car;
+use config::Source;
 use minijinja::{Value, context};
 use observer::Health;
 use study::any_shift::drive::{ScoredDrive, ScoredShift};

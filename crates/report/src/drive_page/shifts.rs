@@ -1,6 +1,6 @@
 //! The table of the shifts of a drive, for the page, the terminal and files.
 
-use config::Car;
+use car::Car;
 use observer::Health;
 use study::any_shift::drive::{ScoredDrive, ScoredShift};
 use study::any_shift::matrix::{ErrorsByPhase, controlling_of};

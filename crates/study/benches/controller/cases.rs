@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use config::{Experiment, Vehicle};
+use car::Vehicle;
+use config::{ExperimentFile, VehicleFile};
 use design::{design_rigid, kalman_filter, range, rigid_observer};
 use observer::{Bounded, Estimator, Input};
 use serde::Serialize;
@@ -45,10 +46,10 @@ pub(crate) struct Run {
 
 /// All of them.
 pub(crate) fn cases() -> Vec<Case> {
-    let car = |file: &str| Vehicle::read(&root().join("vehicles").join(file)).unwrap();
+    let car = |file: &str| VehicleFile::read(&root().join("vehicles").join(file)).unwrap().vehicle;
     let mut cases = Vec::new();
     for (note, vehicle) in [("", car("two_speed_at.toml")), (", piston stroke", car("two_speed_stroke.toml"))] {
-        let told = Experiment::bench().unwrap().sensors_told;
+        let told = ExperimentFile::bench().unwrap().experiment.sensors_told;
         let range = range(&vehicle);
         let (readings, filter) = (readings(&vehicle), kalman_filter(&vehicle, told.as_ref()));
         let rigid = rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains());
@@ -61,7 +62,7 @@ pub(crate) fn cases() -> Vec<Case> {
 
 /// The readings of a shift of the bench, through its sensors.
 fn readings(vehicle: &Vehicle) -> Vec<Input<f32>> {
-    let bench = Experiment::bench().unwrap();
+    let bench = ExperimentFile::bench().unwrap().experiment;
     let shift = simulate_shift(vehicle, vehicle, &bench, BEFORE_S).unwrap();
     let seen = through_sensors(&shift, SAMPLE_TIME_S, &bench.sensors.unwrap(), vehicle);
     let columns = RunColumns::of(&seen, vehicle).unwrap();

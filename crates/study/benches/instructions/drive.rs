@@ -3,8 +3,10 @@
 
 use std::hint::black_box;
 
-use config::{Car, Drive, Experiment, Sensors};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Drive, Sensors};
+use config::{CarFile, DriveFile, ExperimentFile};
+use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::{AnyShiftFilter, FrictionElement, GearboxTables, ShiftInput};
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_drive};
 use study::any_shift::recording::Recording;
@@ -25,9 +27,9 @@ struct Known {
 
 impl Known {
     fn eight_speed() -> &'static Self {
-        let car = Car::eight_speed().unwrap();
+        let car = CarFile::eight_speed().unwrap().car;
         let tables = ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
-        Box::leak(Box::new(Self { car, tables, sensors: Experiment::bench().unwrap().sensors.unwrap() }))
+        Box::leak(Box::new(Self { car, tables, sensors: ExperimentFile::bench().unwrap().experiment.sensors.unwrap() }))
     }
 
     fn filter(&self) -> AnyShiftFilter<'_, f64> {
@@ -39,7 +41,7 @@ impl Known {
     }
 
     fn drive(&self) -> Vec<ShiftInput<f64>> {
-        let drive = Drive::read(&root().join("drives/city.toml")).unwrap();
+        let drive = DriveFile::read(&root().join("drives/city.toml")).unwrap().drive;
         let once = Drive { sample_time_s: RECORD_S, repetitions: 1, ..drive };
         let (model, mut recording) = (CarModel::new(self.truth()).unwrap(), Recording::default());
         simulate_car_drive(&model, &self.car, CarCalibration::STANDARD, &once, |sample| recording.push(sample))

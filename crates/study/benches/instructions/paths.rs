@@ -4,7 +4,8 @@ use std::hint::black_box;
 use std::io;
 use std::path::Path;
 
-use config::{Experiment, GainMethod, ObserverKind, Vehicle};
+use car::{Experiment, GainMethod, ObserverKind, Vehicle};
+use config::ExperimentFile;
 use design::rigid::design_phase;
 use design::{design_rigid, kalman_filter, range, requirement, rigid_observer};
 use observer::{Estimator, Phase};
@@ -60,7 +61,8 @@ fn right_hand_side() -> Box<dyn FnMut()> {
 }
 
 fn warm_shift() -> Box<dyn FnMut()> {
-    let experiment: &Experiment = Box::leak(Box::new(Experiment { sample_time_s: 0.01, ..Experiment::e1().unwrap() }));
+    let experiment: &Experiment =
+        Box::leak(Box::new(Experiment { sample_time_s: 0.01, ..ExperimentFile::e1().unwrap().experiment }));
     let powertrain: &Powertrain = Box::leak(Box::new(Powertrain::new(vehicle())));
     let request_s = experiment.shift.request_s;
     let mut shift = Simulation::new(powertrain, &vehicle(), experiment).unwrap();
@@ -75,7 +77,8 @@ fn warm_shift() -> Box<dyn FnMut()> {
 }
 
 fn launch_and_shift() -> Box<dyn FnMut()> {
-    let (vehicle, experiment) = (vehicle(), Experiment { sample_time_s: 0.001, ..Experiment::e1().unwrap() });
+    let (vehicle, experiment) =
+        (vehicle(), Experiment { sample_time_s: 0.001, ..ExperimentFile::e1().unwrap().experiment });
     Box::new(move || {
         let record = |sample: &_| {
             black_box(sample);
@@ -99,7 +102,7 @@ fn steps(observer: impl Estimator<f64, State: 'static> + 'static) -> Box<dyn FnM
 }
 
 fn kalman_step() -> Box<dyn FnMut()> {
-    let sensors = Experiment::bench().unwrap().sensors_told;
+    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_told;
     steps(kalman_filter(&vehicle(), sensors.as_ref()))
 }
 
@@ -144,7 +147,7 @@ fn estimate_rows() -> Box<dyn FnMut()> {
 
 /// An observer for such a log.
 fn observer(kind: ObserverKind) -> AnyObserver {
-    let sensors = Experiment::bench().unwrap().sensors_told;
+    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_told;
     AnyObserver::designed(&vehicle(), kind, GainMethod::Iss, SAMPLE_TIME_S, sensors.as_ref()).unwrap()
 }
 

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::hint::black_box;
 
-use config::{Experiment, GainMethod};
+use car::GainMethod;
+use config::ExperimentFile;
 use design::{
     Model, bounded, compliant_observer, design_compliant, design_discrete, design_rigid, design_sliding,
     extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
@@ -25,7 +26,7 @@ fn over_shift<'a, O: Estimator<f64> + 'a>(observer: O, samples: &'a [Input<f64>]
 /// The table of all observers, with its figure.
 pub(crate) fn steps(page: &mut String) -> Figure {
     let (vehicle, samples) = (vehicle(), samples());
-    let sensors = Experiment::bench().unwrap().sensors_told;
+    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_told;
     let mut names = Vec::new();
     let mut jobs = Vec::new();
     // By itself, with its guaranteed ranges, and with the range of the shaft torque too.

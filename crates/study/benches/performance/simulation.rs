@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::hint::black_box;
 
-use config::{Experiment, GainMethod};
+use car::{Experiment, GainMethod};
+use config::ExperimentFile;
 use design::rigid::design_phase;
 use design::{Model, Quantity, design_discrete_phase, requirement};
 use observer::Phase;
@@ -33,14 +34,14 @@ pub(crate) fn designs_and_shifts(page: &mut String) {
         );
     });
     let drive = |sample_time_s: f64| {
-        let experiment = Experiment { sample_time_s, ..Experiment::e1().unwrap() };
+        let experiment = Experiment { sample_time_s, ..ExperimentFile::e1().unwrap().experiment };
         one(|| {
             let mut sum = 0.0;
             plant::simulate(black_box(&vehicle), &experiment, |sample| sum += sample.oncoming_pa).unwrap();
             black_box(sum);
         })
     };
-    let experiment = Experiment { sample_time_s: 0.01, ..Experiment::e1().unwrap() };
+    let experiment = Experiment { sample_time_s: 0.01, ..ExperimentFile::e1().unwrap().experiment };
     let powertrain = Powertrain::new(vehicle.clone());
     let request_s = experiment.shift.request_s;
     let mut warm = Simulation::new(&powertrain, &vehicle, &experiment).unwrap();

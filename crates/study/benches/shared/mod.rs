@@ -4,7 +4,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use config::{Experiment, Study, Vehicle};
+use car::Vehicle;
+use config::{ExperimentFile, Study, VehicleFile};
 use observer::Input;
 use study::sampling::through_sensors;
 use study::{Campaign, RunColumns, simulate_shift};
@@ -18,12 +19,12 @@ pub(crate) fn root() -> PathBuf {
 }
 
 pub(crate) fn vehicle() -> Vehicle {
-    Vehicle::built_in().unwrap()
+    VehicleFile::built_in().unwrap().vehicle
 }
 
 /// A shift of the bench as its observers see it: through sensors, from a second before its request.
 fn seen() -> Trace {
-    let (vehicle, bench) = (vehicle(), Experiment::bench().unwrap());
+    let (vehicle, bench) = (vehicle(), ExperimentFile::bench().unwrap().experiment);
     let shift = simulate_shift(&vehicle, &vehicle, &bench, config::study::RECORD_BEFORE_S).unwrap();
     through_sensors(&shift, SAMPLE_TIME_S, &bench.sensors.unwrap(), &vehicle)
 }

@@ -4,8 +4,10 @@
 
 use std::fmt::Write;
 
-use config::{Car, CarStudy, CarStudyRuns, Drive, SampledErrors, Sensors};
-use design::{ElementErrors, ErrorBudget, ShiftTables, any_shift_filter};
+use car::{Car, Drive, Sensors};
+use car::{ElementErrors, ErrorBudget};
+use config::{CarStudy, CarStudyRuns, SampledErrors};
+use design::{ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_drive};
 

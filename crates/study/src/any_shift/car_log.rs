@@ -5,7 +5,7 @@
 //! engine speed. True values and measured
 //! pressures are compared where the log has them.
 
-use config::Car;
+use car::Car;
 use config::gearbox::element_column;
 use design::ShiftTables;
 use drivetrain::CommandKind;

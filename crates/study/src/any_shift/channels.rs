@@ -3,7 +3,7 @@
 //! Turbine and output speed, gear, target gear and the command of every element's valve are needed, without a converter the engine torque
 //! too. With one the estimate is the open loop where there is no engine speed. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
 
-use config::Car;
+use car::Car;
 use config::gearbox::element_column;
 use design::ShiftTables;
 use drivetrain::CommandKind;

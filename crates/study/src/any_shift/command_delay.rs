@@ -9,7 +9,8 @@
 
 use std::collections::VecDeque;
 
-use design::{ElementErrors, ErrorBudget, ShiftTables};
+use car::{ElementErrors, ErrorBudget};
+use design::ShiftTables;
 use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
 
 use super::car_log::LogStep;

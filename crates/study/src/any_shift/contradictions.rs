@@ -4,8 +4,9 @@
 //! element, with all errors of the valve in its favour, can hold nothing: then the channel is another signal. Which one, an element tells
 //! that is open in that gear and whose command presses.
 
-use config::Car;
-use design::{ErrorBudget, ShiftTables};
+use car::Car;
+use car::ErrorBudget;
+use design::ShiftTables;
 use observer::any_shift::MAX_ELEMENTS;
 
 /// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.

@@ -3,8 +3,8 @@
 //! At a steady engine speed the pump takes all of it. The estimates of torque, and what is learnt, are in proportion to the converter's
 //! capacity: where both differ by more than their bounds, one of them is not that of this car.
 
-use config::Car;
-use design::ErrorBudget;
+use car::Car;
+use car::ErrorBudget;
 
 use super::car_log::LogStep;
 use crate::ratio_histogram::RatioHistogram;
@@ -77,12 +77,13 @@ impl ConverterCheck {
 mod tests {
     use super::*;
     use crate::any_shift::{SAMPLE_S, car_log::LogStep};
+    use config::CarFile;
     use observer::Reading;
     use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 
     /// A log in which the engine has this share of the torque that the converter takes; its speed changes at this rate, rad/s^2.
     fn said(share: f64, rate: f64, lock_up_applied: bool, rows: u32) -> Option<String> {
-        let car = Car::eight_speed().unwrap();
+        let car = CarFile::eight_speed().unwrap();
         let mut check = ConverterCheck::default();
         for row in 0..rows {
             let time_s = f64::from(row) * SAMPLE_S;

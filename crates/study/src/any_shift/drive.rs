@@ -1,7 +1,8 @@
 //! A whole drive: what the filter says of every shift of it, beside the truth and the valve model alone.
 
-use config::{Car, Sensors};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Sensors};
+use design::{ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};

@@ -1,6 +1,6 @@
 //! The gears that a log names.
 
-use config::Car;
+use car::Car;
 use observer::Reading;
 use observer::any_shift::GearCommand;
 use plant::car::NO_GEAR;
@@ -243,6 +243,7 @@ impl Gears {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use config::CarFile;
 
     #[test]
     fn a_third_gear_is_a_late_gear_or_a_change_of_mind_by_the_speeds() {
@@ -280,7 +281,7 @@ mod tests {
 
     fn eight_speed() -> Car {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml");
-        Car::read(std::path::Path::new(path)).unwrap()
+        CarFile::read(std::path::Path::new(path)).unwrap().car
     }
 
     /// What is shown of rows of gear, target gear and the gear of the turbine's speed, all as names; the output turns this fast, rad/s.

@@ -2,7 +2,7 @@
 //!
 //! A command then may have changed up to one message before the row that shows it first, and the guaranteed range allows for one row alone.
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 use observer::Reading;
 use observer::any_shift::MAX_ELEMENTS;

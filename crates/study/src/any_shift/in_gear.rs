@@ -1,6 +1,6 @@
 //! What the rows in a gear tell of a log: whether their speeds fit the gear, and whether the filter could use them.
 
-use config::Car;
+use car::Car;
 use observer::{Health, Reading};
 
 use super::ratio_scale::{RatioScale, WrongScale};

@@ -3,8 +3,8 @@
 //! The car makes every shift between neighbouring gears. What its sensors read is estimated with its file, and again with each value
 //! changed by its stated uncertainty, one way and the other.
 
-use config::{Car, Sensors, ShiftClutch};
-use design::{ElementErrors, ErrorBudget};
+use car::{Car, ElementErrors, ErrorBudget, Sensors, ShiftClutch};
+use config::CarFile;
 use drivetrain::Table1;
 
 use super::matrix::controlling_of;
@@ -59,7 +59,7 @@ impl Value {
         Self { key, in_gearbox: true, off, change }
     }
 
-    fn from(&self, car: &Car) -> ValueFrom {
+    fn from(&self, car: &CarFile) -> ValueFrom {
         match self.in_gearbox {
             true => ValueFrom::Gearbox,
             false if car.defaults_taken.iter().any(|taken| taken.key == self.key) => ValueFrom::Default,
@@ -222,7 +222,7 @@ pub struct CarInfluences {
 ///
 /// # Errors
 /// A shift of the car cannot be simulated, or the gearbox has more clutches than the filter has room for.
-pub fn car_influences(car: &Car, sensors: &Sensors) -> Result<Option<CarInfluences>, StudyError> {
+pub fn car_influences(car: &CarFile, sensors: &Sensors) -> Result<Option<CarInfluences>, StudyError> {
     let shifts = nominal_shifts(car, sensors)?;
     if shifts.is_empty() {
         return Ok(None);

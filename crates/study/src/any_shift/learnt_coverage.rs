@@ -3,8 +3,9 @@
 //! The car, its reported engine torque, its wheels and the inertia in the filter's tables are sampled within the bounds of the errors. Of each
 //! learnt quantity there are the error and the standard deviation that the filter states.
 
-use config::{Car, Drive, Sensors};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Drive, Sensors};
+use design::{ShiftTables, any_shift_filter};
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};

@@ -3,7 +3,7 @@
 //! The converter's maps then give the turbine no torque, whatever the engine has: both speeds are alike. With a reported torque the engine
 //! gives far more than the pump takes at these speeds; without one the speeds are alike for longer than a car without torque drives.
 
-use config::Car;
+use car::Car;
 
 use super::car_log::LogStep;
 
@@ -88,12 +88,13 @@ impl LockUpCheck {
 mod tests {
     use super::*;
     use crate::any_shift::SAMPLE_S;
+    use config::CarFile;
     use observer::Reading;
     use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 
     /// What is said of so long a log with this slip, rad/s, an engine that reports the pump's torque and more, N m, and a flag.
     fn said(seconds: u32, slip: f64, more_n_m: Option<f64>, lock_up_applied: bool) -> Option<String> {
-        let car = Car::eight_speed().unwrap();
+        let car = CarFile::eight_speed().unwrap();
         let mut check = LockUpCheck::default();
         for row in 0..100 * seconds {
             let time_s = f64::from(row) * SAMPLE_S;

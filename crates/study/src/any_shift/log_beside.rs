@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 use drivetrain::ShiftKind;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS};

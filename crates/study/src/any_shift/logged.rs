@@ -1,7 +1,8 @@
 //! The filter of a car with any gearbox on its way through a log, and what it says of the shifts.
 
-use config::{Car, Sensors};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Sensors};
+use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::{
     AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate,
     ShiftPhase,

@@ -3,8 +3,9 @@
 //! A run is one shift of one such car. Runs are made in parallel and added in their order, so that the result does not
 //! depend on the number of threads.
 
-use config::{Car, Sensors};
-use design::{ErrorBudget, ShiftTables};
+use car::ErrorBudget;
+use car::{Car, Sensors};
+use design::ShiftTables;
 use drivetrain::ShiftKind;
 use observer::Health;
 use plant::car::CarShift;

@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 use std::convert::Infallible;
 
-use config::{Car, Sensors};
+use car::{Car, Sensors};
 use design::ShiftTables;
 use drivetrain::CommandKind;
 use observer::Reading;
@@ -220,6 +220,7 @@ pub fn has_ages(sample_time_s: f64, offset_s: f64, row_s: f64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use config::CarFile;
     use config::Source;
     use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 
@@ -228,16 +229,16 @@ mod tests {
     fn car() -> Car {
         let gearbox = include_str!("../../../../gearboxes/ravigneaux_4.toml");
         let source = Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
-        Car::from_sources(source, Source::built_in("g.toml", gearbox)).unwrap()
+        CarFile::from_sources(source, Source::built_in("g.toml", gearbox)).unwrap().car
     }
 
     /// Rows of a drive of 150 s, two and a half blocks.
     fn rows(sensors: &Sensors, row_s: f64) -> Vec<MeasuredRow> {
         let text = "name = \"d\"\n[[segment]]\nduration_s = 150\nthrottle = [0.05, 0.15]\n";
-        let drive = config::Drive::from_source(Source::built_in("d.toml", text)).unwrap();
+        let drive = config::DriveFile::from_source(Source::built_in("d.toml", text)).unwrap();
         let (car, mut rows) = (car(), Vec::new());
         let mut sensed = SensedDrive::new(&car, sensors, row_s);
-        let drive = config::Drive { sample_time_s: sensed.record_s(), ..drive };
+        let drive = car::Drive { sample_time_s: sensed.record_s(), ..drive.drive };
         let model = CarModel::new(car.clone()).unwrap();
         simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
             sensed.each(sample, |row| rows.push(*row));
@@ -249,7 +250,7 @@ mod tests {
 
     #[test]
     fn every_row_of_a_drive_is_read_once_and_blocks_leave_no_seam() {
-        let sensors = config::Experiment::bench().unwrap().sensors.unwrap();
+        let sensors = config::ExperimentFile::bench().unwrap().sensors.unwrap();
         let rows = rows(&sensors, 0.01);
         assert!(rows.len() == 15_001 || rows.len() == 15_000, "{}", rows.len());
         assert!(rows.windows(2).all(|pair| (pair[1].sample.time_s - pair[0].sample.time_s - 0.01).abs() < 1e-6));
@@ -270,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_slow_channel_has_a_reading_in_every_second_row_in_every_block() {
-        let mut sensors = config::Experiment::bench().unwrap().sensors.unwrap();
+        let mut sensors = config::ExperimentFile::bench().unwrap().sensors.unwrap();
         sensors.turbine.sample_time_s = 0.02;
         sensors.row_offset_s = 0.004;
         let rows = rows(&sensors, 0.01);

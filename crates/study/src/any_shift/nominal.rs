@@ -1,7 +1,8 @@
 //! The shifts between neighbouring gears of a car as its file has it, read by sensors: what a changed file is tried on.
 
-use config::{Car, Sensors};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Sensors};
+use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::ShiftInput;
 use plant::car::{CarSample, CarShift};
 

@@ -3,7 +3,7 @@
 //! Many gearbox controllers log the pressure that they ask of a clutch. It counts as the command at which the valve of the vehicle file ends at
 //! this pressure. Where the map of the controller is another one, the difference is an error of the valve's gain.
 
-use config::Car;
+use car::Car;
 use config::gearbox::element_column;
 use drivetrain::ClutchValve;
 
@@ -40,10 +40,11 @@ pub fn command_of_valve(valve: &ClutchValve<f64>, most_pa: f64, pressure_pa: f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use config::CarFile;
 
     #[test]
     fn the_command_ends_at_the_pressure_that_is_asked_for() {
-        let car = Car::eight_speed().unwrap();
+        let car = CarFile::eight_speed().unwrap();
         let valve = &car.clutches[0].as_ref().unwrap().valve;
         let most_pa = car.line_pressure_pa;
         for (asked_pa, pressure_pa) in

@@ -1,6 +1,6 @@
 //! Which speed of a log has a wrong scale, by the ratio of turbine and output speed in the gears that the log names.
 
-use config::Car;
+use car::Car;
 
 use crate::ratio_histogram::RatioHistogram;
 
@@ -129,11 +129,12 @@ fn likely(car: &Car, factor: f64) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use config::CarFile;
 
     /// What is said where output and turbine speed are so many times the true ones, and the turbine turns at this share of the engine.
     fn said(scales: [f64; 2], over_engine: f64, has_wheels: bool) -> Option<String> {
-        let car = Car::eight_speed().unwrap();
-        let mut scale = RatioScale::new(&Car::eight_speed().unwrap());
+        let car = CarFile::eight_speed().unwrap();
+        let mut scale = RatioScale::new(&CarFile::eight_speed().unwrap());
         for row in 0..400 {
             let (ratio, output) = ([4.7, 2.1, 1.0, 0.67][row / 100], 50.0 + 0.3 * row as f64);
             // One row in ten is on the way to another gear.
@@ -164,12 +165,12 @@ mod tests {
 
     #[test]
     fn ratios_that_are_off_by_another_factor_in_each_gear_are_no_scale() {
-        let mut scale = RatioScale::new(&Car::eight_speed().unwrap());
+        let mut scale = RatioScale::new(&CarFile::eight_speed().unwrap());
         (0..400).for_each(|row| scale.push(1 + row / 100, [4.7, 2.1, 1.0, 0.67][row / 100], [200.0, 150.0, 100.0]));
-        assert!(scale.sentence(&Car::eight_speed().unwrap(), 1.0).is_none());
+        assert!(scale.sentence(&CarFile::eight_speed().unwrap(), 1.0).is_none());
         // Another gear than the log says, for long.
-        let mut scale = RatioScale::new(&Car::eight_speed().unwrap());
+        let mut scale = RatioScale::new(&CarFile::eight_speed().unwrap());
         (0..4000).for_each(|_| scale.push(7, 0.84, [200.0, 67.0, 100.0]));
-        assert!(scale.sentence(&Car::eight_speed().unwrap(), 1.0).is_none());
+        assert!(scale.sentence(&CarFile::eight_speed().unwrap(), 1.0).is_none());
     }
 }

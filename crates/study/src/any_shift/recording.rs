@@ -1,6 +1,6 @@
 //! A simulated drive as the filter sees it: speeds through toothed wheels, the commands of the valves, the gear.
 
-use config::{Car, Sensors};
+use car::{Car, Sensors};
 use design::ShiftTables;
 use drivetrain::Real;
 use observer::Reading;

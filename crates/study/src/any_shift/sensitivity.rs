@@ -3,8 +3,8 @@
 //! The car makes every shift between neighbouring gears in every kind. What its sensors read is estimated with its file, and again with
 //! one value of the file off by its bound, one way and the other. Each error by itself, so that their squares can be added.
 
-use config::{Car, Sensors, ShiftClutch};
-use design::{ElementErrors, ErrorBudget};
+use car::{Car, Sensors, ShiftClutch};
+use car::{ElementErrors, ErrorBudget};
 use serde::Serialize;
 
 use super::matrix::{MatrixShift, controlling_of};

@@ -3,7 +3,7 @@
 //! In a gear a command may rest for as long as it likes. A shift that the log completes applies one clutch and releases the other, so both
 //! commands have to move between the last reading before it and its end.
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 use observer::Reading;
 use observer::any_shift::MAX_ELEMENTS;

@@ -1,7 +1,8 @@
 //! A drive through all gears of any car: up under power, down coasting, up without power, down under power.
 
-use config::Car;
-use design::{ErrorBudget, ShiftTables};
+use car::Car;
+use car::ErrorBudget;
+use design::ShiftTables;
 use plant::car::{CarCalibration, CarError, CarModel, CarRun, CarSample, CarShift, Driver, idle_throttle};
 
 use super::{AnyShiftError, RECORD_S};

@@ -1,7 +1,8 @@
 //! The columns of a study's table.
 
+use car::{Experiment, ObserverEntry, ObserverKind};
+use config::Study;
 use config::study::QUALITY;
-use config::{Experiment, ObserverEntry, ObserverKind, Study};
 use observer::Phase;
 
 use crate::ObserverRun;

@@ -1,7 +1,7 @@
 //! The shift of a run as its row needs it: rated while it is simulated, and of its signals only those that observers read and
 //! scores are held against.
 
-use config::{Experiment, Vehicle};
+use car::{Experiment, Vehicle};
 use observer::Phase;
 use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::{Moment, PlantError};

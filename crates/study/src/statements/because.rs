@@ -1,6 +1,7 @@
 //! Why a statement differs, or what else the numbers say: runs with one cause of error taken away.
 
-use config::{Experiment, Vehicle};
+use car::{Experiment, Vehicle};
+use config::ExperimentFile;
 use drivetrain::{ClutchValve, Table1, Valve, ValveMaps};
 use trace::units::mpa;
 
@@ -46,7 +47,7 @@ impl Without {
 pub(super) fn explain(
     rows: &mut [Statement],
     vehicle: &Vehicle,
-    experiments: &[Experiment; 4],
+    experiments: &[ExperimentFile; 4],
     [e1, _, _, e4]: &[Comparison; 4],
 ) -> Result<(), StudyError> {
     let without = Without::run(vehicle, &experiments[0], &experiments[1])?;

@@ -9,7 +9,8 @@ mod offsets;
 mod rows;
 mod settings;
 
-use config::{Experiment, Study, Vehicle};
+use car::Vehicle;
+use config::{ExperimentFile, Study};
 use serde::Serialize;
 
 use crate::{Comparison, StudyError, compare};
@@ -145,7 +146,7 @@ impl Chapter {
 /// Simulation, design, or signals; see [`StudyError`]. A setting that fails is counted.
 pub fn reproduce(
     vehicle: &Vehicle,
-    experiments: &[Experiment; 4],
+    experiments: &[ExperimentFile; 4],
     study: &Study,
     count: u64,
     threads: usize,

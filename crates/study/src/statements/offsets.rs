@@ -5,7 +5,7 @@
 //! phase alone, which the theorem does not claim. The initial error has decayed after `4/kappa2`, the settling time of the
 //! certificate: `exp(-4)`, 2 %, of it remains.
 
-use config::Vehicle;
+use car::Vehicle;
 use design::compliant::{PRESSURE_UNIT_PA, SHAFT_UNIT_N_M, compliant_requirement, design_compliant_phase};
 use design::{Certificate, CompliantCertificate, error_bound};
 use nalgebra::DMatrix;

@@ -1,6 +1,6 @@
 //! What is compared with the chapter, as numbers, in one setting.
 
-use config::Vehicle;
+use car::Vehicle;
 use design::RigidDesign;
 use observer::Phase;
 use trace::signal;

@@ -3,7 +3,8 @@
 //! Each setting is a run of a study: a car, a shift controller and sensors that the chapter may have had. The observers are
 //! built for the car of the setting, as the chapter's authors built theirs; off-nominal experiments differ from that car.
 
-use config::{Experiment, ObserverKind, Study};
+use car::ObserverKind;
+use config::{ExperimentFile, Study};
 use serde::Serialize;
 
 use super::Statement;
@@ -54,7 +55,7 @@ enum Setting {
 /// Tests the statements in the first `count` settings of the study.
 pub(super) fn shares(
     study: &Study,
-    experiments: &[Experiment; 4],
+    experiments: &[ExperimentFile; 4],
     count: u64,
     threads: usize,
     mut progress: impl FnMut(),
@@ -111,13 +112,13 @@ impl Count {
 }
 
 /// The experiment without observers that no statement is about.
-fn with_the_observers_that_count(experiment: &Experiment) -> Experiment {
+fn with_the_observers_that_count(experiment: &ExperimentFile) -> ExperimentFile {
     let mut experiment = experiment.clone();
     experiment.observers.retain(|entry| entry.kind == ObserverKind::OpenLoop || NAMED.contains(&entry.name.as_str()));
     experiment
 }
 
-fn setting(study: &Study, experiments: &[Experiment; 4], run: u64) -> Result<Setting, StudyError> {
+fn setting(study: &Study, experiments: &[ExperimentFile; 4], run: u64) -> Result<Setting, StudyError> {
     match outcomes(study, experiments, run) {
         Ok(Some(outcomes)) => Ok(Setting::Whole(outcomes)),
         Ok(None) | Err(StudyError::Plant(_)) => Ok(Setting::NoShift),
@@ -128,10 +129,10 @@ fn setting(study: &Study, experiments: &[Experiment; 4], run: u64) -> Result<Set
 }
 
 /// What comes out in a setting; `None` without a whole shift.
-fn outcomes(study: &Study, experiments: &[Experiment; 4], run: u64) -> Result<Option<Vec<Outcome>>, StudyError> {
+fn outcomes(study: &Study, experiments: &[ExperimentFile; 4], run: u64) -> Result<Option<Vec<Outcome>>, StudyError> {
     let values = factor_values(study, run);
     let vehicle = study.varied(&values)?.vehicle;
-    let compared = |experiment: &Experiment| -> Result<Comparison, StudyError> {
+    let compared = |experiment: &ExperimentFile| -> Result<Comparison, StudyError> {
         let mut experiment = study.varied_experiment(experiment, &values)?;
         experiment.check_observers(&vehicle)?;
         if let Some(sensors) = &mut experiment.sensors {

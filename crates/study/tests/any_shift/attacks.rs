@@ -1,8 +1,9 @@
 //! What a real car does to the filter: lost readings, other throttles, other inertias, an element that slips, single
 //! precision, and input without sense.
 
-use config::Car;
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::Car;
+use car::ErrorBudget;
+use design::{ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use observer::{ChannelHealth, Health, Reading};
@@ -491,7 +492,7 @@ fn an_unknown_gear_and_a_lost_command_are_said() {
 #[test]
 fn one_filter_serves_a_whole_drive() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml");
-    let mut drive = config::Drive::read(&path).unwrap();
+    let mut drive = config::DriveFile::read(&path).unwrap().drive;
     drive.segments.truncate(4);
     (drive.repetitions, drive.sample_time_s) = (1, RECORD_S);
     let car = &cars()[0];

@@ -1,7 +1,8 @@
 //! The guaranteed ranges hold for every bound that a file may state: over files with sampled bounds, and cars sampled within them.
 
-use config::{Car, CarErrorBounds, CurrentSensor, ElementErrorBounds, Sensors};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, CarErrorBounds, CurrentSensor, ElementErrorBounds, Sensors};
+use design::{ShiftTables, any_shift_filter};
 use drivetrain::{ClutchValve, Table1, ValveMaps};
 use observer::Health;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};

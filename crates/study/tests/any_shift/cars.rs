@@ -1,7 +1,9 @@
 //! The shipped gearboxes as cars, their shifts, and the sensors.
 
-use config::{Car, Sensors, Source};
-use design::{ErrorBudget, ShiftTables};
+use car::ErrorBudget;
+use car::{Car, Sensors};
+use config::{CarFile, Source};
+use design::ShiftTables;
 use std::path::Path;
 use study::any_shift::matrix::neighbouring_shifts;
 
@@ -10,7 +12,7 @@ pub(crate) use study::any_shift::matrix::Random;
 /// A vehicle file of two or three lines with a gearbox that ships with the program.
 macro_rules! car {
     ($gearbox:literal, $more:literal) => {
-        Car::from_sources(
+        CarFile::from_sources(
             Source::built_in("car.toml", concat!("name = \"car\"\ngearbox = \"", $gearbox, "\"\n", $more)),
             Source::built_in($gearbox, include_str!(concat!("../../../../", $gearbox))),
         )
@@ -19,6 +21,11 @@ macro_rules! car {
 }
 
 pub(crate) fn cars() -> Vec<Car> {
+    car_files().into_iter().map(|file| file.car).collect()
+}
+
+/// The same with their vehicle files.
+pub(crate) fn car_files() -> Vec<CarFile> {
     vec![
         car!("gearboxes/8hp.toml", ""),
         car!("gearboxes/lepelletier_6.toml", ""),
@@ -31,18 +38,19 @@ pub(crate) fn cars() -> Vec<Car> {
 
 /// The four-speed gearbox whose 1st gear a one-way clutch holds.
 pub(crate) fn one_way() -> Car {
-    car!("gearboxes/ravigneaux_4_one_way.toml", "")
+    car!("gearboxes/ravigneaux_4_one_way.toml", "").car
 }
 
 /// The gearboxes of [`cars`] with pistons that have a stroke.
 pub(crate) fn cars_with_strokes() -> Vec<Car> {
-    vec![
+    let files = [
         car!("gearboxes/8hp.toml", "[fill]\n"),
         car!("gearboxes/lepelletier_6.toml", "[fill]\n"),
         car!("gearboxes/ravigneaux_4.toml", "[fill]\n"),
         car!("gearboxes/10_speed.toml", "[fill]\n"),
         car!("gearboxes/dual_clutch_7.toml", "launch = \"clutch\"\n[fill]\n[driveline]\nfinal_ratio = 1.0\n"),
-    ]
+    ];
+    files.into_iter().map(|file| file.car).collect()
 }
 
 /// Neighbouring gears in both directions, with and without power.
@@ -56,5 +64,5 @@ pub(crate) fn shifts(car: &Car) -> Vec<(usize, usize, f64)> {
 /// Those of the bench.
 pub(crate) fn sensors() -> Sensors {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments/bench.toml");
-    Sensors::read(&path).unwrap().unwrap()
+    config::read_sensors(&path).unwrap().unwrap()
 }

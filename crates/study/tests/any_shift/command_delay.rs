@@ -1,7 +1,7 @@
 //! Logs whose commands come late or early against the speeds.
 
-use config::Car;
-use design::ErrorBudget;
+use car::Car;
+use car::ErrorBudget;
 use observer::Health;
 use observer::any_shift::ShiftInput;
 use plant::car::CarModel;

@@ -1,7 +1,9 @@
 //! Whole drives: through all gears of every shipped gearbox.
 
-use config::Car;
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::Car;
+use car::ErrorBudget;
+use config::CarFile;
+use design::{ShiftTables, any_shift_filter};
 use observer::Health;
 use plant::car::CarModel;
 use study::any_shift::drive::{ScoredDrive, score_drive};
@@ -57,7 +59,7 @@ fn every_car_drives_through_all_its_gears_and_every_shift_is_estimated() {
 /// A car that cannot drive as fast as a shift is usually made shifts at the speed that it reaches.
 #[test]
 fn a_weak_car_drives_through_all_its_gears_too() {
-    let mut weak = Car::eight_speed().unwrap();
+    let mut weak = CarFile::eight_speed().unwrap().car;
     weak.engine.torque_n_m = weak.engine.torque_n_m.scaled(0.5);
     let drive = driven(&weak, 1);
     assert_eq!(drive.shifts.len(), 28);
@@ -67,7 +69,7 @@ fn a_weak_car_drives_through_all_its_gears_too() {
 /// A top gear so long that the engine cannot pull the car to its speed: all other shifts are made.
 #[test]
 fn shifts_that_a_car_is_too_slow_for_are_left_out_and_named() {
-    let mut weak = Car::eight_speed().unwrap();
+    let mut weak = CarFile::eight_speed().unwrap().car;
     weak.engine.torque_n_m = weak.engine.torque_n_m.scaled(0.25);
     let model = CarModel::new(weak.clone()).unwrap();
     let mut done = 0;
@@ -97,7 +99,7 @@ fn shifts_that_a_car_is_too_slow_for_are_left_out_and_named() {
 #[test]
 fn the_ranges_hold_while_pistons_move() {
     let vehicles = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles");
-    let car = Car::read(&vehicles.join("eight_speed_stroke.toml")).unwrap();
+    let car = CarFile::read(&vehicles.join("eight_speed_stroke.toml")).unwrap().car;
     for shift in driven(&car, 1).shifts {
         assert_eq!(shift.inside(), Some(1.0), "{} {}-{}", shift.number, shift.from, shift.to);
     }
@@ -107,7 +109,7 @@ fn the_ranges_hold_while_pistons_move() {
 #[test]
 fn the_pressure_of_every_element_is_within_its_range_in_gears_too() {
     let vehicles = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles");
-    let with_strokes = Car::read(&vehicles.join("eight_speed_stroke.toml")).unwrap();
+    let with_strokes = CarFile::read(&vehicles.join("eight_speed_stroke.toml")).unwrap().car;
     for known in cars().into_iter().chain([with_strokes]) {
         let name = &known.gearbox.name;
         let model = CarModel::new(drawn_car(&known, 0, 0, 1)).unwrap();

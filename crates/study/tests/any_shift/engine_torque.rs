@@ -1,7 +1,9 @@
 //! The torque that the engine's controller reports, beside the maps of an open converter.
 
-use config::{Car, Drive};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Drive};
+use config::DriveFile;
+use design::{ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::Reading;
 use observer::any_shift::ShiftInput;
@@ -40,7 +42,7 @@ fn drive(known: &Car, seed: u64) -> [Vec<MatrixRow>; ALL.len()] {
     let truth = ShiftDraw::within(known, &errors, || random.uniform()).car(known);
     let factor = 1.0 + errors.engine * (2.0 * random.uniform() - 1.0);
     let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml");
-    let town = Drive { repetitions: 2, sample_time_s: RECORD_S, ..Drive::read(&town).unwrap() };
+    let town = Drive { repetitions: 2, sample_time_s: RECORD_S, ..DriveFile::read(&town).unwrap().drive };
     let model = CarModel::new(truth.clone()).unwrap();
     let mut recording = Recording::default();
     simulate_car_drive(&model, known, CarCalibration::STANDARD, &town, |sample| recording.push(sample)).unwrap();

@@ -1,7 +1,9 @@
 //! Holes in the speeds of a drive.
 
-use config::{Car, Drive};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Drive};
+use config::DriveFile;
+use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::ShiftInput;
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use std::path::Path;
@@ -19,7 +21,7 @@ fn town(known: &Car) -> (CarModel, Recording) {
     let mut random = Random(5);
     let truth = ShiftDraw::within(known, &ErrorBudget::of_car(known), || random.uniform()).car(known);
     let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml");
-    let town = Drive { repetitions: 1, sample_time_s: RECORD_S, ..Drive::read(&town).unwrap() };
+    let town = Drive { repetitions: 1, sample_time_s: RECORD_S, ..DriveFile::read(&town).unwrap().drive };
     let (model, mut recording) = (CarModel::new(truth).unwrap(), Recording::default());
     simulate_car_drive(&model, known, CarCalibration::STANDARD, &town, |sample| recording.push(sample)).unwrap();
     (model, recording)

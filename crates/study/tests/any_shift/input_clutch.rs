@@ -1,7 +1,9 @@
 //! The clutch between engine and gearbox: the lock-up clutch of a converter, and the clutch that starts a car without one.
 
-use config::{Car, Drive, LockUp, Source};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, LockUp};
+use config::{DriveFile, Source};
+use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::{ShiftEstimate, ShiftInput};
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use study::any_shift::RECORD_S;
@@ -51,7 +53,7 @@ fn score(car: &Car, errors: &Errors, is_scored: impl Fn(&CarSample) -> bool) -> 
         converter
     });
     let model = CarModel::new(truth.clone()).unwrap();
-    let drive = Drive::from_source(Source::built_in("drive.toml", DRIVE)).unwrap();
+    let drive = DriveFile::from_source(Source::built_in("drive.toml", DRIVE)).unwrap().drive;
     assert!((drive.sample_time_s - RECORD_S).abs() < 1e-12);
     let mut recording = Recording::default();
     simulate_car_drive(&model, car, CarCalibration::STANDARD, &drive, |sample| recording.push(sample)).unwrap();

@@ -1,6 +1,6 @@
 //! What is learnt from shift to shift.
 
-use config::Car;
+use car::Car;
 use observer::Reading;
 use observer::any_shift::{Learnt, ShiftInput};
 use plant::car::CarShift;
@@ -220,7 +220,7 @@ fn cars_of_the_budget_are_learnt() {
         for seed in 1..=draws() {
             let draw = |car: &Car| {
                 let mut random = Random(seed * 77);
-                ShiftDraw::within(car, &design::ErrorBudget::of_car(car), || random.uniform())
+                ShiftDraw::within(car, &car::ErrorBudget::of_car(car), || random.uniform())
             };
             let drive = Drive::new(draw, seed);
             for (sum, count) in sums.iter_mut().zip([0, SHIFTS, 3 * SHIFTS]) {

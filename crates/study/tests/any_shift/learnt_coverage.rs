@@ -1,7 +1,8 @@
 //! What is learnt lies within its stated intervals, and does not make the torques worse with the hours.
 
-use config::{Car, Drive};
-use design::ErrorBudget;
+use car::ErrorBudget;
+use car::{Car, Drive};
+use config::DriveFile;
 use std::path::Path;
 use study::any_shift::learnt_coverage::{Coverage, LearntDrive, Quantity, Sampled, SampledCar, learn};
 
@@ -9,7 +10,7 @@ use super::cars::{cars, sensors};
 
 /// So many times three minutes in town by a sampled car.
 fn town(car: &Car, what: Sampled, (repetitions, parts): (u32, usize), seed: u64) -> LearntDrive {
-    let town = Drive::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml")).unwrap();
+    let town = DriveFile::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml")).unwrap().drive;
     let sampled = SampledCar::new(car, &ErrorBudget::of_car(car), what, seed);
     learn(car, &sampled, &Drive { repetitions, ..town }, &sensors(), (parts, seed)).unwrap()
 }

@@ -1,8 +1,9 @@
 //! What limits the estimate of which shift: the runs of the matrix with one error less. Either the filter is told what it does
 //! not know, or the car or its sensors are without it.
 
-use config::{Car, Sensors};
-use design::{ElementErrors, ErrorBudget, ShiftTables, any_shift_filter};
+use car::{Car, Sensors};
+use car::{ElementErrors, ErrorBudget};
+use design::{ShiftTables, any_shift_filter};
 use drivetrain::{ClutchValve, ShiftKind, Table1};
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, ShiftInput};

@@ -21,8 +21,8 @@ mod strokes;
 mod valve_timing;
 mod wheel;
 
+use car::Car;
 use cars::{cars, sensors};
-use config::Car;
 use drivetrain::{ClutchValve, ShiftKind, Table1};
 use study::any_shift::matrix::{CLASSES, MatrixCounts, MatrixPlan, MatrixRow, Pooled, class, matrix};
 

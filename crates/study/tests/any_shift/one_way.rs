@@ -1,6 +1,6 @@
 //! A gear that a one-way clutch holds: its shifts are estimated, and in coasting the health says that it overruns.
 
-use config::Car;
+use car::Car;
 use observer::Health;
 use plant::car::{CarCalibration, CarModel, CarRun, Driver};
 use study::any_shift::TruePhase;

@@ -2,8 +2,10 @@
 
 use std::fmt::Write as _;
 
-use config::{Car, Drive, Source};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::Car;
+use car::ErrorBudget;
+use config::{CarFile, DriveFile, Source};
+use design::{ShiftTables, any_shift_filter};
 use observer::Health;
 use observer::any_shift::ShiftPhase;
 use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_drive};
@@ -12,14 +14,14 @@ use study::any_shift::logged::LoggedDrive;
 use study::any_shift::recording::Recording;
 use study::any_shift::{inputs, simulated};
 
-use super::cars::{cars, sensors};
+use super::cars::{car_files, sensors};
 
 /// Up through the gears under power and down again, twice.
 const DRIVE: &str = "name = \"d\"\nsample_time_s = 0.001\nrepetitions = 2\n[[segment]]\nduration_s = 25\nthrottle = [0.1, 0.35]\n\
     [[segment]]\nduration_s = 12\nthrottle = 0.0\nbrake = 0.12\n[[segment]]\nduration_s = 8\nthrottle = [0.2, 0.6]\n";
 
 /// The car with the ratios of its gearbox, and with the masses of its shifts if they are told.
-fn by_ratios(car: &Car, with_masses: bool) -> Car {
+fn by_ratios(car: &CarFile, with_masses: bool) -> Car {
     let mut text = "name = \"by its ratios\"\nlevel = \"ratios\"\ngear = [\n".to_owned();
     let gears = &car.gearbox.gears;
     for gear in gears {
@@ -36,7 +38,7 @@ fn by_ratios(car: &Car, with_masses: bool) -> Car {
         )
         .unwrap();
     }
-    Car::from_sources(car.source.clone(), Source::built_in("g.toml", &text)).unwrap()
+    CarFile::from_sources(car.source.clone(), Source::built_in("g.toml", &text)).unwrap().car
 }
 
 /// Torque of all clutches of a shift at the turbine, N m.
@@ -51,10 +53,10 @@ fn true_sum(car: &Car, sample: &CarSample) -> Option<f64> {
 }
 
 /// RMS error in N m, RMS over the stated deviation, RMS torque, and rows, of the inertia phases.
-fn score(truth: &Car, with_masses: bool) -> [f64; 4] {
+fn score(truth: &CarFile, with_masses: bool) -> [f64; 4] {
     let known = by_ratios(truth, with_masses);
-    let model = CarModel::new(truth.clone()).unwrap();
-    let drive = Drive::from_source(Source::built_in("drive.toml", DRIVE)).unwrap();
+    let model = CarModel::new(truth.car.clone()).unwrap();
+    let drive = DriveFile::from_source(Source::built_in("drive.toml", DRIVE)).unwrap().drive;
     let mut recording = Recording::default();
     simulate_car_drive(&model, truth, CarCalibration::STANDARD, &drive, |sample| recording.push(sample)).unwrap();
     let errors = ErrorBudget::of_car(&known);
@@ -80,7 +82,7 @@ fn score(truth: &Car, with_masses: bool) -> [f64; 4] {
 
 #[test]
 fn the_clutches_have_their_torque_at_the_turbine() {
-    for car in cars().into_iter().filter(|car| car.converter.is_some()) {
+    for car in car_files().into_iter().filter(|car| car.converter.is_some()) {
         for (how, with_masses) in [("masses told", true), ("masses assumed", false)] {
             let [error, standardised, size, rows] = score(&car, with_masses);
             println!(
@@ -99,7 +101,7 @@ fn the_clutches_have_their_torque_at_the_turbine() {
 /// Past a gear nothing is known of the inertias: it is said so, in every row, and no speed is accused.
 #[test]
 fn a_shift_past_a_gear_is_not_modelled() {
-    let truth = cars().remove(0);
+    let truth = car_files().remove(0);
     let known = by_ratios(&truth, false);
     let gear = |name: &str| truth.gearbox.gear(name).unwrap();
     let tables = LoggedDrive::tables(&known, None).unwrap();

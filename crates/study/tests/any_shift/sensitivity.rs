@@ -1,17 +1,22 @@
 //! What each error does to the estimates of a shift.
 
-use config::{Car, CarErrorBounds, ElementErrorBounds, Source};
+use car::{Car, CarErrorBounds, ElementErrorBounds};
+use config::{CarFile, Source};
 use study::any_shift::influence::{CarInfluences, ValueFrom, car_influences};
 use study::any_shift::sensitivity::{EffectInShift, PhaseOfShift, ShiftErrorKind, car_sensitivity};
 
-use super::cars::{cars, sensors};
+use super::cars::{car_files, sensors};
 
 fn effect(phase: &PhaseOfShift, error: ShiftErrorKind) -> Option<&EffectInShift> {
     phase.effects.iter().find(|effect| effect.error == error)
 }
 
+fn car_file(name: &str) -> CarFile {
+    car_files().into_iter().find(|car| car.gearbox.name.contains(name)).unwrap()
+}
+
 fn car(name: &str) -> Car {
-    cars().into_iter().find(|car| car.gearbox.name.contains(name)).unwrap()
+    car_file(name).car
 }
 
 /// What is known without a filter: the valve model alone has the whole error of friction, and none of the driveline.
@@ -79,7 +84,7 @@ fn a_car_without_converter_has_the_error_of_the_reported_engine_torque() {
 
 #[test]
 fn values_of_the_file_of_the_gearbox_and_defaults_are_told_apart() {
-    let car = car("AODE");
+    let car = car_file("AODE");
     let found = car_influences(&car, &sensors()).unwrap().unwrap();
     assert_eq!(found.shifts, 12);
     let of = |key: &str| found.values.iter().find(|value| value.key == key).unwrap();
@@ -97,13 +102,14 @@ fn values_of_the_file_of_the_gearbox_and_defaults_are_told_apart() {
 
 #[test]
 fn the_bounds_of_a_file_say_how_far_its_values_are_off() {
-    let car = car("AODE");
+    let car = car_file("AODE");
     let narrow = ElementErrorBounds { valve_gain_factor: Some([0.98, 1.01]), ..ElementErrorBounds::default() };
     let wide = ElementErrorBounds { valve_gain_factor: Some([0.99, 1.03]), ..ElementErrorBounds::default() };
     let mut elements = vec![narrow; car.clutches.len()];
     elements[0] = wide;
     let error_bounds = CarErrorBounds { elements, converter_share: Some(0.02), ..CarErrorBounds::default() };
-    let fitted = Car { error_bounds, ..car.clone() };
+    let mut fitted = car.clone();
+    fitted.error_bounds = error_bounds;
     let [series, fitted] = [car, fitted].map(|car| car_influences(&car, &sensors()).unwrap().unwrap());
     let of = |found: &CarInfluences, key: &str| found.values.iter().find(|value| value.key == key).unwrap().clone();
     assert_eq!(of(&series, "valve.gain.gain_pa_a").limits, [0.9, 1.1]);
@@ -122,6 +128,6 @@ fn a_car_that_makes_no_shift_is_no_car_without_errors() {
     // Oil at -40 degC: the pistons do not arrive in time.
     let text = "name = \"cold\"\ngearbox = \"8hp.toml\"\n[fill]\nstroke_m = 0.02\n[oil]\ntemperature_degc = -40\n";
     let gearbox = include_str!("../../../../gearboxes/8hp.toml");
-    let car = Car::from_sources(Source::built_in("car.toml", text), Source::built_in("8hp.toml", gearbox)).unwrap();
+    let car = CarFile::from_sources(Source::built_in("car.toml", text), Source::built_in("8hp.toml", gearbox)).unwrap();
     assert_eq!(car_influences(&car, &sensors()).unwrap().unwrap().shifts, 0);
 }

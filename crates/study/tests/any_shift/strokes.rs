@@ -1,7 +1,8 @@
 //! Cars whose pistons have a stroke, with other volumes, return springs, passages and oil than those that the filter knows.
 
-use config::{Car, ShiftClutch};
-use design::{ErrorBudget, ShiftTables};
+use car::ErrorBudget;
+use car::{Car, ShiftClutch};
+use design::ShiftTables;
 use drivetrain::ShiftKind;
 use observer::any_shift::{AnyShiftFilter, FrictionElement, GearboxTables, Learnt};
 use plant::car::CarShift;

@@ -1,7 +1,7 @@
 //! Lag and delay of the valves, which the filter learns, against a filter that is told both.
 
-use config::Car;
-use design::ErrorBudget;
+use car::Car;
+use car::ErrorBudget;
 use study::any_shift::{ShiftDraw, ValveTiming};
 
 use super::cars::{Random, cars};

@@ -1,7 +1,8 @@
 //! A wheel speed that is not what the filter takes it to be: of another scale, as with a worn tyre, or later than is said.
 
-use config::{Car, Sensors};
-use design::{ErrorBudget, ShiftTables, any_shift_filter};
+use car::ErrorBudget;
+use car::{Car, Sensors};
+use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
 use observer::{ChannelHealth, Reading};
 use plant::car::{CarModel, CarShift};

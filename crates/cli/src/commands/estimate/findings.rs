@@ -1,6 +1,6 @@
 //! What is said about the estimates of a log.
 
-use config::{ObserverKind, Vehicle};
+use car::{ObserverKind, Vehicle};
 use logs::Role;
 use observer::{ChannelHealth, Estimate as Sample, Health};
 use report::tables::{health_meaning, phase_name};

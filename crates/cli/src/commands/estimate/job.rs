@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use ::observer::Estimate;
-use config::{ObserverKind, Vehicle};
+use car::{ObserverKind, Vehicle};
 use drivetrain::CommandKind;
 use logs::{Log, Role, Shift};
 use report::log_page::{LogPage, shift_rows};

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use config::Vehicle;
+use car::Vehicle;
 use drivetrain::{ClutchValve, CommandKind};
 use logs::plausibility::Seen;
 use logs::{
@@ -250,7 +250,7 @@ impl<'a> Measured<'a> {
         let look = if is_followed { FOLLOWED_LOOK } else { FIRST_LOOK };
         let mut channels = Channels {
             steps: Steps::new(Readings::new(log, &map)?),
-            asked_of: (command == asked).then_some((vehicle.oncoming.valve, vehicle.limits.pressure_max_pa)),
+            asked_of: (command == asked).then_some((vehicle.oncoming.valve, vehicle.error_bounds.pressure_max_pa)),
             looked_at: VecDeque::new(),
             median_step_s: f64::NAN,
         };

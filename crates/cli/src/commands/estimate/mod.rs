@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use config::{Kind, Source, Vehicle};
+use config::{Kind, Source, VehicleFile};
 use logs::ChannelMap;
 use trace::ShownPath as _;
 
@@ -35,7 +35,7 @@ pub(super) use observer::{best, kind, sensors};
 /// What is common to all logs of a command.
 struct Setup<'a> {
     options: &'a Estimate,
-    vehicle: Vehicle,
+    vehicle: VehicleFile,
     map: ChannelMap,
     /// Set when a log that is followed is to end.
     stop: Arc<AtomicBool>,
@@ -141,7 +141,7 @@ fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
 }
 
 fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
-    let mut vehicle = Vehicle::read(&options.vehicle)?;
+    let mut vehicle = VehicleFile::read(&options.vehicle)?;
     if let Some(path) = &options.sensors {
         vehicle.error_bounds = vehicle.error_bounds.read_by(vehicle.oncoming.valve.command_kind(), &sensors(path)?);
     }

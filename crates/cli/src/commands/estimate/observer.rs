@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use car::{ObserverKind, Sensors, Vehicle};
 use clap::ValueEnum;
-use config::{ObserverKind, Sensors, Vehicle};
 use design::{compliant_open_loop_phases, rigid_open_loop_phases};
 use logs::Role;
 use report::tables::phase_name;
@@ -184,7 +184,7 @@ fn name_of(choice: ObserverChoice, method: MethodChoice) -> String {
 
 /// The sensors that a file describes.
 pub(in crate::commands) fn sensors(path: &Path) -> Result<Sensors, Failure> {
-    Sensors::read(path)?.ok_or_else(|| {
+    config::read_sensors(path)?.ok_or_else(|| {
         let path = path.shown();
         Failure::Input(format!("{path}: there is no [sensors] table\nhint: add one, as in experiments/bench.toml"))
     })

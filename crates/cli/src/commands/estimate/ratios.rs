@@ -1,6 +1,6 @@
 //! Whether the speeds of a log are those of the vehicle file's car: ratios that a wrong scale changes.
 
-use config::Vehicle;
+use car::Vehicle;
 use observer::{Input, Reading};
 use study::CameSpeed;
 use study::ratio_histogram::RatioHistogram;

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use config::Vehicle;
+use car::Vehicle;
 use logs::Shift;
 use report::log_page::MOST_DRAWN;
 use study::shift_estimates::{self, is_of_vehicle, thinned};

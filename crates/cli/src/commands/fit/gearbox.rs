@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use config::Car;
+use car::Car;
+use config::CarFile;
 use design::ShiftTables;
 use fit::gearbox::{HeldOut, Recorded, Recorder, ShiftLog};
 use fit::{FitError, ReadingAges};
@@ -29,7 +30,7 @@ const SHIFTS_MAX: usize = 400;
 const STEPS: u64 = 20_000;
 
 pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
-    let car = Car::read(&options.vehicle)?;
+    let car = CarFile::read(&options.vehicle)?;
     if car.gearbox.has_ratios_alone() {
         return Err(Failure::Input(format!(
             "{}: the ratios alone are known of its gearbox, and a fit finds values of clutches and valves\n\

@@ -4,7 +4,8 @@ mod gearbox;
 
 use std::path::Path;
 
-use config::{Kind, Source, Vehicle};
+use car::Vehicle;
+use config::{Kind, Source, VehicleFile};
 use fit::{Collected, FitError, HeldOut, ReadingAges, ReportRow, SHIFTS_MAX, ShiftRecord};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use trace::ShownPath as _;
@@ -33,7 +34,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     if source.kind()? == Kind::Car {
         return gearbox::fit(options);
     }
-    let vehicle = Vehicle::from_source(source)?;
+    let vehicle = VehicleFile::from_source(source)?;
     let ages = match options.sensors.as_deref() {
         Some(path) => ReadingAges::of(&sensors(path)?),
         None => ReadingAges::default(),
@@ -106,7 +107,7 @@ fn is_vehicle_file(path: &Path) -> bool {
 }
 
 /// The shifts of all logs.
-fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collected, Failure> {
+fn collect(options: &Fit, vehicle: &VehicleFile, bar: &ProgressBar) -> Result<Collected, Failure> {
     let map = channel_map_of_car(&options.mapping, vehicle.road.wheel_radius_m)?;
     let mut all = Collected::default();
     for log in &options.logs {

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use config::{CarStudy, CarStudyRuns, ElementErrors, Source};
+use car::ElementErrors;
+use config::{CarStudy, CarStudyRuns, Source};
 use report::matrix_page::kind_rows;
 use study::StudyError;
 use study::any_shift::campaign::{CarCampaign, CarRow, CarSummary};

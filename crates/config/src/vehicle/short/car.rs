@@ -14,7 +14,7 @@ use super::first_file::exact;
 use super::{ENGINE_TORQUE_N_M, MASS_KG, WHEEL_RADIUS_M};
 use crate::check::Check;
 use crate::source::toml_number;
-use crate::vehicle::car::Car;
+use crate::vehicle::car::CarFile;
 use crate::vehicle::{FINAL_RATIOS, MASSES_KG, WHEEL_RADII_M};
 use crate::{ConfigError, GearboxFile, Source, toml_string};
 
@@ -201,14 +201,16 @@ const HEAD: &str = "\
 pub fn short_car_file(facts: &CarFacts, gearbox: &Source) -> Result<String, ConfigError> {
     refuse_ratio(facts, gearbox)?;
     // The file without its comments says what the defaults are.
-    let bare =
-        Car::from_sources(Source::built_in("the new vehicle file", &text(facts, |_| String::new())), gearbox.clone())?;
+    let bare = CarFile::from_sources(
+        Source::built_in("the new vehicle file", &text(facts, |_| String::new())),
+        gearbox.clone(),
+    )?;
     let shown = |table: &str| -> String {
         let keys = SHOWN.iter().filter(|(name, _)| *name == table).flat_map(|(_, keys)| *keys);
         keys.map(|key| commented(&bare.defaults_taken, table, key)).collect()
     };
     let text = text(facts, shown);
-    Car::from_sources(Source::built_in("the new vehicle file", &text), gearbox.clone())?;
+    CarFile::from_sources(Source::built_in("the new vehicle file", &text), gearbox.clone())?;
     Ok(text)
 }
 

@@ -3,7 +3,7 @@
 use super::complete::{complete, find};
 use super::{Facts, Short, ValveKind, text_of};
 use crate::source::toml_number;
-use crate::{ConfigError, Source, Vehicle, toml_string};
+use crate::{ConfigError, Source, VehicleFile, toml_string};
 
 /// Defaults of a table that stand in a short file as comments: what an estimate uses and somebody may know.
 struct Shown {
@@ -96,7 +96,7 @@ pub fn short_file(facts: &Facts, has_stroke: bool) -> Result<String, ConfigError
         exact(facts.wheel_radius_m),
         shown("design.error_bounds")?,
     );
-    Vehicle::from_source(Source::built_in("the new vehicle file", &text))?;
+    VehicleFile::from_source(Source::built_in("the new vehicle file", &text))?;
     Ok(text)
 }
 
@@ -135,8 +135,8 @@ mod tests {
         }
     }
 
-    fn vehicle(facts: &Facts) -> Result<Vehicle, ConfigError> {
-        Vehicle::from_source(Source::built_in("x.toml", &short_file(facts, false)?))
+    fn vehicle(facts: &Facts) -> Result<VehicleFile, ConfigError> {
+        VehicleFile::from_source(Source::built_in("x.toml", &short_file(facts, false)?))
     }
 
     #[test]
@@ -166,10 +166,10 @@ mod tests {
             engine_torque_n_m: 190.0,
             ..facts(2.5, 1.0)
         };
-        let (short, shipped) = (vehicle(&numbers).unwrap(), Vehicle::built_in().unwrap());
+        let (short, shipped) = (vehicle(&numbers).unwrap(), VehicleFile::built_in().unwrap());
         assert_eq!((short.filter, short.error_bounds), (shipped.filter, shipped.error_bounds));
         assert_eq!(short.engine, shipped.engine);
-        let supply = |vehicle: &Vehicle| vehicle.offgoing.cylinder.supply;
+        let supply = |vehicle: &VehicleFile| vehicle.offgoing.cylinder.supply;
         assert_eq!(supply(&short), supply(&shipped));
         assert_eq!(short.output_inertia_kg_m2, shipped.output_inertia_kg_m2);
     }
@@ -189,7 +189,7 @@ mod tests {
         for (a, b) in one.shift.mass_kg_m2.as_flattened().iter().zip(two.shift.mass_kg_m2.as_flattened()) {
             twice(*a, *b);
         }
-        let fill_s = |vehicle: &Vehicle| {
+        let fill_s = |vehicle: &VehicleFile| {
             let cylinder = &vehicle.oncoming.cylinder;
             cylinder.stroke_m3 / cylinder.supply.flow(0.15e6, cylinder.viscosity_m2_s)
         };
@@ -242,15 +242,18 @@ mod tests {
             for has_stroke in [false, true] {
                 let facts = Facts { valve, ..facts(4.17, 2.34) };
                 let short =
-                    Vehicle::from_source(Source::built_in("x", &short_file(&facts, has_stroke).unwrap())).unwrap();
+                    VehicleFile::from_source(Source::built_in("x", &short_file(&facts, has_stroke).unwrap())).unwrap();
                 let text = complete_file(&facts, has_stroke).unwrap();
                 assert_eq!(text, short.source.text);
-                let complete = Vehicle::from_source(Source::built_in("x", &text)).unwrap();
+                let complete = VehicleFile::from_source(Source::built_in("x", &text)).unwrap();
                 assert!(complete.defaults_taken.is_empty(), "{:?}", complete.defaults_taken);
                 assert!(short.defaults_taken.len() > 50, "{}", short.defaults_taken.len());
                 assert_eq!(short.oncoming.has_stroke, has_stroke);
-                let same =
-                    Vehicle { source: short.source.clone(), defaults_taken: short.defaults_taken.clone(), ..complete };
+                let same = VehicleFile {
+                    source: short.source.clone(),
+                    defaults_taken: short.defaults_taken.clone(),
+                    ..complete
+                };
                 assert_eq!(same, short);
             }
         }

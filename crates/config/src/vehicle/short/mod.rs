@@ -7,17 +7,20 @@ mod car;
 mod complete;
 mod facts;
 mod first_file;
-mod one_shift;
 mod train;
 mod uncertainty;
 
+use ::car::one_shift::{
+    ENGINE_TORQUE_N_M, FINAL_RATIO, MASS_ERROR, OFFGOING_N_M, OFFGOING_OPEN_N_M, OUTPUT_ERROR_N_M, PISTON_AREAS_M2,
+    PLATE_RADII_M, RATIO_BEFORE, SHAFT_TORQUE_N_M, TORQUE_SHARES,
+};
 use drivetrain::cylinder::{CAPACITY_M3_PA, FLOW_MAX_M3_S, LEAK_M3_S_PA, PASSAGE};
 use toml::de::DeValue;
 
 use super::budget;
 use crate::check::Check;
 use crate::source::{Layers, toml_number};
-use crate::{ConfigError, Source, Vehicle};
+use crate::{ConfigError, Source, VehicleFile};
 pub use car::{CarFacts, short_car_file, sized_gearbox};
 pub(super) use car::{car_defaults, car_defaults_taken};
 pub use complete::DefaultTaken;
@@ -25,7 +28,6 @@ use facts::located;
 pub(super) use facts::refuse_facts;
 pub use facts::{Facts, ValveKind};
 pub use first_file::{complete_file, short_file};
-pub use one_shift::OneShiftError;
 pub use uncertainty::Uncertainty;
 
 const DEFAULTS: &str = include_str!("defaults.toml");
@@ -114,40 +116,26 @@ fn numbers(values: &[f64]) -> String {
     }
 }
 
-/// The car whose values are scaled: the built-in one.
-const ENGINE_TORQUE_N_M: f64 = 190.0;
+/// More of the car whose values are scaled: the built-in one.
 const MASS_KG: f64 = 1500.0;
 const WHEEL_RADIUS_M: f64 = 0.3;
 const WHEEL_INERTIA_KG_M2: f64 = 2.4;
 const TYRE_FORCE_N: f64 = 13_200.0;
 const STIFFNESS_N_M_RAD: f64 = 13_000.0;
 const DAMPING_N_M_S_RAD: f64 = 20.0;
-const SHAFT_TORQUE_N_M: f64 = 800.0;
 const TURBINE_ERROR_N_M: f64 = 20.0;
-const OUTPUT_ERROR_N_M: f64 = 175.0;
 const ENGINE_INERTIA_KG_M2: f64 = 0.17;
 const TURBINE_INERTIA_KG_M2: f64 = 0.06;
 const OUTPUT_INERTIA_KG_M2: f64 = 0.15;
-const RATIO_BEFORE: f64 = 2.5;
-/// How fast the torque of its offgoing clutch changes, N m per root second: 0.7 of the 285 N m that it holds at the greatest engine
-/// torque. From half of them it falls to zero in a torque phase of 0.25 s.
-const OFFGOING_N_M: f64 = 200.0;
-/// What is left of that torque when the clutch is open, N m.
-const OFFGOING_OPEN_N_M: f64 = 10.0;
-const LOWER_GEAR: f64 = 2.5 * 3.0;
-/// Its mass error over the mass, and its rolling resistance over the weight.
-const MASS_SHARE: f64 = 0.15;
+const LOWER_GEAR: f64 = RATIO_BEFORE * FINAL_RATIO;
+/// Its rolling resistance over the weight.
 const ROLLING_SHARE: f64 = 0.02;
-/// Its offgoing and oncoming clutch: share of the turbine torque that they carry, mean radius of the plates, m, and piston area, m^2.
-const TORQUE_SHARES: [f64; 2] = [1.5, 0.6];
-const PLATE_RADII_M: [f64; 2] = [0.14, 0.13];
-const PISTON_AREAS_M2: [f64; 2] = [0.012, 0.01];
 /// Pressure at which its plates touch, Pa.
 const KISS_PA: f64 = 60e3;
 
 /// The defaults as the text of a vehicle file.
 fn text_of(facts: &Facts) -> Result<String, ConfigError> {
-    let given = Vehicle::built_in()?;
+    let given = VehicleFile::built_in()?;
     let torque = facts.engine_torque_n_m / ENGINE_TORQUE_N_M;
     let lower_gear = torque * facts.ratio_before * facts.final_ratio / LOWER_GEAR;
     let mass = facts.mass_kg / MASS_KG;
@@ -183,7 +171,7 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
         ("radius", toml_number(facts.wheel_radius_m)),
         ("rolling", toml_number(ROLLING_SHARE * weight_n * facts.wheel_radius_m)),
         ("turbine_torque", toml_number(torque * TURBINE_ERROR_N_M)),
-        ("mass_error", toml_number(MASS_SHARE * facts.mass_kg)),
+        ("mass_error", toml_number(MASS_ERROR * facts.mass_kg)),
         ("shaft_torque", toml_number(lower_gear * SHAFT_TORQUE_N_M)),
         ("output_torque", toml_number(torque * facts.ratio_before / RATIO_BEFORE * OUTPUT_ERROR_N_M)),
         ("offgoing", toml_number(carried[0] * OFFGOING_N_M)),

@@ -1,10 +1,11 @@
 //! How far off a default may be.
 
+use car::{ErrorBounds, Vehicle};
 use drivetrain::Table1;
 
 use super::DefaultTaken;
 use crate::study::Change;
-use crate::{ConfigError, ErrorBounds, Vehicle};
+use crate::{ConfigError, VehicleFile};
 
 /// By how much the right value of a key may differ from its default: what the two limits do to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,11 +89,11 @@ impl DefaultTaken {
     ///
     /// # Errors
     /// A vehicle file cannot have that value.
-    pub fn at_limit(&self, vehicle: &Vehicle, change: Change, limit: f64) -> Result<Vehicle, ConfigError> {
+    pub fn at_limit(&self, vehicle: &VehicleFile, change: Change, limit: f64) -> Result<Vehicle, ConfigError> {
         if self.key == TORQUE_RATIO {
             let given = &vehicle.converter.torque_ratio;
             let values: Vec<f64> = given.values().iter().map(|ratio| 1.0 + limit * (ratio - 1.0)).collect();
-            let mut changed = vehicle.clone();
+            let mut changed = vehicle.vehicle.clone();
             // The axis is that of the map.
             changed.converter.torque_ratio = Table1::new(given.axis(), &values).unwrap_or(*given);
             return Ok(changed);
@@ -127,7 +128,7 @@ mod tests {
     use crate::Source;
     use crate::vehicle::short::{Facts, ValveKind, short_file};
 
-    fn short(valve: ValveKind) -> Vehicle {
+    fn short(valve: ValveKind) -> VehicleFile {
         let facts = Facts {
             name: "x".to_owned(),
             mass_kg: 1650.0,
@@ -138,14 +139,14 @@ mod tests {
             engine_torque_n_m: 250.0,
             valve,
         };
-        Vehicle::from_source(Source::built_in("x.toml", &short_file(&facts, false).unwrap())).unwrap()
+        VehicleFile::from_source(Source::built_in("x.toml", &short_file(&facts, false).unwrap())).unwrap()
     }
 
     #[test]
     fn every_share_belongs_to_a_default_and_every_default_of_the_car_has_an_uncertainty() {
         let cars = [short(ValveKind::Proportional), short(ValveKind::PulseWidth)];
         for (pattern, _) in SHARES {
-            let has = |car: &Vehicle| car.defaults_taken.iter().any(|taken| without_names(&taken.key) == pattern);
+            let has = |car: &VehicleFile| car.defaults_taken.iter().any(|taken| without_names(&taken.key) == pattern);
             assert!(cars.iter().any(has), "{pattern}");
         }
         // Axes of maps, the engine's map, requirements of designs, limits of signals: no estimate changes with them.

@@ -1,6 +1,6 @@
 //! Contacts and accelerations in published gearboxes.
 
-use config::{Car, Source};
+use config::{CarFile, Source};
 use drivetrain::{Engagement, ShiftTorques};
 use geartrain::Change;
 use rand_distr::Distribution;
@@ -15,7 +15,7 @@ macro_rules! models {
         [$({
             let car = Source::built_in("car.toml", concat!("name = \"car\"\ngearbox = \"", $gearbox, "\"\n"));
             let gearbox = Source::built_in($gearbox, include_str!(concat!("../../../../../", $gearbox)));
-            CarModel::new(Car::from_sources(car, gearbox).unwrap()).unwrap()
+            CarModel::new(CarFile::from_sources(car, gearbox).unwrap().car).unwrap()
         }),*]
     };
 }

@@ -1,6 +1,6 @@
 //! Numbers of the shift controller.
 
-use config::FastFill;
+use car::FastFill;
 
 /// Calibration of the shift controller: one set for all gearboxes and all kinds of shift.
 #[derive(Debug, Clone, Copy, PartialEq)]

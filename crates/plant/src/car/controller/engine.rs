@@ -11,7 +11,7 @@
 //!
 //! with the engine torque `T_e` that the limited rate allows.
 
-use config::Car;
+use car::Car;
 
 use super::{CarCalibration, CarMeasured};
 

@@ -3,7 +3,7 @@
 //! With the engine's torque `T_e` and inertia `I_e`, the clutch takes what holds the engine near a speed `w*` that rises with
 //! the throttle: `T = T_e - I_e k (w* - w_e)`. Without throttle it takes the creep torque, less with the brake.
 
-use config::Car;
+use car::Car;
 
 use super::pressure::Controlled;
 use super::{CarCalibration, CarMeasured};

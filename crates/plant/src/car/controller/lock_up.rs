@@ -8,7 +8,7 @@
 //!
 //! The reference has the sign of `T_e - T_p`: in overrun the turbine turns faster than the engine.
 
-use config::{Car, LockUp};
+use car::{Car, LockUp};
 
 use super::{CarCalibration, CarMeasured};
 

@@ -25,7 +25,7 @@ mod track;
 
 use std::collections::VecDeque;
 
-use config::{Car, ShiftClutch};
+use car::{Car, ShiftClutch};
 use drivetrain::ReducedShift;
 use geartrain::{Change, ElementKind};
 

@@ -1,7 +1,7 @@
 //! A shift clutch as its controller sees it: from torque at the turbine to the command of its valve. A one-way clutch has none: it
 //! is asked for nothing.
 
-use config::{FastFill, ShiftClutch};
+use car::{FastFill, ShiftClutch};
 
 use super::CarCalibration;
 use crate::fast_fill::{FillPlan, StrokeModel};

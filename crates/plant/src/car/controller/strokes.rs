@@ -1,6 +1,6 @@
 //! Where the pistons are, as the controller models them: what a fill needs depends on what is left of the one before.
 
-use config::Car;
+use car::Car;
 
 use crate::fast_fill::StrokeModel;
 use crate::gear_train::MAX_ELEMENTS;
@@ -15,7 +15,7 @@ impl Strokes {
     /// In this gear, with everything at rest.
     pub(super) fn new(car: &Car, gear: usize) -> Self {
         let holds = |element: usize| car.gearbox.gears[gear].holding.iter().any(|holding| holding.element == element);
-        let model = |(element, clutch): (usize, &Option<config::ShiftClutch>)| {
+        let model = |(element, clutch): (usize, &Option<car::ShiftClutch>)| {
             let clutch = clutch.as_ref().filter(|clutch| clutch.has_stroke)?;
             Some(StrokeModel::new(clutch, if holds(element) { car.line_pressure_pa } else { 0.0 }))
         };

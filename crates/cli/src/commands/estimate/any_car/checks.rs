@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 use drivetrain::{ClutchValve, CommandKind};
 use logs::Role;

@@ -1,6 +1,6 @@
 //! The columns of an estimate of a car with any gearbox.
 
-use config::Car;
+use car::Car;
 use config::gearbox::element_column;
 use observer::any_shift::{MAX_ELEMENTS, ONE_WAY, ShiftEstimate};
 use observer::{ChannelHealth, Channels};

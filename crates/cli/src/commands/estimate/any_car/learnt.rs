@@ -3,7 +3,8 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use config::{Car, ConfigError, Source, read_learnt, write_learnt};
+use car::Car;
+use config::{ConfigError, Source, read_learnt, write_learnt};
 use design::ShiftTables;
 use observer::any_shift::{Learnt, LearntElement};
 use study::any_shift::logged::LoggedDrive;

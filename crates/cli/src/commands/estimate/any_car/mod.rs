@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use config::{Car, Sensors};
+use car::{Car, Sensors};
+use config::CarFile;
 use design::ShiftTables;
 use logs::ChannelMap;
 use report::drive_page::{DrivePage, MOST_DRAWN, findings, shift_cells, shift_rows, shift_words};
@@ -54,7 +55,7 @@ pub(super) fn check_options(options: &Estimate) -> Result<(), Failure> {
 /// What is common to all logs of a command.
 pub(super) struct CarSetup<'a> {
     options: &'a Estimate,
-    car: Car,
+    car: CarFile,
     tables: ShiftTables<f64>,
     sensors: Option<Sensors>,
     map: ChannelMap,
@@ -64,7 +65,7 @@ pub(super) struct CarSetup<'a> {
 
 impl<'a> CarSetup<'a> {
     pub(super) fn new(options: &'a Estimate) -> Result<Self, Failure> {
-        let car = Car::read(&options.vehicle)?;
+        let car = CarFile::read(&options.vehicle)?;
         if options.learnt.is_some() && car.gearbox.has_ratios_alone() {
             let vehicle = options.vehicle.shown();
             let message = format!("--learnt has no effect with {vehicle}: the ratios alone are known of its gearbox");
@@ -209,7 +210,7 @@ fn write_tables(drive: &ScoredDrive, car: &Car, csv: &Path, json: &Path) -> Resu
 /// The page, beside the table of shifts.
 fn write_page(
     drive: &ScoredDrive,
-    car: &Car,
+    car: &CarFile,
     log: &Path,
     [csv, json, page]: &[PathBuf; 3],
     say: &mut Messages,

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use config::Car;
+use car::Car;
 
 use super::super::selection::{AFTER_S, BEFORE_S, Selection};
 use super::columns::Row;

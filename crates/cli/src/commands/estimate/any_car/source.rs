@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use config::Car;
+use car::Car;
 use design::ShiftTables;
 use logs::{ChannelMap, Log, LogError, OnChange, Role};
 use observer::any_shift::MAX_ELEMENTS;

@@ -5,11 +5,37 @@ use drivetrain::{
 };
 use geartrain::{Change, Shift};
 
-use super::facts::{Facts, ValveKind};
-use super::{ENGINE_TORQUE_N_M, MASS_SHARE, PISTON_AREAS_M2, PLATE_RADII_M, RATIO_BEFORE, TORQUE_SHARES, text_of};
-use crate::vehicle::error_budget::command_limits;
-use crate::vehicle::{Car, ElementErrors, ErrorBudget, SHAFT_OVER_TYRES, ShiftClutch, Uncertainty};
-use crate::{CompliantRequirement, ConfigError, DesignRequirement, ErrorBounds, Source, Vehicle};
+use crate::error_budget::{BACKLASH_RAD, CHANNEL_SKEW_S, COMMAND_AGE_S, WHEEL_DELAY_S, around, command_limits};
+use crate::{
+    Car, CompliantRequirement, DesignRequirement, ElementErrors, ErrorBounds, ErrorBudget, FilterSettings, PhaseSlips,
+    ShiftClutch, Uncertainty, ValveUncertainty, Vehicle,
+};
+
+/// The car whose values are scaled, that of `vehicles/two_speed_at.toml`: greatest engine torque, N m.
+pub const ENGINE_TORQUE_N_M: f64 = 190.0;
+/// Its ratio of the gearbox before the shift, and of the differential.
+pub const RATIO_BEFORE: f64 = 2.5;
+/// The same of the differential.
+pub const FINAL_RATIO: f64 = 3.0;
+/// Largest torque of its drive shafts in a shift, N m.
+pub const SHAFT_TORQUE_N_M: f64 = 800.0;
+/// Torque at its gearbox output that a rigid model leaves out, N m.
+pub const OUTPUT_ERROR_N_M: f64 = 175.0;
+/// How fast the torque of its offgoing clutch changes, N m per root second: 0.7 of the 285 N m that it holds at the greatest engine
+/// torque. From half of them it falls to zero in a torque phase of 0.25 s.
+pub const OFFGOING_N_M: f64 = 200.0;
+/// What is left of that torque when the clutch is open, N m.
+pub const OFFGOING_OPEN_N_M: f64 = 10.0;
+/// Relative error of the mass of a car as it is driven.
+pub const MASS_ERROR: f64 = 0.15;
+/// Its offgoing and oncoming clutch: torque over that of the turbine, mean radius of the plates, m, and piston area, m^2.
+pub const TORQUE_SHARES: [f64; 2] = [1.5, 0.6];
+/// The same of the mean radius of the plates, m.
+pub const PLATE_RADII_M: [f64; 2] = [0.14, 0.13];
+/// The same of the piston areas, m^2.
+pub const PISTON_AREAS_M2: [f64; 2] = [0.012, 0.01];
+/// What its error budget does to the outputs in torque and inertia phase ([`Vehicle::acceleration_errors`]), rad/s^2.
+pub const ACCELERATION_ERRORS_RAD_S2: [f64; 2] = [63.326091034413786, 834.0051599116736];
 
 /// Turbine torque of the shift at which the errors are weighed, over the greatest torque of the engine: 133 of 190 N m in the car that is scaled.
 const SHIFT_TORQUE: f64 = 0.7;
@@ -84,10 +110,29 @@ pub enum OneShiftError {
          sensitivity` says what the speeds show of each clutch torque"
     )]
     NoConverter,
-    /// A number of the car is outside the range of a vehicle file.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
 }
+
+/// What differs between a shift with a valve that is commanded by a current and one with a duty cycle.
+struct ByCommand {
+    command_max: f64,
+    command_error: f64,
+    valve: ValveUncertainty,
+    /// Settling times of torque and inertia phase, s, then the same of the compliant observer.
+    settling_s: [f64; 4],
+}
+
+const BY_CURRENT: ByCommand = ByCommand {
+    command_max: 1.2,
+    command_error: 0.01,
+    valve: ValveUncertainty::None,
+    settling_s: [0.15, 0.10, 0.10, 0.10],
+};
+const BY_DUTY_CYCLE: ByCommand = ByCommand {
+    command_max: 100.0,
+    command_error: 0.5,
+    valve: ValveUncertainty::PressureDrop((0.0, 40e3)),
+    settling_s: [0.25, 0.18, 0.17, 0.13],
+};
 
 /// A shift with all that its vehicle needs.
 struct OneShift<'c> {
@@ -140,15 +185,14 @@ impl Car {
     /// Engine, converter, clutches, driveline, tyre and road are the car's, the gear train is its reduction to the shift. The
     /// observers' valve is that of the oncoming element, linear around the pressure of a shift; of a normally-high valve the command is
     /// `zero_pressure_a` less the current. The bounds of the errors are those of the car ([`ErrorBudget::of_car`]). All else is
-    /// the default of a short file, scaled to the car and to the torques that the two elements carry. Its source is that of the car, so
-    /// that none of its values can be changed by its key.
+    /// that of `vehicles/two_speed_at.toml`, scaled to the car and to the torques that the two elements carry.
     ///
     /// # Errors
     /// It is no shift between two wet clutches with a falling ratio, or the car has no converter; see [`OneShiftError`].
     pub fn of_shift(&self, gears: [usize; 2]) -> Result<Vehicle, OneShiftError> {
         let name = self.shift_name(gears);
         let shift = self.gearbox.shift(gears[0], gears[1]).ok_or_else(|| self.no_shift(&name))?;
-        OneShift::of(self, shift, name)?.vehicle()
+        Ok(OneShift::of(self, shift, name)?.vehicle())
     }
 }
 
@@ -186,29 +230,18 @@ impl<'c> OneShift<'c> {
         })
     }
 
-    fn vehicle(&self) -> Result<Vehicle, OneShiftError> {
+    fn vehicle(&self) -> Vehicle {
         let car = self.car;
-        let size = self.of_size()?;
-        let pressure_max_pa = self.element.pressure_max_pa;
-        let error_bounds = self.error_bounds(&size.error_bounds, pressure_max_pa);
-        let mut supervisor = size.supervisor;
-        supervisor.kiss_pressure_pa = self.oncoming.clutch.kiss_pressure();
-        let mut limits = size.limits;
-        limits.pressure_max_pa = pressure_max_pa;
-        limits.shaft_torque_max_n_m = SHAFT_OVER_TYRES * car.tyre.max_force_n * car.road.wheel_radius_m;
-        if self.oncoming.valve.command_kind() == CommandKind::Current {
-            [_, limits.command_max] =
-                command_limits(&self.oncoming.valve, car.line_pressure_pa, self.element.valve_gain_factor);
-        }
-        let mut filter = size.filter;
-        filter.offgoing_n_m *= self.offgoing_size();
-        let built_in = Vehicle::built_in()?;
+        let kind = match self.oncoming.valve.command_kind() {
+            CommandKind::Current => &BY_CURRENT,
+            CommandKind::DutyCycle => &BY_DUTY_CYCLE,
+        };
+        let error_bounds = self.error_bounds(kind.command_error);
         let own = acceleration_errors(&self.reduced, &car.driveline, &car.road, &error_bounds);
-        let other = acceleration_errors(&built_in.shift, &built_in.driveline, &built_in.road, &built_in.error_bounds);
-        let [in_torque_phase, in_inertia_phase] = [own[0] / other[0], own[1] / other[1]];
+        let [in_torque_phase, in_inertia_phase] = [0, 1].map(|phase| own[phase] / ACCELERATION_ERRORS_RAD_S2[phase]);
         let train = car.gearbox.train.as_ref();
-        Ok(Vehicle {
-            source: Source { path: car.source.path.clone(), text: car.source.text.clone() },
+        let [torque_s, inertia_s, compliant_torque_s, compliant_inertia_s] = kind.settling_s;
+        Vehicle {
             name: format!("{}, shift {}", car.name, self.name),
             engine: car.engine,
             converter: self.converter,
@@ -223,89 +256,101 @@ impl<'c> OneShift<'c> {
             tyre: car.tyre,
             road: car.road,
             observer_valve: self.observer_valve(self.oncoming.clutch.kiss_pressure() + error_bounds.shift_pressure_pa),
-            uncertainty: Uncertainty { friction: self.friction(), ..size.uncertainty },
-            supervisor,
-            limits,
-            torque_phase: self.requirement(&size.torque_phase, in_torque_phase),
-            inertia_phase: self.requirement(&size.inertia_phase, in_inertia_phase),
-            compliant_torque_phase: self.compliant(&size.compliant_torque_phase),
-            compliant_inertia_phase: self.compliant(&size.compliant_inertia_phase),
-            error_bounds,
-            filter,
-            defaults_taken: car.defaults_taken.clone(),
-            ..size
-        })
-    }
-
-    /// The car of the defaults at the size of this one.
-    fn of_size(&self) -> Result<Vehicle, ConfigError> {
-        let car = self.car;
-        let facts = Facts {
-            name: car.name.clone(),
-            mass_kg: car.road.mass_kg,
-            wheel_radius_m: car.road.wheel_radius_m,
-            // The gear train is the car's: it takes the place of this one.
-            ratio_before: RATIO_BEFORE,
-            ratio_after: 1.0,
-            final_ratio: car.driveline.final_ratio,
-            engine_torque_n_m: car.engine.largest_torque(),
-            valve: match self.oncoming.valve.command_kind() {
-                CommandKind::Current => ValveKind::Proportional,
-                CommandKind::DutyCycle => ValveKind::PulseWidth,
+            uncertainty: Uncertainty { friction: self.friction(), valve: kind.valve },
+            phase_slips: PhaseSlips { release_slip_rad_s: 1.0, lock_slip_rad_s: 3.0, lock_hold_s: 0.02 },
+            speed_max_rad_s: 1000.0,
+            command_max: match self.oncoming.valve.command_kind() {
+                CommandKind::Current => {
+                    command_limits(&self.oncoming.valve, car.line_pressure_pa, self.element.valve_gain_factor)[1]
+                }
+                CommandKind::DutyCycle => kind.command_max,
             },
-        };
-        let path = format!("defaults for a shift of {}", car.source.path.to_string_lossy());
-        Vehicle::from_source(Source { path: path.into(), text: text_of(&facts)? })
+            torque_phase: self.requirement(torque_s, None, in_torque_phase * 36.7, 0.06e6),
+            inertia_phase: self.requirement(inertia_s, Some(15.0), in_inertia_phase * 1600.0, 0.05e6),
+            compliant_torque_phase: self.compliant(compliant_torque_s, 15.0, 0.18e6),
+            compliant_inertia_phase: self.compliant(compliant_inertia_s, 5.0, 0.04e6),
+            error_bounds,
+            filter: FilterSettings {
+                turbine_share: 0.10,
+                turbine_share_s: 3.0,
+                twist_rate_rad_s: 0.05,
+                valve_rate_s: 0.1,
+                offgoing_n_m: self.torque_size() * OFFGOING_N_M * self.offgoing_size(),
+                offgoing_release_s: 0.03,
+                output_least_rad_s: 20.0,
+            },
+            shaft_settling_s: 0.5,
+        }
     }
 
-    /// The error budget of the car of the defaults, for this shift.
-    fn error_bounds(&self, size: &ErrorBounds, pressure_max_pa: f64) -> ErrorBounds {
+    /// The error budget of the shift. Numbers without a name are those of `vehicles/two_speed_at.toml`.
+    fn error_bounds(&self, command: f64) -> ErrorBounds {
         let (car, errors, element) = (self.car, &self.budget, &self.element);
         let torque_n_m = SHIFT_TORQUE * car.engine.largest_torque();
-        let lower_gear = self.reduced.ratio_offgoing() / RATIO_BEFORE;
+        let lower_gear = self.torque_size() * self.reduced.ratio_offgoing() / RATIO_BEFORE;
         let (pressure, slip) = (self.pressure_size(), self.slip_size());
         let [on_turbine, on_output] = self.reduced.slip_oncoming;
-        let around = |share: f64| [1.0 - share, 1.0 + share];
+        let (turbine_quantum_rad_s, output_quantum_rad_s) = (0.7_f64, 0.7_f64);
         ErrorBounds {
             turbine_torque_n_m: errors.converter * torque_n_m,
             turbine_torque_share: errors.converter,
             inertia_torque_n_m: self.inertia_torque_n_m(),
-            pressure_pa: pressure * size.pressure_pa,
-            shift_pressure_pa: pressure * size.shift_pressure_pa,
-            shift_ramp_pa_s: pressure * size.shift_ramp_pa_s,
-            pressure_max_pa,
-            line_pressure_pa: [pressure_max_pa; 2],
-            mass_kg: car.error_bounds.mass_share.unwrap_or(MASS_SHARE) * car.road.mass_kg,
-            shaft_torque_n_m: lower_gear * size.shaft_torque_n_m,
-            output_torque_n_m: lower_gear * size.output_torque_n_m,
-            offgoing_torque_n_m: self.offgoing_size() * size.offgoing_torque_n_m,
-            slip_quantum_rad_s: (on_turbine * size.turbine_quantum_rad_s).hypot(on_output * size.output_quantum_rad_s),
-            slip_rad_s: slip * size.slip_rad_s,
-            friction_factor: element.friction_factor,
-            valve_gain_factor: element.valve_gain_factor,
+            pressure_pa: pressure * 0.1e6,
+            mass_kg: car.error_bounds.mass_share.unwrap_or(MASS_ERROR) * car.road.mass_kg,
+            grade_rad: 0.0873,
+            shaft_torque_n_m: lower_gear * car.driveline.final_ratio / FINAL_RATIO * SHAFT_TORQUE_N_M,
+            output_torque_n_m: lower_gear * OUTPUT_ERROR_N_M,
+            offgoing_torque_n_m: self.torque_size() * OFFGOING_OPEN_N_M * self.offgoing_size(),
+            offgoing_drain_s: 0.1,
+            turbine_quantum_rad_s,
+            output_quantum_rad_s,
+            slip_quantum_rad_s: (on_turbine * turbine_quantum_rad_s).hypot(on_output * output_quantum_rad_s),
+            wheel_quantum_rad_s: 0.14,
+            sampling_delay_s: 0.02,
+            float32_rounding: 6e-8,
+            shift_pressure_pa: pressure * 0.2e6,
+            shift_ramp_pa_s: pressure * 0.8e6,
             valve_lag_factor: element.valve_lag_factor,
+            valve_gain_factor: element.valve_gain_factor,
             valve_delay_s: element.valve_delay_s,
             valve_hysteresis_pa: element.valve_hysteresis_pa,
+            command_age_s: COMMAND_AGE_S,
+            line_pressure_pa: [element.pressure_max_pa; 2],
             fill: self.oncoming.standard_fill_budget(car.oil_temperature_degc),
+            friction_factor: element.friction_factor,
+            command,
+            slip_rad_s: slip * 40.0,
+            pressure_max_pa: element.pressure_max_pa,
             wheel_scale: errors.wheel_scale,
+            wheel_delay_s: WHEEL_DELAY_S,
+            channel_skew_s: CHANNEL_SKEW_S,
             engine_torque_share: errors.engine,
             shaft_stiffness_factor: around(errors.stiffness),
-            ..*size
+            backlash_rad: BACKLASH_RAD,
         }
     }
 
-    /// A requirement of the car of the defaults, at the pressures of this shift and with errors of the accelerations that are larger by
-    /// this factor.
-    fn requirement(&self, of: &DesignRequirement, acceleration: f64) -> DesignRequirement {
-        DesignRequirement {
-            model_error_max_rad_s2: acceleration * of.model_error_max_rad_s2,
-            offset_max_pa: self.pressure_size() * of.offset_max_pa,
-            ..*of
-        }
+    /// A requirement at the pressures of this shift.
+    fn requirement(
+        &self,
+        settling_time_s: f64,
+        kappa1_per_s: Option<f64>,
+        model_error_max_rad_s2: f64,
+        offset_max_pa: f64,
+    ) -> DesignRequirement {
+        let offset_max_pa = self.pressure_size() * offset_max_pa;
+        DesignRequirement { settling_time_s, kappa1_per_s, model_error_max_rad_s2, offset_max_pa }
     }
 
-    fn compliant(&self, of: &CompliantRequirement) -> CompliantRequirement {
-        CompliantRequirement { offset_max_pa: self.pressure_size() * of.offset_max_pa, ..*of }
+    /// The same on the compliant observer.
+    fn compliant(&self, settling_time_s: f64, kappa1_per_s: f64, offset_max_pa: f64) -> CompliantRequirement {
+        let offset_max_pa = self.pressure_size() * offset_max_pa;
+        CompliantRequirement { settling_time_s, kappa1_per_s: Some(kappa1_per_s), offset_max_pa, error_matrix: None }
+    }
+
+    /// Greatest torque of the engine, over that of the car that is scaled.
+    fn torque_size(&self) -> f64 {
+        self.car.engine.largest_torque() / ENGINE_TORQUE_N_M
     }
 
     /// What an error of the turbine-side inertia is worth in the inertia phase, N m.
@@ -350,6 +395,13 @@ impl<'c> OneShift<'c> {
             },
             ClutchValve::PulseWidth { law, .. } => Valve::PulseWidth(*law),
         }
+    }
+}
+
+impl Vehicle {
+    /// What the errors of its budget do to the outputs of torque and inertia phase, all at their bounds at the same time, rad/s^2.
+    pub fn acceleration_errors(&self) -> [f64; 2] {
+        acceleration_errors(&self.shift, &self.driveline, &self.road, &self.error_bounds)
     }
 }
 

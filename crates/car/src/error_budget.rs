@@ -4,8 +4,7 @@
 
 use drivetrain::{ClutchValve, CommandKind};
 
-use super::{Car, ElementErrorBounds, ShiftClutch};
-use crate::Sensors;
+use crate::{Car, ElementErrorBounds, Sensors, ShiftClutch};
 
 /// Relative error of a clutch's friction where the file gives none \[chosen\]; so are the other defaults.
 const FRICTION: f64 = 0.15;
@@ -16,20 +15,31 @@ const VALVE_LAG: f64 = 0.5;
 /// Of the converter's capacity.
 const CONVERTER: f64 = 0.10;
 /// Of the engine torque that the engine's controller reports.
-pub(super) const ENGINE: f64 = 0.08;
+pub const ENGINE: f64 = 0.08;
 /// Of the turbine-side inertia `M11` of a shift.
 const INERTIA: f64 = 0.20;
 /// Of the stiffness of the drive shafts.
-pub(super) const STIFFNESS: f64 = 0.20;
+pub const STIFFNESS: f64 = 0.20;
 /// Of the scale of the wheel speed: size, wear and pressure of the tyres.
-pub(super) const WHEEL_SCALE: f64 = 0.02;
+pub const WHEEL_SCALE: f64 = 0.02;
 /// Half-width of the hysteresis of a valve, Pa: trade data sheets of proportional pressure reducers give 2 to 4 % of full scale for the whole
 /// width.
-pub(super) const HYSTERESIS_PA: f64 = 10e3;
+pub const HYSTERESIS_PA: f64 = 10e3;
 /// Delay of a valve, s.
 const VALVE_DELAY_S: [f64; 2] = [0.0, 0.03];
 /// What the delay of a valve may differ from that of its file by, where that is outside [`VALVE_DELAY_S`], s.
 const VALVE_DELAY_ERROR_S: f64 = 0.015;
+/// Age of a command where the file says nothing, s \[chosen\]: one time step of any log at 20 Hz or more.
+pub const COMMAND_AGE_S: f64 = 0.05;
+
+/// Delay of the wheel speed, s: filter and bus of the brakes' controller.
+pub const WHEEL_DELAY_S: f64 = 0.03;
+/// Delay of turbine against output speed, s: one cycle of a bus.
+pub const CHANNEL_SKEW_S: f64 = 0.01;
+/// Factors on the stiffness of the drive shafts.
+pub const STIFFNESS_FACTOR: [f64; 2] = around(STIFFNESS);
+/// Twist without torque, rad at the wheels \[chosen\].
+pub const BACKLASH_RAD: f64 = 0.03;
 /// Error of a reading of a valve's command, relative to its maximum \[chosen\]: five standard deviations of a usual sensor.
 const COMMAND: f64 = 0.01;
 /// Room above the largest command that a valve needs for line pressure: controllers saturate their valves \[chosen\].
@@ -187,7 +197,7 @@ impl ElementErrors {
 }
 
 /// The largest command that a valve needs, A or %, with this line pressure and these factors on its gain, and the largest that it may get.
-pub(super) fn command_limits(valve: &ClutchValve<f64>, line_pressure_pa: f64, gain_factor: [f64; 2]) -> [f64; 2] {
+pub fn command_limits(valve: &ClutchValve<f64>, line_pressure_pa: f64, gain_factor: [f64; 2]) -> [f64; 2] {
     match valve.command_kind() {
         // The controller of the weakest valve commands what that one needs. A normally-high valve has its largest command without pressure.
         CommandKind::Current => {
@@ -200,7 +210,7 @@ pub(super) fn command_limits(valve: &ClutchValve<f64>, line_pressure_pa: f64, ga
 }
 
 /// Factors up to a relative error.
-pub(super) const fn around(relative: f64) -> [f64; 2] {
+pub const fn around(relative: f64) -> [f64; 2] {
     [1.0 - relative, 1.0 + relative]
 }
 
