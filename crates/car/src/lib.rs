@@ -41,6 +41,8 @@ mod step;
 #[cfg(feature = "std")]
 pub mod stroke;
 #[cfg(feature = "std")]
+pub mod template;
+#[cfg(feature = "std")]
 mod vehicle;
 
 pub use discretisation::Discretisation;
@@ -63,6 +65,7 @@ pub use self::{
     ratios_alone::TURBINE_SIDE_INERTIA_KG_M2,
     sensors::{CurrentSensor, OUTLIER_A, ReadingErrors, Sensors, SpeedSensor},
     speed_trace::SpeedTrace,
+    template::{CarSize, TemplateError},
     vehicle::{
         CompliantRequirement, DesignRequirement, FilterSettings, PhaseSlips, Uncertainty, ValveUncertainty, Vehicle,
     },

@@ -5,6 +5,7 @@
 mod any_car;
 mod any_car_checks;
 mod any_car_logs;
+mod arrows;
 mod attacks;
 mod car_check;
 mod commands;

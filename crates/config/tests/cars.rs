@@ -1,9 +1,9 @@
 //! Vehicle files with a gearbox file, and drive files.
 
-use car::{ErrorBudget, ShiftPlan};
+use car::{Car, CarSize, ErrorBudget, ShiftPlan};
 use config::gearbox::SHIPPED;
 use config::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
-use config::{CarFile, DriveFile, Source, VehicleFile};
+use config::{CarFile, DriveFile, GearboxFile, Source, VehicleFile};
 
 const GEARBOX: &str = include_str!("../../../gearboxes/8hp.toml");
 
@@ -54,6 +54,49 @@ fn the_greatest_engine_torque_scales_what_depends_on_the_size_of_a_car() {
         let message = car(&format!("[engine]\nmax_torque_n_m = {wrong}\n")).unwrap_err();
         assert!(message.contains("car.toml:4"), "{wrong}: {message}");
     }
+}
+
+/// The template stands in the crate `car` as numbers and in `vehicles/eight_speed.toml` as the file that its sources explain.
+#[test]
+fn a_car_made_of_types_is_that_of_a_short_file_with_the_same_numbers() {
+    let gearbox = || Source::built_in("8hp.toml", include_str!("../../../gearboxes/8hp.toml"));
+    let description = || GearboxFile::from_source(gearbox()).unwrap().gearbox;
+    let file = |text: &str| {
+        let text = format!("name = \"car\"\ngearbox = \"8hp.toml\"\n{text}");
+        CarFile::from_sources(Source::built_in("car.toml", &text), gearbox()).unwrap().car
+    };
+    let (own, other) = (Car::template(description(), 1500.0).unwrap(), file(""));
+    // The ratio of the lowest gear is computed: what depends on it has another last digit.
+    let driveline = other.driveline;
+    assert!((own.driveline.shaft_stiffness_n_m_rad / driveline.shaft_stiffness_n_m_rad - 1.0).abs() < 1e-12);
+    assert!((own.driveline.shaft_damping_n_m_s_rad / driveline.shaft_damping_n_m_s_rad - 1.0).abs() < 1e-12);
+    assert_eq!(Car { name: other.name.clone(), driveline, ..own }, other);
+    let size = CarSize { mass_kg: 1900.0, engine_torque_n_m: 400.0, wheel_radius_m: 0.33, final_ratio: 2.8 };
+    let own = Car::of_size(description(), &size).unwrap();
+    let other = file(
+        "[engine]\nmax_torque_n_m = 400\n[driveline]\nfinal_ratio = 2.8\n[vehicle]\nmass_kg = 1900\nwheel_radius_m = 0.33\n",
+    );
+    let numbers = |car: &Car| {
+        let (line, road, converter) = (&car.driveline, &car.road, car.converter.unwrap());
+        [
+            car.engine.inertia_kg_m2,
+            car.engine.largest_torque(),
+            converter.capacity_n_m_s2.at(0.5),
+            line.final_ratio,
+            line.shaft_stiffness_n_m_rad,
+            line.shaft_damping_n_m_s_rad,
+            line.wheel_inertia_kg_m2,
+            car.tyre.max_force_n,
+            road.mass_kg,
+            road.wheel_radius_m,
+            road.rolling_moment_n_m,
+        ]
+    };
+    // A file has five digits.
+    for (own, other) in numbers(&own).into_iter().zip(numbers(&other)) {
+        assert!((own / other - 1.0).abs() < 5e-5, "{own} {other}");
+    }
+    assert_eq!((own.clutches, own.error_bounds), (other.clutches, other.error_bounds));
 }
 
 #[test]

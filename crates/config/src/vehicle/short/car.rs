@@ -4,6 +4,9 @@
 
 use std::ops::Range;
 
+use ::car::CarSize;
+use ::car::one_shift::{ENGINE_TORQUE_N_M, FINAL_RATIO};
+use ::car::template::{LOWEST_RATIO, MASS_KG, Scales, WHEEL_RADIUS_M};
 use geartrain::Gearbox;
 use toml::Spanned;
 use toml::de::DeValue;
@@ -11,17 +14,11 @@ use toml::de::DeValue;
 use super::complete::{DefaultTaken, Leaf, leaves, number_of, taken_of};
 use super::facts::{ENGINE_TORQUES_N_M, located};
 use super::first_file::exact;
-use super::{ENGINE_TORQUE_N_M, MASS_KG, WHEEL_RADIUS_M};
 use crate::check::Check;
 use crate::source::toml_number;
 use crate::vehicle::car::CarFile;
 use crate::vehicle::{FINAL_RATIOS, MASSES_KG, WHEEL_RADII_M};
 use crate::{ConfigError, GearboxFile, Source, toml_string};
-
-/// Ratio from turbine to wheels in the lowest gear of the car whose values are scaled.
-const LOWEST_GEAR: f64 = LOWEST_RATIO * 3.0;
-/// Its ratio of the gearbox alone.
-const LOWEST_RATIO: f64 = 108.0 / 23.0;
 
 /// Ratio from engine to wheels that no car's lowest gear has \[chosen\]: trucks have 60 with 16 gears, cars 8 to 25.
 const MOST_RATIO: f64 = 40.0;
@@ -47,25 +44,15 @@ pub struct CarFacts {
     pub engine_torque_n_m: f64,
 }
 
-/// Sizes of a car over those of the car that the defaults are of.
-struct Sizes {
-    torque: f64,
-    lowest_gear: f64,
-    mass: f64,
-    radius: f64,
-}
-
-impl Sizes {
-    /// The factor on a default; `None` where it does not depend on the size of a car.
-    fn factor(&self, key: &str) -> Option<f64> {
-        match key {
-            "engine.inertia_kg_m2" | "engine.torque.torque_n_m" | "converter.capacity_n_m_s2" => Some(self.torque),
-            "driveline.shaft_stiffness_n_m_rad" | "driveline.shaft_damping_n_m_s_rad" => Some(self.lowest_gear),
-            "driveline.wheel_inertia_kg_m2" => Some(self.mass * self.radius * self.radius),
-            "tyre.max_force_n" => Some(self.mass),
-            "vehicle.rolling_moment_n_m" => Some(self.mass * self.radius),
-            _ => None,
-        }
+/// The factor on a default; `None` where it does not depend on the size of a car.
+fn factor(scales: &Scales, key: &str) -> Option<f64> {
+    match key {
+        "engine.inertia_kg_m2" | "engine.torque.torque_n_m" | "converter.capacity_n_m_s2" => Some(scales.engine),
+        "driveline.shaft_stiffness_n_m_rad" | "driveline.shaft_damping_n_m_s_rad" => Some(scales.shafts),
+        "driveline.wheel_inertia_kg_m2" => Some(scales.wheels),
+        "tyre.max_force_n" => Some(scales.tyres),
+        "vehicle.rolling_moment_n_m" => Some(scales.rolling),
+        _ => None,
     }
 }
 
@@ -89,15 +76,14 @@ pub(in super::super) fn car_defaults(
     let Some(engine_torque_n_m) = number(&["engine", "max_torque_n_m"], ENGINE_TORQUES_N_M)? else {
         return Ok(shipped);
     };
-    let torque = engine_torque_n_m / ENGINE_TORQUE_N_M;
-    let final_ratio = number(&["driveline", "final_ratio"], FINAL_RATIOS)?.unwrap_or(3.0);
-    let sizes = Sizes {
-        torque,
-        lowest_gear: torque * lowest_ratio(gearbox) * final_ratio / LOWEST_GEAR,
-        mass: number(&["vehicle", "mass_kg"], MASSES_KG)?.map_or(1.0, |mass| mass / MASS_KG),
-        radius: number(&["vehicle", "wheel_radius_m"], WHEEL_RADII_M)?.map_or(1.0, |radius| radius / WHEEL_RADIUS_M),
+    let size = CarSize {
+        engine_torque_n_m,
+        final_ratio: number(&["driveline", "final_ratio"], FINAL_RATIOS)?.unwrap_or(FINAL_RATIO),
+        mass_kg: number(&["vehicle", "mass_kg"], MASSES_KG)?.unwrap_or(MASS_KG),
+        wheel_radius_m: number(&["vehicle", "wheel_radius_m"], WHEEL_RADII_M)?.unwrap_or(WHEEL_RADIUS_M),
     };
-    let text = scaled(&shipped, |key| sizes.factor(key))?;
+    let scales = size.scales(lowest_ratio(gearbox));
+    let text = scaled(&shipped, |key| factor(&scales, key))?;
     Ok(Source { path: format!("defaults of {}", source.path.to_string_lossy()).into(), text })
 }
 

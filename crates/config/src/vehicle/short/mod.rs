@@ -14,6 +14,7 @@ use ::car::one_shift::{
     ENGINE_TORQUE_N_M, FINAL_RATIO, MASS_ERROR, OFFGOING_N_M, OFFGOING_OPEN_N_M, OUTPUT_ERROR_N_M, PISTON_AREAS_M2,
     PLATE_RADII_M, RATIO_BEFORE, SHAFT_TORQUE_N_M, TORQUE_SHARES,
 };
+use ::car::template::{MASS_KG, WHEEL_RADIUS_M};
 use drivetrain::cylinder::{CAPACITY_M3_PA, FLOW_MAX_M3_S, LEAK_M3_S_PA, PASSAGE};
 use toml::de::DeValue;
 
@@ -117,8 +118,6 @@ fn numbers(values: &[f64]) -> String {
 }
 
 /// More of the car whose values are scaled: the built-in one.
-const MASS_KG: f64 = 1500.0;
-const WHEEL_RADIUS_M: f64 = 0.3;
 const WHEEL_INERTIA_KG_M2: f64 = 2.4;
 const TYRE_FORCE_N: f64 = 13_200.0;
 const STIFFNESS_N_M_RAD: f64 = 13_000.0;
