@@ -115,21 +115,15 @@ pub enum OneShiftError {
 /// What differs between a shift with a valve that is commanded by a current and one with a duty cycle.
 struct ByCommand {
     command_max: f64,
-    command_error: f64,
     valve: ValveUncertainty,
     /// Settling times of torque and inertia phase, s, then the same of the compliant observer.
     settling_s: [f64; 4],
 }
 
-const BY_CURRENT: ByCommand = ByCommand {
-    command_max: 1.2,
-    command_error: 0.01,
-    valve: ValveUncertainty::None,
-    settling_s: [0.15, 0.10, 0.10, 0.10],
-};
+const BY_CURRENT: ByCommand =
+    ByCommand { command_max: 1.2, valve: ValveUncertainty::None, settling_s: [0.15, 0.10, 0.10, 0.10] };
 const BY_DUTY_CYCLE: ByCommand = ByCommand {
     command_max: 100.0,
-    command_error: 0.5,
     valve: ValveUncertainty::PressureDrop((0.0, 40e3)),
     settling_s: [0.25, 0.18, 0.17, 0.13],
 };
@@ -236,7 +230,7 @@ impl<'c> OneShift<'c> {
             CommandKind::Current => &BY_CURRENT,
             CommandKind::DutyCycle => &BY_DUTY_CYCLE,
         };
-        let error_bounds = self.error_bounds(kind.command_error);
+        let error_bounds = self.error_bounds();
         let own = acceleration_errors(&self.reduced, &car.driveline, &car.road, &error_bounds);
         let [in_torque_phase, in_inertia_phase] = [0, 1].map(|phase| own[phase] / ACCELERATION_ERRORS_RAD_S2[phase]);
         let train = car.gearbox.train.as_ref();
@@ -284,7 +278,7 @@ impl<'c> OneShift<'c> {
     }
 
     /// The error budget of the shift. Numbers without a name are those of `vehicles/two_speed_at.toml`.
-    fn error_bounds(&self, command: f64) -> ErrorBounds {
+    fn error_bounds(&self) -> ErrorBounds {
         let (car, errors, element) = (self.car, &self.budget, &self.element);
         let torque_n_m = SHIFT_TORQUE * car.engine.largest_torque();
         let lower_gear = self.torque_size() * self.reduced.ratio_offgoing() / RATIO_BEFORE;
@@ -318,7 +312,7 @@ impl<'c> OneShift<'c> {
             line_pressure_pa: [element.pressure_max_pa; 2],
             fill: self.oncoming.standard_fill_budget(car.oil_temperature_degc),
             friction_factor: element.friction_factor,
-            command,
+            command: element.command,
             slip_rad_s: slip * 40.0,
             pressure_max_pa: element.pressure_max_pa,
             wheel_scale: errors.wheel_scale,

@@ -112,7 +112,6 @@ fn what_no_car_scales_is_that_of_the_vehicle_files_of_one_shift() {
                 bounds.sampling_delay_s,
                 bounds.float32_rounding,
                 bounds.command_age_s,
-                bounds.command,
                 bounds.wheel_delay_s,
                 bounds.channel_skew_s,
                 bounds.backlash_rad,
@@ -156,9 +155,11 @@ fn the_bounds_are_those_of_the_car_and_of_the_oncoming_element() {
     // C closes in 2-3: what the file says of it is taken, and what it says of E is not.
     car.error_bounds.elements[2].friction_factor = Some([0.95, 1.05]);
     car.error_bounds.elements[4].friction_factor = Some([0.5, 1.5]);
+    car.error_bounds.elements[2].command = Some(0.03);
     car.error_bounds.converter_share = Some(0.05);
     let vehicle = of(&car, "2-3").unwrap();
     assert_eq!(vehicle.error_bounds.friction_factor, [0.95, 1.05]);
+    assert_eq!(vehicle.error_bounds.command, 0.03);
     near(vehicle.error_bounds.turbine_torque_n_m, 0.05 * 133.0, 1e-9);
 }
 
