@@ -32,15 +32,6 @@ pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use trace::toml_string;
 pub use vehicle::{CarFile, DefaultTaken, VehicleFile};
 
-// The types that a file is read into, for the time in which their users still name this crate.
-pub use car::{
-    Car, CarErrorBounds, CompliantRequirement, CurrentSensor, DesignRequirement, Drive, DriveSegment,
-    ElementErrorBounds, ElementErrors, ErrorBounds, ErrorBudget, Experiment, FastFill, FilterSettings, GainMethod,
-    GivenGains, LockUp, ObserverEntry, ObserverKind, OffNominal, OneShiftError, Profile, ReadingErrors, SAMPLE_TIMES_S,
-    Scenario, Sensors, ShiftCalibration, ShiftClutch, ShiftPlan, ShiftSchedule, SpeedSensor, SpeedTrace,
-    TURBINE_SIDE_INERTIA_KG_M2, Uncertainty, ValveUncertainty, Vehicle,
-};
-
 /// A file is used as what it describes.
 macro_rules! file_of {
     ($file:ident, $field:ident: $described:ty) => {

@@ -142,7 +142,7 @@ fn the_lock_up_clutch_in_the_comments_of_the_shipped_file_is_right_and_has_every
     let begin = shipped.find("# [lock_up]").unwrap();
     let block = shipped[begin..].lines().take_while(|line| line.starts_with("# ")).map(|line| &line[2..]);
     let lock_up = car(&block.collect::<Vec<_>>().join("\n")).unwrap().lock_up.unwrap();
-    let config::LockUp { capacity_n_m, first_gear, on_rad_s, off_rad_s, ramp_s, slip_rad_s } = lock_up;
+    let car::LockUp { capacity_n_m, first_gear, on_rad_s, off_rad_s, ramp_s, slip_rad_s } = lock_up;
     assert_eq!((capacity_n_m, first_gear, on_rad_s, off_rad_s, ramp_s, slip_rad_s), (300.0, 3, 140.0, 110.0, 0.5, 4.0));
 }
 
@@ -216,7 +216,7 @@ fn a_key_of_the_file_replaces_that_of_the_eight_speed_car() {
 #[test]
 fn a_table_fill_gives_the_pistons_a_stroke() {
     let strokes = |text: &str| -> Vec<Option<f64>> {
-        let mm = |clutch: &config::ShiftClutch| 1e3 * clutch.cylinder.stroke_m3 / clutch.clutch.piston_area_m2;
+        let mm = |clutch: &car::ShiftClutch| 1e3 * clutch.cylinder.stroke_m3 / clutch.clutch.piston_area_m2;
         let car = car(text).unwrap();
         car.clutches.iter().flatten().map(|clutch| clutch.has_stroke.then(|| mm(clutch))).collect()
     };

@@ -54,9 +54,11 @@ impl CarFile {
 
 #[cfg(test)]
 mod tests {
+    use car::Car;
+
     use super::*;
+    use crate::Source;
     use crate::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
-    use crate::{Car, Source};
 
     const GEARBOX: &str = include_str!("../../../../gearboxes/8hp.toml");
 
