@@ -195,7 +195,7 @@ impl Contacts {
         let at_zero = &at_zero[..count];
         let state = CarState { motion: train.without_slip(state.motion, at_zero)?, ..*state };
         let others = Self::new(model, states)?;
-        let torques = model.applied(&others, &state, inputs);
+        let torques = model.applied(&others, &state, &model.acting(inputs));
         let free = others.accelerations_rad_s2(&model.ends_n_m(&torques), &torques.elements_n_m);
         let problem = train.problem(at_zero, |element| {
             (train.slip(&free, element), model.holding_limits(element, &state, inputs).unwrap_or((0.0, 0.0)))

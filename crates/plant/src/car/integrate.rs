@@ -1,7 +1,7 @@
 //! Steps within one set of contacts, and the events between them.
 
 use super::contacts::Contacts;
-use super::model::{CarInputs, CarModel, CarState, CarTorques, MAX_PACKS, Part, STATES, STATES_WITH_STROKE};
+use super::model::{Acting, CarInputs, CarModel, CarState, CarTorques, MAX_PACKS, Part, STATES, STATES_WITH_STROKE};
 use crate::gear_train::{MAX_ELEMENTS, TrainError};
 use crate::hybrid::root;
 use crate::rosenbrock::{self, SHORTEST_STEP_S, StepSize, Tolerance, Trial};
@@ -82,17 +82,39 @@ impl CarStep<'_> {
 /// Time, state and contacts of the car, and how to carry them on.
 #[derive(Debug, Clone)]
 pub struct CarIntegrator {
-    /// Time, s.
-    pub time_s: f64,
-    /// Continuous state.
-    pub state: CarState,
-    /// Which elements stick.
-    pub contacts: Contacts,
+    time_s: f64,
+    state: CarState,
+    contacts: Contacts,
     step_size: StepSize,
     relative_tolerance: f64,
+    /// The right-hand side at the state, found at the end of the last step, and the inputs under which it holds.
+    known: Option<(CarInputs, Rates<STATES_WITH_STROKE>)>,
+}
+
+/// The right-hand side at one state: derivative, and the torques that make it but for those of the sticking elements.
+type Rates<const N: usize> = ([f64; N], CarTorques);
+
+/// The first `M` of `N` numbers; those beyond are zero.
+fn resized<const N: usize, const M: usize>(x: &[f64; N]) -> [f64; M] {
+    std::array::from_fn(|i| if i < N { x[i] } else { 0.0 })
 }
 
 impl CarIntegrator {
+    /// Time, s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Continuous state.
+    pub fn state(&self) -> &CarState {
+        &self.state
+    }
+
+    /// Which elements stick.
+    pub fn contacts(&self) -> &Contacts {
+        &self.contacts
+    }
+
     /// Starts at this time and state. Elements without slip stick if they can hold.
     ///
     /// # Errors
@@ -102,7 +124,8 @@ impl CarIntegrator {
             return Err(TrainError::NotFinite.into());
         }
         let (contacts, state) = Contacts::settle(model, &[None; MAX_ELEMENTS], None, &state, inputs)?;
-        Ok(Self { time_s, state, contacts, step_size: StepSize::FIRST, relative_tolerance: RELATIVE_TOLERANCE })
+        let (step_size, relative_tolerance) = (StepSize::FIRST, RELATIVE_TOLERANCE);
+        Ok(Self { time_s, state, contacts, step_size, relative_tolerance, known: None })
     }
 
     /// The same with another relative tolerance of a step.
@@ -140,21 +163,26 @@ impl CarIntegrator {
         until_s: f64,
         record: &mut impl FnMut(&CarStep<'_>),
     ) -> Result<(), CarError> {
-        let mut slope = model.rates::<N>(&self.contacts, &self.state.to_array(), inputs);
+        let acting = model.acting(inputs);
+        let mut rates: Rates<N> = match self.known.take() {
+            Some((same, (slope, applied))) if same == *inputs => (resized(&slope), applied),
+            _ => model.rates(&self.contacts, &self.state.to_array(), &acting),
+        };
         let mut changes = 0;
         while until_s - self.time_s > SAME_INSTANT_S {
             let mut size = self.step_size;
-            let accepted = size.accepted(until_s - self.time_s, |h| self.trial::<N, ROWS>(model, inputs, &slope, h));
+            let accepted = size.accepted(until_s - self.time_s, |h| self.trial::<N, ROWS>(model, &acting, &rates, h));
             self.step_size = size;
-            let (step_s, trial) = accepted.ok_or(CarError::Diverged { time_s: self.time_s })?;
-            let Some((theta, element)) = self.first_event(model, inputs, &trial) else {
-                self.take(&trial, step_s, inputs, record);
-                slope = (trial.end_slope, trial.end_applied);
+            // Looked at where it is: a trial is large, and a copy costs as much as a stage.
+            let Some((step_s, trial)) = &accepted else { return Err(CarError::Diverged { time_s: self.time_s }) };
+            let Some((theta, element)) = self.first_event(model, &acting, trial) else {
+                self.take(trial, *step_s, inputs, record);
+                rates = (trial.end_slope, trial.end_applied);
                 changes = 0;
                 continue;
             };
             // Repeat the step up to the event, so that its state has the accuracy of a step and not of the interpolant.
-            let to_event = self.trial::<N, ROWS>(model, inputs, &slope, theta * step_s);
+            let to_event = self.trial::<N, ROWS>(model, &acting, &rates, theta * step_s);
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
             if changes > MOST_CHANGES {
                 return Err(CarError::Chatter { time_s: self.time_s });
@@ -162,9 +190,10 @@ impl CarIntegrator {
             self.take(&to_event, theta * step_s, inputs, record);
             (self.contacts, self.state) =
                 Contacts::settle(model, self.contacts.states(), element, &self.state, inputs)?;
-            slope = model.rates(&self.contacts, &self.state.to_array(), inputs);
+            rates = model.rates(&self.contacts, &self.state.to_array(), &acting);
         }
         self.time_s = until_s;
+        self.known = Some((*inputs, (resized(&rates.0), rates.1)));
         Ok(())
     }
 
@@ -200,13 +229,13 @@ impl CarIntegrator {
     fn trial<const N: usize, const ROWS: usize>(
         &self,
         model: &CarModel,
-        inputs: &CarInputs,
-        (slope, applied): &([f64; N], CarTorques),
+        acting: &Acting<'_>,
+        (slope, applied): &Rates<N>,
         step_s: f64,
     ) -> Trial<N, CarTorques> {
-        let f = |x: &[f64; N]| model.rates(&self.contacts, x, inputs).0;
-        let at_end = |x: &[f64; N]| model.rates(&self.contacts, x, inputs);
-        let rows: [_; ROWS] = model.stiff_rows(&self.state, applied.tyre_n, inputs);
+        let f = |x: &[f64; N]| model.rates(&self.contacts, x, acting).0;
+        let at_end = |x: &[f64; N]| model.rates(&self.contacts, x, acting);
+        let rows: [_; ROWS] = model.stiff_rows(&self.state, applied.tyre_n, acting);
         let tolerance = Tolerance { relative: self.relative_tolerance, scale: CarState::scale() };
         rosenbrock::step(&f, &at_end, &self.state.to_array(), slope, &rows, step_s, &tolerance)
     }
@@ -216,20 +245,21 @@ impl CarIntegrator {
     fn first_event<const N: usize>(
         &self,
         model: &CarModel,
-        inputs: &CarInputs,
+        acting: &Acting<'_>,
         trial: &Trial<N, CarTorques>,
     ) -> Option<(f64, Option<usize>)> {
         let end = CarState::from_array(&trial.end);
-        let at_end = self.margins(model, inputs, &end, &trial.end_applied);
+        let at_end = self.margins(model, acting.inputs, &end, &trial.end_applied);
         let used_up = (0..2 * MAX_ELEMENTS).filter(|&at| at_end[at] < 0.0);
-        let crossing = |at: usize| {
-            let margin = |theta: f64| {
-                let state = CarState::from_array(&trial.at(theta));
-                let applied = model.applied(&self.contacts, &state, inputs);
-                self.margins(model, inputs, &state, &applied)[at]
-            };
-            (root(margin), at)
+        let margin = |at: usize, x: &CarState| match at.checked_sub(MAX_ELEMENTS) {
+            Some(element) => self.kiss_margin(model, x, element),
+            None if self.contacts.of(at) == Some(Contact::Stuck) => {
+                let held = self.held_n_m(model, &model.applied(&self.contacts, x, acting));
+                holding_margin(model, acting.inputs, x, at, held[at])
+            }
+            None => self.slip_margin(model, x, at),
         };
+        let crossing = |at: usize| (root(|theta| margin(at, &CarState::from_array(&trial.at(theta)))), at);
         let (theta, at) = used_up.map(crossing).min_by(|a, b| a.0.total_cmp(&b.0))?;
         let slides = at < MAX_ELEMENTS && matches!(self.contacts.of(at), Some(Contact::Slipping(_)));
         Some((theta, slides.then_some(at)))
@@ -241,24 +271,48 @@ impl CarIntegrator {
     fn margins(&self, model: &CarModel, inputs: &CarInputs, x: &CarState, applied: &CarTorques) -> Margins {
         let mut margins = [f64::INFINITY; 2 * MAX_ELEMENTS];
         for &element in self.contacts.sliding() {
-            if let Some(Contact::Slipping(direction)) = self.contacts.of(element)
-                && !self.contacts.is_kept(element)
-            {
-                margins[element] = Direction::sign(direction) * model.slip(x, element) + SLACK;
-            }
-            if let Part::Friction(slot, clutch) = &model.parts[element] {
-                let beyond_kiss_pa = CarModel::plates_pa(*slot, clutch, x) - clutch.clutch.kiss_pressure();
-                let sign = if self.contacts.of(element).is_some() { 1.0 } else { -1.0 };
-                margins[MAX_ELEMENTS + element] = sign * PER_PA * beyond_kiss_pa + SLACK;
-            }
+            margins[element] = self.slip_margin(model, x, element);
+            margins[MAX_ELEMENTS + element] = self.kiss_margin(model, x, element);
         }
-        let held = self.contacts.holding_n_m(&model.ends_n_m(applied), &applied.elements_n_m);
+        let held = self.held_n_m(model, applied);
         for &element in self.contacts.stuck() {
-            let (lower, upper) = model.holding_limits(element, x, inputs).unwrap_or((0.0, 0.0));
-            // The contact solver counts in shares of the limits.
-            let slack = |limit: f64| TORQUE_SLACK * (1.0 + limit.abs());
-            margins[element] = (upper - held[element] + slack(upper)).min(held[element] - lower + slack(lower));
+            margins[element] = holding_margin(model, inputs, x, element, held[element]);
         }
         margins
     }
+
+    /// Slip of an element that slips, in its direction, rad/s.
+    #[inline]
+    fn slip_margin(&self, model: &CarModel, x: &CarState, element: usize) -> f64 {
+        match self.contacts.of(element) {
+            Some(Contact::Slipping(direction)) if !self.contacts.is_kept(element) => {
+                Direction::sign(direction) * model.slip(x, element) + SLACK
+            }
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Pressure of a friction element that does not stick from its kiss point, on the side on which it is.
+    #[inline]
+    fn kiss_margin(&self, model: &CarModel, x: &CarState, element: usize) -> f64 {
+        let Part::Friction(slot, clutch) = &model.parts[element] else { return f64::INFINITY };
+        let beyond_kiss_pa = CarModel::plates_pa(*slot, clutch, x) - clutch.clutch.kiss_pressure();
+        let sign = if self.contacts.of(element).is_some() { 1.0 } else { -1.0 };
+        sign * PER_PA * beyond_kiss_pa + SLACK
+    }
+
+    /// Torque of each sticking element under these torques of the others, N m.
+    #[inline]
+    fn held_n_m(&self, model: &CarModel, applied: &CarTorques) -> [f64; MAX_ELEMENTS] {
+        self.contacts.holding_n_m(&model.ends_n_m(applied), &applied.elements_n_m)
+    }
+}
+
+/// What a sticking element could hold beyond what it does, N m.
+#[inline]
+fn holding_margin(model: &CarModel, inputs: &CarInputs, x: &CarState, element: usize, held_n_m: f64) -> f64 {
+    let (lower, upper) = model.holding_limits(element, x, inputs).unwrap_or((0.0, 0.0));
+    // The contact solver counts in shares of the limits.
+    let slack = |limit: f64| TORQUE_SLACK * (1.0 + limit.abs());
+    (upper - held_n_m + slack(upper)).min(held_n_m - lower + slack(lower))
 }

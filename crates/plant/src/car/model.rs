@@ -1,8 +1,8 @@
 //! The equations of the car.
 
 use car::{Car, ShiftClutch};
-use drivetrain::Driveline;
 use drivetrain::clutch::drag_torque;
+use drivetrain::{ColumnPlace, Driveline};
 use geartrain::ElementKind;
 
 use super::contacts::Contacts;
@@ -127,6 +127,16 @@ pub struct CarInputs {
     pub dogs: [bool; MAX_ELEMENTS],
     /// Torque that the lock-up clutch holds, N m; without a converter it holds any torque.
     pub lock_up_n_m: f64,
+}
+
+/// Inputs with what follows from them alone, found once for a segment of the integration.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Acting<'u> {
+    pub(super) inputs: &'u CarInputs,
+    /// Where the throttle lies in the engine's map.
+    throttle: ColumnPlace<f64>,
+    /// Deceleration by the grade, m/s^2.
+    grade_m_s2: f64,
 }
 
 /// Torques and speeds at one instant.
@@ -281,9 +291,20 @@ impl CarModel {
         }
     }
 
+    /// These inputs on this car.
+    #[inline]
+    pub(super) fn acting<'u>(&self, inputs: &'u CarInputs) -> Acting<'u> {
+        Acting {
+            inputs,
+            throttle: self.car.engine.torque_n_m.place(inputs.throttle),
+            grade_m_s2: grade_m_s2(inputs.grade_rad),
+        }
+    }
+
     /// Every torque but those of the sticking elements, which stay zero.
     #[inline]
-    pub(super) fn applied(&self, contacts: &Contacts, x: &CarState, u: &CarInputs) -> CarTorques {
+    pub(super) fn applied(&self, contacts: &Contacts, x: &CarState, acting: &Acting<'_>) -> CarTorques {
+        let u = acting.inputs;
         let [engine_rad_s, turbine_rad_s, output_rad_s] = self.speeds(x);
         let car = &self.car;
         let (pump_n_m, converter_n_m) = match &car.converter {
@@ -293,7 +314,7 @@ impl CarModel {
             }
             None => (0.0, 0.0),
         };
-        let engine_n_m = car.engine.torque(engine_rad_s, u.throttle);
+        let engine_n_m = car.engine.torque_n_m.at_place(engine_rad_s, &acting.throttle);
         let twist_rate = car.driveline.twist_rate(output_rad_s, x.wheel_rad_s);
         let mut elements_n_m = [0.0; MAX_ELEMENTS];
         for &element in contacts.sliding() {
@@ -327,7 +348,7 @@ impl CarModel {
 
     /// Every torque at this state.
     pub fn torques(&self, contacts: &Contacts, x: &CarState, u: &CarInputs) -> CarTorques {
-        let mut torques = self.applied(contacts, x, u);
+        let mut torques = self.applied(contacts, x, &self.acting(u));
         let ends = self.ends_n_m(&torques);
         let held: [f64; MAX_ELEMENTS] = contacts.holding_n_m(&ends, &torques.elements_n_m);
         for &element in contacts.stuck() {
@@ -342,10 +363,10 @@ impl CarModel {
         &self,
         contacts: &Contacts,
         x: &[f64; N],
-        u: &CarInputs,
+        acting: &Acting<'_>,
     ) -> ([f64; N], CarTorques) {
-        let x = CarState::from_array(x);
-        let torques = self.applied(contacts, &x, u);
+        let (x, u) = (CarState::from_array(x), acting.inputs);
+        let torques = self.applied(contacts, &x, acting);
         let (car, ends) = (&self.car, self.ends_n_m(&torques));
         let road = &car.road;
         let (mut valves_pa, mut volumes_m3) = ([0.0; MAX_PACKS], [0.0; MAX_PACKS]);
@@ -366,7 +387,7 @@ impl CarModel {
         let rates = CarState {
             twist_rad: car.driveline.twist_rate(torques.output_rad_s, x.wheel_rad_s),
             wheel_rad_s: wheel_n_m / car.driveline.wheel_inertia_kg_m2,
-            vehicle_m_s: self.vehicle_acceleration(&x, torques.tyre_n, u),
+            vehicle_m_s: self.acceleration_under(&x, torques.tyre_n, acting.grade_m_s2),
             motion: contacts.accelerations_rad_s2(&ends, &torques.elements_n_m),
             valves_pa,
             volumes_m3,
@@ -374,11 +395,17 @@ impl CarModel {
         (rates.to_array(), torques)
     }
 
-    /// `m dv/dt = F_x - F_A - F_G`, m/s^2.
+    /// Acceleration of the vehicle under this force of the tyres, m/s^2.
     #[inline]
     pub fn vehicle_acceleration(&self, x: &CarState, tyre_n: f64, u: &CarInputs) -> f64 {
+        self.acceleration_under(x, tyre_n, grade_m_s2(u.grade_rad))
+    }
+
+    /// `m dv/dt = F_x - F_A - F_G`, m/s^2.
+    #[inline]
+    fn acceleration_under(&self, x: &CarState, tyre_n: f64, grade_m_s2: f64) -> f64 {
         let road = &self.car.road;
-        (tyre_n - road.drag_force(x.vehicle_m_s)) / road.mass_kg - drivetrain::road::GRAVITY_M_S2 * u.grade_rad.sin()
+        (tyre_n - road.drag_force(x.vehicle_m_s)) / road.mass_kg - grade_m_s2
     }
 
     /// The equations that are stiff: that of the wheel, and with a stroke those of the oil in the cylinders, as many as are
@@ -388,10 +415,10 @@ impl CarModel {
         &self,
         x: &CarState,
         tyre_n: f64,
-        u: &CarInputs,
+        acting: &Acting<'_>,
     ) -> [StiffRow<N>; ROWS] {
         let mut rows = [StiffRow::none(); ROWS];
-        rows[0] = self.wheel_row(x, tyre_n, u);
+        rows[0] = self.wheel_row(x, tyre_n, acting.inputs.brake_n_m);
         for part in &self.parts {
             if let Part::Friction(slot, clutch) = part
                 && let Some(row) = rows.get_mut(1 + slot)
@@ -408,7 +435,7 @@ impl CarModel {
 
     /// The wheel's equation, which tyre and brake make stiff.
     #[inline]
-    fn wheel_row<const N: usize>(&self, x: &CarState, tyre_n: f64, u: &CarInputs) -> StiffRow<N> {
+    fn wheel_row<const N: usize>(&self, x: &CarState, tyre_n: f64, brake_n_m: f64) -> StiffRow<N> {
         let (road, line) = (&self.car.road, &self.car.driveline);
         let radius = road.wheel_radius_m;
         let grip = self.car.tyre.damping(radius * x.wheel_rad_s, x.vehicle_m_s, tyre_n);
@@ -417,7 +444,7 @@ impl CarModel {
             if in_gap { (0.0, 0.0) } else { (line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad) };
         let by_inertia = |torque: f64| torque / line.wheel_inertia_kg_m2;
         let mut gradient = [0.0; N];
-        gradient[WHEEL] = by_inertia(-(radius * radius * grip + damping + brake_slope(u.brake_n_m, x.wheel_rad_s)));
+        gradient[WHEEL] = by_inertia(-(radius * radius * grip + damping + brake_slope(brake_n_m, x.wheel_rad_s)));
         gradient[VEHICLE] = by_inertia(radius * grip);
         gradient[TWIST] = by_inertia(stiffness);
         let by_output = by_inertia(damping / line.final_ratio);
@@ -441,6 +468,10 @@ impl CarModel {
         *motion.get_mut(train.len())? = engine_rad_s;
         Some(motion)
     }
+}
+
+fn grade_m_s2(grade_rad: f64) -> f64 {
+    drivetrain::road::GRAVITY_M_S2 * grade_rad.sin()
 }
 
 fn brake(torque_n_m: f64, wheel_rad_s: f64) -> f64 {

@@ -98,7 +98,7 @@ impl<'m> CarRun<'m> {
 
     /// The state.
     pub fn state(&self) -> &CarState {
-        &self.plant.state
+        self.plant.state()
     }
 
     /// Asks for a gear; see [`CarShiftController::request`].
@@ -142,15 +142,15 @@ impl<'m> CarRun<'m> {
         mut record: impl FnMut(&CarSample),
     ) -> Result<(), CarError> {
         let (model, now_s) = (self.model, self.time_s());
-        let [engine_rad_s, ..] = model.speeds(&self.plant.state);
+        let [engine_rad_s, ..] = model.speeds(self.plant.state());
         let driver = Driver { throttle: driver.throttle.max(idle_throttle(engine_rad_s)), ..driver };
-        self.commands = self.controller.step(now_s, driver.throttle, &measure(model, &self.plant.state, driver));
+        self.commands = self.controller.step(now_s, driver.throttle, &measure(model, self.plant.state(), driver));
         self.valves.send(model, now_s, &self.commands.elements);
         self.periods += 1;
         let end_s = self.time_s();
         let shown = self.controller.shown(now_s);
-        while self.plant.time_s < end_s - SAME_INSTANT_S {
-            let inputs = inputs(model, &mut self.valves, &self.commands, driver, self.plant.time_s + SAME_INSTANT_S);
+        while self.plant.time_s() < end_s - SAME_INSTANT_S {
+            let inputs = inputs(model, &mut self.valves, &self.commands, driver, self.plant.time_s() + SAME_INSTANT_S);
             let until_s = self.valves.next_arrival_s().map_or(end_s, |arrival| arrival.min(end_s));
             let (commands, samples, sample_time_s) = (&self.commands, &mut self.samples, self.sample_time_s);
             self.plant.advance(model, &inputs, until_s, &mut |step| {

@@ -62,12 +62,12 @@ fn the_two_speed_plant_and_the_general_one_agree_under_the_same_commands() {
         let (now, next) = (&pair[0], &pair[1]);
         valves.send(&model, now.time_s, &commands(now));
         inputs.throttle = now.commands.throttle;
-        while plant.time_s < next.time_s - 1e-9 {
-            inputs.settled_pa = valves.settled_pa(&model, plant.time_s + 1e-9);
+        while plant.time_s() < next.time_s - 1e-9 {
+            inputs.settled_pa = valves.settled_pa(&model, plant.time_s() + 1e-9);
             let until_s = valves.next_arrival_s().map_or(next.time_s, |arrival| arrival.min(next.time_s));
             plant.advance(&model, &inputs, until_s, &mut |_| {}).unwrap();
         }
-        let [engine, turbine, output] = model.speeds(&plant.state);
+        let [engine, turbine, output] = model.speeds(plant.state());
         let far = |a: f64, b: f64, unit: f64| (a - b).abs() / unit;
         let x = &next.state;
         // Units in which the integration's tolerance of 1e-5 for each step adds up to some 1e-3 over the shift.
@@ -75,10 +75,10 @@ fn the_two_speed_plant_and_the_general_one_agree_under_the_same_commands() {
             far(engine, x.engine_rad_s, 100.0),
             far(turbine, x.turbine_rad_s, 100.0),
             far(output, x.output_rad_s, 100.0),
-            far(plant.state.twist_rad, x.twist_rad, 0.1),
-            far(plant.state.vehicle_m_s, x.vehicle_m_s, 10.0),
-            far(model.pressure_pa(&plant.state, 0), next.offgoing_pa, 1e6),
-            far(model.pressure_pa(&plant.state, 1), next.oncoming_pa, 1e6),
+            far(plant.state().twist_rad, x.twist_rad, 0.1),
+            far(plant.state().vehicle_m_s, x.vehicle_m_s, 10.0),
+            far(model.pressure_pa(plant.state(), 0), next.offgoing_pa, 1e6),
+            far(model.pressure_pa(plant.state(), 1), next.oncoming_pa, 1e6),
         ];
         let worst = distance.into_iter().fold(0.0, f64::max);
         assert!(worst < 2e-3, "{:.3} s: {distance:?}", next.time_s);

@@ -54,7 +54,7 @@ fn inputs(throttle: f64) -> CarInputs {
 }
 
 fn accelerations(model: &CarModel, contacts: &Contacts, x: &CarState, u: &CarInputs) -> [f64; MAX_FREEDOMS] {
-    let torques = model.applied(contacts, x, u);
+    let torques = model.applied(contacts, x, &model.acting(u));
     contacts.accelerations_rad_s2(&model.ends_n_m(&torques), &torques.elements_n_m)
 }
 
