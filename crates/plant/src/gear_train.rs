@@ -139,13 +139,25 @@ impl TrainModel {
     /// Slip of an element, rad/s.
     #[inline]
     pub fn slip(&self, motion: &[f64; MAX_FREEDOMS], element: usize) -> f64 {
-        dot(&self.slips[element], motion)
+        self.slip_of::<MAX_FREEDOMS>(motion, element)
+    }
+
+    /// The same, of `F` degrees of freedom.
+    #[inline]
+    pub(crate) fn slip_of<const F: usize>(&self, motion: &[f64], element: usize) -> f64 {
+        dot(&self.slips[element][..F], &motion[..F])
     }
 
     /// Speeds of input and output, rad/s.
     #[inline]
     pub fn ends(&self, motion: &[f64; MAX_FREEDOMS]) -> [f64; 2] {
-        [dot(&self.ends[0], motion), dot(&self.ends[1], motion)]
+        self.ends_of::<MAX_FREEDOMS>(motion)
+    }
+
+    /// The same, of `F` degrees of freedom.
+    #[inline]
+    pub(crate) fn ends_of<const F: usize>(&self, motion: &[f64]) -> [f64; 2] {
+        [dot(&self.ends[0][..F], &motion[..F]), dot(&self.ends[1][..F], &motion[..F])]
     }
 
     /// Kinetic energy, J.

@@ -22,6 +22,9 @@ pub struct Contacts {
     stuck_count: usize,
     sliding: [usize; MAX_ELEMENTS],
     sliding_count: usize,
+    /// Those that do not stick and may have a torque: all but open elements without drag.
+    driven: [usize; MAX_ELEMENTS],
+    driven_count: usize,
     /// Whether what sticks keeps the slip of an element as it is, as that of a one-way clutch beside a brake that holds.
     is_kept: [bool; MAX_ELEMENTS],
     /// `a_k`.
@@ -48,6 +51,8 @@ impl Contacts {
             stuck_count: 0,
             sliding: [0; MAX_ELEMENTS],
             sliding_count: 0,
+            driven: [0; MAX_ELEMENTS],
+            driven_count: 0,
             is_kept: [false; MAX_ELEMENTS],
             accelerations: [[0.0; MAX_FREEDOMS]; ENDS + MAX_ELEMENTS],
             holding: [[0.0; ENDS + MAX_ELEMENTS]; MAX_CONTACTS],
@@ -59,6 +64,11 @@ impl Contacts {
             };
             *list.get_mut(*count).ok_or(TrainError::TooLarge)? = element;
             *count += 1;
+            let drags = matches!(&model.parts[element], Part::Friction(_, clutch) if clutch.drag_n_m > 0.0);
+            if matches!(state, Some(Contact::Slipping(_))) || (state.is_none() && drags) {
+                contacts.driven[contacts.driven_count] = element;
+                contacts.driven_count += 1;
+            }
         }
         let sliding = contacts.sliding().to_vec();
         let ends = end_responses(train).into_iter().enumerate();
@@ -120,28 +130,45 @@ impl Contacts {
         &self.sliding[..self.sliding_count]
     }
 
-    /// Accelerations under torques on engine, input and output, and those of the elements that do not stick.
+    /// The elements that do not stick and may have a torque.
     #[inline]
+    pub(super) fn driven(&self) -> &[usize] {
+        &self.driven[..self.driven_count]
+    }
+
+    /// Accelerations under torques on engine, input and output, and those of the elements that do not stick.
     pub(super) fn accelerations_rad_s2(
         &self,
         ends_n_m: &[f64; ENDS],
         elements_n_m: &[f64; MAX_ELEMENTS],
     ) -> [f64; MAX_FREEDOMS] {
-        let mut sum = [0.0; MAX_FREEDOMS];
-        let mut add = |torque: f64, column: &[f64; MAX_FREEDOMS]| {
+        let mut sum = self.by_ends(ends_n_m);
+        for &element in self.sliding() {
+            self.add_element(element, elements_n_m[element], &mut sum);
+        }
+        sum
+    }
+
+    /// Accelerations of the first `F` motions under torques on engine, input and output.
+    #[inline]
+    pub(super) fn by_ends<const F: usize>(&self, ends_n_m: &[f64; ENDS]) -> [f64; F] {
+        let mut sum = [0.0; F];
+        for (torque, column) in ends_n_m.iter().zip(&self.accelerations) {
             for (sum, x) in sum.iter_mut().zip(column) {
                 *sum += torque * x;
             }
-        };
-        for (torque, column) in ends_n_m.iter().zip(&self.accelerations) {
-            add(*torque, column);
-        }
-        for &element in self.sliding() {
-            if elements_n_m[element] != 0.0 {
-                add(elements_n_m[element], &self.accelerations[ENDS + element]);
-            }
         }
         sum
+    }
+
+    /// Adds the accelerations of the first `F` motions under the torque of an element that does not stick.
+    #[inline]
+    pub(super) fn add_element<const F: usize>(&self, element: usize, torque_n_m: f64, sum: &mut [f64; F]) {
+        if torque_n_m != 0.0 {
+            for (sum, x) in sum.iter_mut().zip(&self.accelerations[ENDS + element]) {
+                *sum += torque_n_m * x;
+            }
+        }
     }
 
     /// Torque of each sticking element, N m.

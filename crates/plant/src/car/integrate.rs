@@ -1,8 +1,11 @@
 //! Steps within one set of contacts, and the events between them.
 
 use super::contacts::Contacts;
-use super::model::{Acting, CarInputs, CarModel, CarState, CarTorques, MAX_PACKS, Part, STATES, STATES_WITH_STROKE};
-use crate::gear_train::{MAX_ELEMENTS, TrainError};
+use super::model::{
+    Acting, CarInputs, CarModel, CarState, CarTorques, MAX_PACKS, Part, SMALL_FREEDOMS, SMALL_PACKS, STATES,
+    STATES_WITH_STROKE, states,
+};
+use crate::gear_train::{MAX_ELEMENTS, MAX_FREEDOMS, TrainError};
 use crate::hybrid::root;
 use crate::rosenbrock::{self, SHORTEST_STEP_S, StepSize, Tolerance, Trial};
 use crate::{Contact, Direction};
@@ -66,9 +69,13 @@ trait DenseOutput: std::fmt::Debug {
     fn state_at(&self, theta: f64) -> CarState;
 }
 
-impl<const N: usize> DenseOutput for Trial<N, CarTorques> {
+/// A step of a gearbox with `F` degrees of freedom and `P` friction elements.
+#[derive(Debug)]
+struct Step<'t, const N: usize, const F: usize, const P: usize>(&'t Trial<N, CarTorques>);
+
+impl<const N: usize, const F: usize, const P: usize> DenseOutput for Step<'_, N, F, P> {
     fn state_at(&self, theta: f64) -> CarState {
-        CarState::from_array(&self.at(theta))
+        CarState::from_array::<N, F, P>(&self.0.at(theta))
     }
 }
 
@@ -147,16 +154,23 @@ impl CarIntegrator {
         record: &mut impl FnMut(&CarStep<'_>),
     ) -> Result<(), CarError> {
         self.resettle(model, inputs)?;
-        // The oil in the cylinders is integrated only where it matters.
-        if model.has_stroke() {
-            self.advance_states::<STATES_WITH_STROKE, { 1 + MAX_PACKS }>(model, inputs, until_s, record)
-        } else {
-            self.advance_states::<STATES, 1>(model, inputs, until_s, record)
+        const F: usize = SMALL_FREEDOMS;
+        const P: usize = SMALL_PACKS;
+        const N: usize = states(F, P);
+        // The oil in the cylinders is integrated only where it matters, and a small gearbox without the room of a large one.
+        match (model.is_small(), model.has_stroke()) {
+            (true, false) => self.advance_states::<N, F, P, 1>(model, inputs, until_s, record),
+            (true, true) => self.advance_states::<{ N + P }, F, P, { 1 + P }>(model, inputs, until_s, record),
+            (false, false) => self.advance_states::<STATES, MAX_FREEDOMS, MAX_PACKS, 1>(model, inputs, until_s, record),
+            (false, true) => self.advance_states::<STATES_WITH_STROKE, MAX_FREEDOMS, MAX_PACKS, { 1 + MAX_PACKS }>(
+                model, inputs, until_s, record,
+            ),
         }
     }
 
-    /// As [`Self::advance`], for the first `N` states with this number of stiff rows.
-    fn advance_states<const N: usize, const ROWS: usize>(
+    /// As [`Self::advance`], for the `N` states of a gearbox with `F` degrees of freedom and `P` friction elements, with this number of stiff
+    /// rows.
+    fn advance_states<const N: usize, const F: usize, const P: usize, const ROWS: usize>(
         &mut self,
         model: &CarModel,
         inputs: &CarInputs,
@@ -166,31 +180,32 @@ impl CarIntegrator {
         let acting = model.acting(inputs);
         let mut rates: Rates<N> = match self.known.take() {
             Some((same, (slope, applied))) if same == *inputs => (resized(&slope), applied),
-            _ => model.rates(&self.contacts, &self.state.to_array(), &acting),
+            _ => model.rates::<N, F, P>(&self.contacts, &self.state.to_array::<N, F, P>(), &acting),
         };
         let mut changes = 0;
         while until_s - self.time_s > SAME_INSTANT_S {
             let mut size = self.step_size;
-            let accepted = size.accepted(until_s - self.time_s, |h| self.trial::<N, ROWS>(model, &acting, &rates, h));
+            let accepted =
+                size.accepted(until_s - self.time_s, |h| self.trial::<N, F, P, ROWS>(model, &acting, &rates, h));
             self.step_size = size;
             // Looked at where it is: a trial is large, and a copy costs as much as a stage.
             let Some((step_s, trial)) = &accepted else { return Err(CarError::Diverged { time_s: self.time_s }) };
-            let Some((theta, element)) = self.first_event(model, &acting, trial) else {
-                self.take(trial, *step_s, inputs, record);
+            let Some((theta, element)) = self.first_event::<N, F, P>(model, &acting, trial) else {
+                self.take::<N, F, P>(trial, *step_s, inputs, record);
                 rates = (trial.end_slope, trial.end_applied);
                 changes = 0;
                 continue;
             };
             // Repeat the step up to the event, so that its state has the accuracy of a step and not of the interpolant.
-            let to_event = self.trial::<N, ROWS>(model, &acting, &rates, theta * step_s);
+            let to_event = self.trial::<N, F, P, ROWS>(model, &acting, &rates, theta * step_s);
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
             if changes > MOST_CHANGES {
                 return Err(CarError::Chatter { time_s: self.time_s });
             }
-            self.take(&to_event, theta * step_s, inputs, record);
+            self.take::<N, F, P>(&to_event, theta * step_s, inputs, record);
             (self.contacts, self.state) =
                 Contacts::settle(model, self.contacts.states(), element, &self.state, inputs)?;
-            rates = model.rates(&self.contacts, &self.state.to_array(), &acting);
+            rates = model.rates::<N, F, P>(&self.contacts, &self.state.to_array::<N, F, P>(), &acting);
         }
         self.time_s = until_s;
         self.known = Some((*inputs, (resized(&rates.0), rates.1)));
@@ -212,7 +227,7 @@ impl CarIntegrator {
         Ok(())
     }
 
-    fn take<const N: usize>(
+    fn take<const N: usize, const F: usize, const P: usize>(
         &mut self,
         trial: &Trial<N, CarTorques>,
         step_s: f64,
@@ -220,35 +235,41 @@ impl CarIntegrator {
         record: &mut impl FnMut(&CarStep<'_>),
     ) {
         let end_s = self.time_s + step_s;
-        record(&CarStep { start_s: self.time_s, end_s, contacts: &self.contacts, inputs, trial });
+        record(&CarStep {
+            start_s: self.time_s,
+            end_s,
+            contacts: &self.contacts,
+            inputs,
+            trial: &Step::<N, F, P>(trial),
+        });
         self.time_s = end_s;
-        self.state = CarState::from_array(&trial.end);
+        self.state = CarState::from_array::<N, F, P>(&trial.end);
     }
 
     #[inline]
-    fn trial<const N: usize, const ROWS: usize>(
+    fn trial<const N: usize, const F: usize, const P: usize, const ROWS: usize>(
         &self,
         model: &CarModel,
         acting: &Acting<'_>,
         (slope, applied): &Rates<N>,
         step_s: f64,
     ) -> Trial<N, CarTorques> {
-        let f = |x: &[f64; N]| model.rates(&self.contacts, x, acting).0;
-        let at_end = |x: &[f64; N]| model.rates(&self.contacts, x, acting);
-        let rows: [_; ROWS] = model.stiff_rows(&self.state, applied.tyre_n, acting);
-        let tolerance = Tolerance { relative: self.relative_tolerance, scale: CarState::scale() };
-        rosenbrock::step(&f, &at_end, &self.state.to_array(), slope, &rows, step_s, &tolerance)
+        let f = |x: &[f64; N]| model.slope::<N, F, P>(&self.contacts, x, acting);
+        let at_end = |x: &[f64; N]| model.rates::<N, F, P>(&self.contacts, x, acting);
+        let rows: [_; ROWS] = model.stiff_rows::<N, F, P, ROWS>(&self.state, applied.tyre_n, acting);
+        let tolerance = Tolerance { relative: self.relative_tolerance, scale: CarState::scale::<N, F, P>() };
+        rosenbrock::step(&f, &at_end, &self.state.to_array::<N, F, P>(), slope, &rows, step_s, &tolerance)
     }
 
     /// Fraction of the step at which the first margin reaches zero, located on the dense output, and the element that has
     /// no slip there.
-    fn first_event<const N: usize>(
+    fn first_event<const N: usize, const F: usize, const P: usize>(
         &self,
         model: &CarModel,
         acting: &Acting<'_>,
         trial: &Trial<N, CarTorques>,
     ) -> Option<(f64, Option<usize>)> {
-        let end = CarState::from_array(&trial.end);
+        let end = CarState::from_array::<N, F, P>(&trial.end);
         let at_end = self.margins(model, acting.inputs, &end, &trial.end_applied);
         let used_up = (0..2 * MAX_ELEMENTS).filter(|&at| at_end[at] < 0.0);
         let margin = |at: usize, x: &CarState| match at.checked_sub(MAX_ELEMENTS) {
@@ -259,7 +280,7 @@ impl CarIntegrator {
             }
             None => self.slip_margin(model, x, at),
         };
-        let crossing = |at: usize| (root(|theta| margin(at, &CarState::from_array(&trial.at(theta)))), at);
+        let crossing = |at: usize| (root(|theta| margin(at, &CarState::from_array::<N, F, P>(&trial.at(theta)))), at);
         let (theta, at) = used_up.map(crossing).min_by(|a, b| a.0.total_cmp(&b.0))?;
         let slides = at < MAX_ELEMENTS && matches!(self.contacts.of(at), Some(Contact::Slipping(_)));
         Some((theta, slides.then_some(at)))

@@ -17,12 +17,19 @@ const TWIST: usize = 0;
 const WHEEL: usize = 1;
 const VEHICLE: usize = 2;
 const MOTION: usize = 3;
-const PRESSURE: usize = MOTION + MAX_FREEDOMS;
-const VOLUME: usize = PRESSURE + MAX_PACKS;
-/// Number of states of a car whose pistons have no stroke.
-pub(super) const STATES: usize = VOLUME;
-/// Number of states of a car whose pistons have one: the oil in the cylinders is added.
-pub(super) const STATES_WITH_STROKE: usize = VOLUME + MAX_PACKS;
+/// Number of states of a car with room for the largest gearbox, whose pistons have no stroke.
+pub(super) const STATES: usize = states(MAX_FREEDOMS, MAX_PACKS);
+/// Number of states of a car with room for the largest gearbox, whose pistons have one: the oil in the cylinders is added.
+pub(super) const STATES_WITH_STROKE: usize = STATES + MAX_PACKS;
+/// Degrees of freedom, engine included, and friction elements of a small gearbox, as one with a planetary set and two gears.
+pub(super) const SMALL_FREEDOMS: usize = 3;
+/// Friction elements of a small gearbox.
+pub(super) const SMALL_PACKS: usize = 2;
+
+/// Number of states with these degrees of freedom and friction elements whose pistons have no stroke.
+pub(super) const fn states(freedoms: usize, packs: usize) -> usize {
+    MOTION + freedoms + packs
+}
 
 /// Speed of the wheel, rad/s, over which the torque of the brake turns around: the brakes of a standing car creep instead of
 /// sticking, as its tyres do.
@@ -72,40 +79,40 @@ impl CarState {
         volumes_m3: [1e-6; MAX_PACKS],
     };
 
-    /// The size of each of the first `N` states.
-    pub(super) fn scale<const N: usize>() -> [f64; N] {
-        Self::SCALE.to_array()
+    /// The size of each state.
+    pub(super) fn scale<const N: usize, const F: usize, const P: usize>() -> [f64; N] {
+        Self::SCALE.to_array::<N, F, P>()
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        self.to_array::<STATES_WITH_STROKE>().iter().all(|x| x.is_finite())
+        self.to_array::<STATES_WITH_STROKE, MAX_FREEDOMS, MAX_PACKS>().iter().all(|x| x.is_finite())
     }
 
-    /// The first `N` states.
-    #[inline]
-    pub(super) fn to_array<const N: usize>(self) -> [f64; N] {
+    /// `N` states of a gearbox with `F` degrees of freedom and `P` friction elements; the oil only if there is room for it.
+    #[inline(always)]
+    pub(super) fn to_array<const N: usize, const F: usize, const P: usize>(self) -> [f64; N] {
         let mut x = [0.0; N];
         x[TWIST] = self.twist_rad;
         x[WHEEL] = self.wheel_rad_s;
         x[VEHICLE] = self.vehicle_m_s;
-        x[MOTION..PRESSURE].copy_from_slice(&self.motion);
-        x[PRESSURE..VOLUME].copy_from_slice(&self.valves_pa);
-        if N > VOLUME {
-            x[VOLUME..].copy_from_slice(&self.volumes_m3);
+        x[MOTION..MOTION + F].copy_from_slice(&self.motion[..F]);
+        x[MOTION + F..states(F, P)].copy_from_slice(&self.valves_pa[..P]);
+        if N > states(F, P) {
+            x[states(F, P)..].copy_from_slice(&self.volumes_m3[..P]);
         }
         x
     }
 
-    /// The state from its first `N` numbers; the others are zero.
-    #[inline]
-    pub(super) fn from_array<const N: usize>(x: &[f64; N]) -> Self {
+    /// The state from the numbers of [`Self::to_array`]; the others are zero.
+    #[inline(always)]
+    pub(super) fn from_array<const N: usize, const F: usize, const P: usize>(x: &[f64; N]) -> Self {
         Self {
             twist_rad: x[TWIST],
             wheel_rad_s: x[WHEEL],
             vehicle_m_s: x[VEHICLE],
-            motion: std::array::from_fn(|i| x[MOTION + i]),
-            valves_pa: std::array::from_fn(|i| x[PRESSURE + i]),
-            volumes_m3: std::array::from_fn(|i| if N > VOLUME { x[VOLUME + i] } else { 0.0 }),
+            motion: std::array::from_fn(|i| if i < F { x[MOTION + i] } else { 0.0 }),
+            valves_pa: std::array::from_fn(|i| if i < P { x[MOTION + F + i] } else { 0.0 }),
+            volumes_m3: std::array::from_fn(|i| if i < P && N > states(F, P) { x[states(F, P) + i] } else { 0.0 }),
         }
     }
 }
@@ -179,6 +186,7 @@ pub struct CarModel {
     pub(super) train: TrainModel,
     pub(super) parts: Vec<Part>,
     has_stroke: bool,
+    is_small: bool,
 }
 
 impl CarModel {
@@ -210,7 +218,8 @@ impl CarModel {
             return Err(TrainError::TooLarge);
         }
         let has_stroke = car.clutches.iter().flatten().any(|clutch| clutch.has_stroke);
-        Ok(Self { car, train, parts, has_stroke })
+        let is_small = train.freedoms <= SMALL_FREEDOMS && packs <= SMALL_PACKS;
+        Ok(Self { car, train, parts, has_stroke, is_small })
     }
 
     /// Place of the clutch between engine and gearbox input among the elements.
@@ -230,6 +239,12 @@ impl CarModel {
     #[inline]
     pub(super) fn has_stroke(&self) -> bool {
         self.has_stroke
+    }
+
+    /// Whether the state of a small gearbox has room for that of this one.
+    #[inline]
+    pub(super) fn is_small(&self) -> bool {
+        self.is_small
     }
 
     /// Pressure on the plates of the friction element that has this place among the pressures, Pa.
@@ -270,9 +285,16 @@ impl CarModel {
         (capacity > 0.0).then_some((-capacity, capacity))
     }
 
-    /// Torque of an element that slips or is open, N m.
-    #[inline]
-    fn sliding_torque(&self, element: usize, contact: Option<Contact>, slip: f64, x: &CarState, u: &CarInputs) -> f64 {
+    /// Torque of an element that slips or is open, N m. `plates_pa` gives the pressure on the plates of a friction element, Pa.
+    #[inline(always)]
+    fn sliding_torque(
+        &self,
+        element: usize,
+        contact: Option<Contact>,
+        slip: f64,
+        plates_pa: impl Fn(usize, &ShiftClutch) -> f64,
+        u: &CarInputs,
+    ) -> f64 {
         let direction = match contact {
             Some(Contact::Slipping(direction)) => direction.sign(),
             _ => 0.0,
@@ -281,7 +303,7 @@ impl CarModel {
             Part::Friction(slot, clutch) => {
                 let torque = match contact {
                     None => 0.0,
-                    Some(_) => direction * clutch.clutch.torque_capacity(Self::plates_pa(*slot, clutch, x), slip),
+                    Some(_) => direction * clutch.clutch.torque_capacity(plates_pa(*slot, clutch), slip),
                 };
                 if clutch.drag_n_m > 0.0 { torque + drag_torque(clutch.drag_n_m, slip) } else { torque }
             }
@@ -304,9 +326,21 @@ impl CarModel {
     /// Every torque but those of the sticking elements, which stay zero.
     #[inline]
     pub(super) fn applied(&self, contacts: &Contacts, x: &CarState, acting: &Acting<'_>) -> CarTorques {
-        let u = acting.inputs;
-        let [engine_rad_s, turbine_rad_s, output_rad_s] = self.speeds(x);
-        let car = &self.car;
+        let x = x.to_array::<STATES_WITH_STROKE, MAX_FREEDOMS, MAX_PACKS>();
+        let mut torques = self.sources::<STATES_WITH_STROKE, MAX_FREEDOMS>(&x, acting);
+        for &element in contacts.driven() {
+            torques.elements_n_m[element] =
+                self.sliding::<STATES_WITH_STROKE, MAX_FREEDOMS, MAX_PACKS>(element, contacts, &x, acting);
+        }
+        torques
+    }
+
+    /// Speeds, and every torque but those of the elements, which stay zero. Always inlined: it is most of the right-hand side of the integrator.
+    #[inline(always)]
+    fn sources<const N: usize, const F: usize>(&self, x: &[f64; N], acting: &Acting<'_>) -> CarTorques {
+        let (car, u) = (&self.car, acting.inputs);
+        let engine_rad_s = x[MOTION + self.train.freedoms - 1];
+        let [turbine_rad_s, output_rad_s] = self.train.ends_of::<F>(&x[MOTION..]);
         let (pump_n_m, converter_n_m) = match &car.converter {
             Some(converter) => {
                 let torques = converter.torques(engine_rad_s, turbine_rad_s);
@@ -315,12 +349,7 @@ impl CarModel {
             None => (0.0, 0.0),
         };
         let engine_n_m = car.engine.torque_n_m.at_place(engine_rad_s, &acting.throttle);
-        let twist_rate = car.driveline.twist_rate(output_rad_s, x.wheel_rad_s);
-        let mut elements_n_m = [0.0; MAX_ELEMENTS];
-        for &element in contacts.sliding() {
-            let slip = self.slip(x, element);
-            elements_n_m[element] = self.sliding_torque(element, contacts.of(element), slip, x, u);
-        }
+        let twist_rate = car.driveline.twist_rate(output_rad_s, x[WHEEL]);
         CarTorques {
             engine_rad_s,
             turbine_rad_s,
@@ -328,15 +357,32 @@ impl CarModel {
             engine_n_m: if engine_n_m > 0.0 { engine_n_m * u.engine_share } else { engine_n_m },
             pump_n_m,
             converter_n_m,
-            shaft_n_m: car.driveline.shaft_torque_with_backlash(x.twist_rad, twist_rate, car.backlash_rad),
-            brake_n_m: brake(u.brake_n_m, x.wheel_rad_s),
-            tyre_n: car.tyre.force(car.road.wheel_radius_m * x.wheel_rad_s, x.vehicle_m_s),
-            elements_n_m,
+            shaft_n_m: car.driveline.shaft_torque_with_backlash(x[TWIST], twist_rate, car.backlash_rad),
+            brake_n_m: brake(u.brake_n_m, x[WHEEL]),
+            tyre_n: car.tyre.force(car.road.wheel_radius_m * x[WHEEL], x[VEHICLE]),
+            elements_n_m: [0.0; MAX_ELEMENTS],
         }
     }
 
+    /// Torque of an element that slips or is open, N m.
+    #[inline(always)]
+    fn sliding<const N: usize, const F: usize, const P: usize>(
+        &self,
+        element: usize,
+        contacts: &Contacts,
+        x: &[f64; N],
+        acting: &Acting<'_>,
+    ) -> f64 {
+        let slip = self.train.slip_of::<F>(&x[MOTION..], element);
+        let plates_pa = |slot: usize, clutch: &ShiftClutch| {
+            let volume_m3 = if N > states(F, P) { x[states(F, P) + slot] } else { 0.0 };
+            clutch.pressure(x[MOTION + F + slot], volume_m3)
+        };
+        self.sliding_torque(element, contacts.of(element), slip, plates_pa, acting.inputs)
+    }
+
     /// Torques on engine, gearbox input and gearbox output, N m, without those of the elements.
-    #[inline]
+    #[inline(always)]
     pub(super) fn ends_n_m(&self, torques: &CarTorques) -> [f64; 3] {
         let drag = self.car.engine.drag_n_m_s * torques.engine_rad_s;
         [
@@ -359,75 +405,103 @@ impl CarModel {
 
     /// Time derivative of the state, and the torques that make it but for those of the sticking elements.
     #[inline]
-    pub(super) fn rates<const N: usize>(
+    pub(super) fn rates<const N: usize, const F: usize, const P: usize>(
         &self,
         contacts: &Contacts,
         x: &[f64; N],
         acting: &Acting<'_>,
     ) -> ([f64; N], CarTorques) {
-        let (x, u) = (CarState::from_array(x), acting.inputs);
-        let torques = self.applied(contacts, &x, acting);
-        let (car, ends) = (&self.car, self.ends_n_m(&torques));
-        let road = &car.road;
-        let (mut valves_pa, mut volumes_m3) = ([0.0; MAX_PACKS], [0.0; MAX_PACKS]);
+        let mut elements_n_m = [0.0; MAX_ELEMENTS];
+        let (rates, torques) =
+            self.rates_with::<N, F, P>(contacts, x, acting, |element, torque_n_m| elements_n_m[element] = torque_n_m);
+        (rates, CarTorques { elements_n_m, ..torques })
+    }
+
+    /// Time derivative of the state.
+    #[inline]
+    pub(super) fn slope<const N: usize, const F: usize, const P: usize>(
+        &self,
+        contacts: &Contacts,
+        x: &[f64; N],
+        acting: &Acting<'_>,
+    ) -> [f64; N] {
+        self.rates_with::<N, F, P>(contacts, x, acting, |_, _| {}).0
+    }
+
+    /// Time derivative of the state, and the torques without those of the elements, which are shown one after another.
+    #[inline(always)]
+    fn rates_with<const N: usize, const F: usize, const P: usize>(
+        &self,
+        contacts: &Contacts,
+        x: &[f64; N],
+        acting: &Acting<'_>,
+        mut show: impl FnMut(usize, f64),
+    ) -> ([f64; N], CarTorques) {
+        let (car, u) = (&self.car, acting.inputs);
+        let torques = self.sources::<N, F>(x, acting);
+        let mut motion = contacts.by_ends::<F>(&self.ends_n_m(&torques));
+        for &element in contacts.driven() {
+            let torque_n_m = self.sliding::<N, F, P>(element, contacts, x, acting);
+            contacts.add_element(element, torque_n_m, &mut motion);
+            show(element, torque_n_m);
+        }
+        let mut rates = [0.0; N];
         for part in &self.parts {
-            if let Part::Friction(slot, clutch) = part {
-                let (now, settled) = (x.valves_pa[*slot], u.settled_pa[*slot]);
-                // Most of a drive most pressures rest.
-                if now != settled {
-                    valves_pa[*slot] = clutch.valve.pressure_rate(now, settled);
-                }
-                volumes_m3[*slot] = clutch.volume_rate(x.volumes_m3[*slot], now);
+            let Part::Friction(slot, clutch) = part else { continue };
+            let (now, settled) = (x[MOTION + F + slot], u.settled_pa[*slot]);
+            // Most of a drive most pressures rest.
+            if now != settled {
+                rates[MOTION + F + slot] = clutch.valve.pressure_rate(now, settled);
+            }
+            if N > states(F, P) {
+                rates[states(F, P) + slot] = clutch.volume_rate(x[states(F, P) + slot], now);
             }
         }
+        let road = &car.road;
         let wheel_n_m = torques.shaft_n_m
-            - road.rolling_moment(x.wheel_rad_s)
+            - road.rolling_moment(x[WHEEL])
             - torques.brake_n_m
             - road.wheel_radius_m * torques.tyre_n;
-        let rates = CarState {
-            twist_rad: car.driveline.twist_rate(torques.output_rad_s, x.wheel_rad_s),
-            wheel_rad_s: wheel_n_m / car.driveline.wheel_inertia_kg_m2,
-            vehicle_m_s: self.acceleration_under(&x, torques.tyre_n, acting.grade_m_s2),
-            motion: contacts.accelerations_rad_s2(&ends, &torques.elements_n_m),
-            valves_pa,
-            volumes_m3,
-        };
-        (rates.to_array(), torques)
+        rates[TWIST] = car.driveline.twist_rate(torques.output_rad_s, x[WHEEL]);
+        rates[WHEEL] = wheel_n_m / car.driveline.wheel_inertia_kg_m2;
+        rates[VEHICLE] = self.acceleration_under(x[VEHICLE], torques.tyre_n, acting.grade_m_s2);
+        rates[MOTION..MOTION + F].copy_from_slice(&motion);
+        (rates, torques)
     }
 
     /// Acceleration of the vehicle under this force of the tyres, m/s^2.
     #[inline]
     pub fn vehicle_acceleration(&self, x: &CarState, tyre_n: f64, u: &CarInputs) -> f64 {
-        self.acceleration_under(x, tyre_n, grade_m_s2(u.grade_rad))
+        self.acceleration_under(x.vehicle_m_s, tyre_n, grade_m_s2(u.grade_rad))
     }
 
     /// `m dv/dt = F_x - F_A - F_G`, m/s^2.
     #[inline]
-    fn acceleration_under(&self, x: &CarState, tyre_n: f64, grade_m_s2: f64) -> f64 {
+    fn acceleration_under(&self, vehicle_m_s: f64, tyre_n: f64, grade_m_s2: f64) -> f64 {
         let road = &self.car.road;
-        (tyre_n - road.drag_force(x.vehicle_m_s)) / road.mass_kg - grade_m_s2
+        (tyre_n - road.drag_force(vehicle_m_s)) / road.mass_kg - grade_m_s2
     }
 
     /// The equations that are stiff: that of the wheel, and with a stroke those of the oil in the cylinders, as many as are
     /// asked for. `tyre_n` is the tyre's force at this state.
     #[inline]
-    pub(super) fn stiff_rows<const N: usize, const ROWS: usize>(
+    pub(super) fn stiff_rows<const N: usize, const F: usize, const P: usize, const ROWS: usize>(
         &self,
         x: &CarState,
         tyre_n: f64,
         acting: &Acting<'_>,
     ) -> [StiffRow<N>; ROWS] {
         let mut rows = [StiffRow::none(); ROWS];
-        rows[0] = self.wheel_row(x, tyre_n, acting.inputs.brake_n_m);
+        rows[0] = self.wheel_row::<N, F>(x, tyre_n, acting.inputs.brake_n_m);
         for part in &self.parts {
             if let Part::Friction(slot, clutch) = part
                 && let Some(row) = rows.get_mut(1 + slot)
             {
                 let (own, valve) = clutch.volume_rate_slopes(x.volumes_m3[*slot], x.valves_pa[*slot]);
                 let mut gradient = [0.0; N];
-                gradient[VOLUME + slot] = own;
-                gradient[PRESSURE + slot] = valve;
-                *row = StiffRow::new(VOLUME + slot, gradient);
+                gradient[states(F, P) + slot] = own;
+                gradient[MOTION + F + slot] = valve;
+                *row = StiffRow::new(states(F, P) + slot, gradient);
             }
         }
         rows
@@ -435,7 +509,7 @@ impl CarModel {
 
     /// The wheel's equation, which tyre and brake make stiff.
     #[inline]
-    fn wheel_row<const N: usize>(&self, x: &CarState, tyre_n: f64, brake_n_m: f64) -> StiffRow<N> {
+    fn wheel_row<const N: usize, const F: usize>(&self, x: &CarState, tyre_n: f64, brake_n_m: f64) -> StiffRow<N> {
         let (road, line) = (&self.car.road, &self.car.driveline);
         let radius = road.wheel_radius_m;
         let grip = self.car.tyre.damping(radius * x.wheel_rad_s, x.vehicle_m_s, tyre_n);
@@ -448,10 +522,15 @@ impl CarModel {
         gradient[VEHICLE] = by_inertia(radius * grip);
         gradient[TWIST] = by_inertia(stiffness);
         let by_output = by_inertia(damping / line.final_ratio);
-        for (entry, output) in gradient[MOTION..PRESSURE].iter_mut().zip(&self.train.ends[1]) {
+        for (entry, output) in gradient[MOTION..MOTION + F].iter_mut().zip(&self.train.ends[1]) {
             *entry = by_output * output;
         }
-        StiffRow::new(WHEEL, gradient)
+        // Of few states all may differ from zero: the compiler then knows where the row lies.
+        if F == SMALL_FREEDOMS {
+            StiffRow::of_states(WHEEL, TWIST..MOTION + F, gradient)
+        } else {
+            StiffRow::new(WHEEL, gradient)
+        }
     }
 
     /// Kinetic energy of engine and gearbox, J.
