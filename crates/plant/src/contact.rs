@@ -184,7 +184,6 @@ mod tests {
     /// Numbers from -1 to 1.
     fn random(state: &mut u64) -> f64 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        #[expect(clippy::cast_precision_loss, reason = "31 bits")]
         let value = (*state >> 33) as f64;
         value / f64::from(1_u32 << 30) - 1.0
     }

@@ -196,7 +196,6 @@ pub fn step<const N: usize, const ROWS: usize, E>(
         let share = error[i] / allowed;
         share * share
     };
-    #[expect(clippy::cast_precision_loss, reason = "the number of states is small")]
     let error = ((0..N).map(scaled).sum::<f64>() / N as f64).sqrt();
     let (end_slope, end_applied) = at_end(&end);
     Trial { end, end_slope, end_applied, error, start: *x, start_slope: *slope, length_s: h }

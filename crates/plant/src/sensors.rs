@@ -43,7 +43,6 @@ impl Noise {
 
     /// A whole number below `count`.
     fn below(&mut self, count: usize) -> usize {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the count")]
         let at = (self.uniform() * count as f64) as usize;
         at.min(count.saturating_sub(1))
     }
@@ -126,7 +125,6 @@ pub fn read_current(sensor: &CurrentSensor, truth: Channel<'_>, rows: Rows<'_>) 
 pub fn dealt(outliers: f64, channels: usize, seed: u64) -> Vec<f64> {
     let mut noise = Noise::new(seed, "outliers");
     let mut counts = vec![0.0; channels];
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 to 1000")]
     for _ in 0..outliers as usize {
         counts[noise.below(channels)] += 1.0;
     }

@@ -104,7 +104,6 @@ impl<'d> Follower<'d> {
     }
 
     /// How well the speed was followed.
-    #[expect(clippy::cast_precision_loss, reason = "a drive has fewer periods than a double has integers")]
     pub(super) fn error(&self) -> SpeedError {
         let periods = self.periods.max(1) as f64;
         let rms_m_s = (self.squares / periods).sqrt();

@@ -76,7 +76,6 @@ impl<'m> CarRun<'m> {
     }
 
     /// Time reached, s.
-    #[expect(clippy::cast_precision_loss, reason = "a drive has fewer periods than a double has integers")]
     pub fn time_s(&self) -> f64 {
         self.periods as f64 * self.period_s
     }
@@ -168,7 +167,6 @@ impl<'m> CarRun<'m> {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a drive has fewer samples than a double has integers")]
 fn sample_time(samples: u64, sample_time_s: f64) -> f64 {
     samples as f64 * sample_time_s
 }

@@ -69,7 +69,6 @@ fn add_outliers(readings: &mut Readings, count: f64, size: f64, mut noise: Noise
     let [begin_s, end_s] = rows.shift_s;
     let in_shift = |&at: &usize| (begin_s..=end_s).contains(&rows.at_s[at]) && !readings.values[at].is_nan();
     let mut left: Vec<usize> = (0..rows.at_s.len()).filter(in_shift).collect();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 to 1000")]
     for _ in 0..(count as usize).min(left.len()) {
         let at = left.swap_remove(noise.below(left.len()));
         readings.values[at] += if noise.uniform() < 0.5 { size } else { -size };
