@@ -4,8 +4,8 @@ use car::{Car, ElementErrors, ErrorBudget, Sensors};
 use drivetrain::{Cylinder, Real};
 use geartrain::{Change, ElementKind, Gear, Gearbox};
 use observer::any_shift::{
-    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, Piston, ShiftRow,
-    ShiftUncertainty, TurbineTorque, ValveLimits,
+    AnyShiftFilter, ElementUncertainty, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY,
+    Piston, ShiftRow, ShiftUncertainty, TurbineTorque, ValveLimits,
 };
 use observer::{Budget, FillBudget, InputLimits, ValveModel};
 
@@ -44,21 +44,21 @@ pub struct ShiftTables<T> {
 }
 
 impl ShiftTables<f64> {
-    /// The tables of a gearbox whose elements have these valves and limits of them, `None` for an element that has none, as a dog. An
-    /// element without plates or valve is left out, and the shifts between others remain; so do those between one of them and a one-way clutch. What sits on the input
+    /// The tables of a gearbox whose elements are made by `friction_element` from their plates, `None` for an element without a valve. An
+    /// element without plates or valve, as a dog, is left out, and the shifts between others remain; so do those between one of them and a one-way clutch. What sits on the input
     /// shaft without being part of the gearbox, as an engine without converter, is added to the mass.
     ///
     /// # Errors
     /// More clutches and brakes than the filter has room for; holds their number.
-    pub fn new(
+    fn new(
         gearbox: &Gearbox,
-        valve: impl Fn(usize) -> Option<(ValveModel<f64>, ValveLimits<f64>, Option<Budget<f64>>)>,
+        friction_element: impl Fn(usize) -> Option<FrictionElement<f64>>,
         more_on_input_kg_m2: f64,
     ) -> Result<Self, usize> {
         let (mut elements, mut places) = (Vec::new(), Vec::new());
         for (at, element) in gearbox.elements.iter().enumerate() {
-            let friction = element.pack.zip(valve(at)).map(|(clutch, (valve, limits, budget))| {
-                elements.push(FrictionElement { clutch, valve, limits, piston: None, budget });
+            let friction = element.pack.and_then(|_| friction_element(at)).map(|element| {
+                elements.push(element);
                 elements.len() - 1
             });
             places.push(friction);
@@ -122,6 +122,11 @@ impl<T: Real> ShiftTables<T> {
         }
     }
 
+    /// What the filter does not know of each element.
+    pub fn uncertainties_mut(&mut self) -> impl Iterator<Item = &mut ElementUncertainty<T>> {
+        self.elements.iter_mut().map(|element| &mut element.uncertainty)
+    }
+
     /// Place of an element of the gearbox in the tables; `None` if it is not in them.
     pub fn place(&self, element: usize) -> Option<usize> {
         self.places.get(element).copied().flatten()
@@ -140,11 +145,13 @@ impl ShiftTables<f64> {
     /// More clutches and brakes than the filter has room for; holds their number.
     pub fn of_car(car: &Car, budget: &ErrorBudget) -> Result<Self, usize> {
         let on_input_kg_m2 = if car.converter.is_some() { 0.0 } else { car.engine.inertia_kg_m2 };
-        let mut tables = Self::new(
+        Self::new(
             &car.gearbox,
             |element| {
                 let (clutch, errors) = (car.clutches.get(element)?.as_ref()?, budget.element(element)?);
                 let [shortest_s, longest_s] = errors.valve_delay_s;
+                // The friction over slip is the car's; the gearbox file has one coefficient. So are the strokes.
+                let fill = clutch.standard_fill_budget(car.oil_temperature_degc);
                 let range = Budget {
                     valve: clutch.valve,
                     lag_factor: errors.valve_lag_factor,
@@ -155,24 +162,21 @@ impl ShiftTables<f64> {
                     command_age_s: budget.command_age_s,
                     line_pressure_pa: [errors.pressure_max_pa; 2],
                     pressure_max_pa: errors.pressure_max_pa,
-                    fill: clutch.standard_fill_budget(car.oil_temperature_degc),
+                    fill,
                     friction_factor: errors.friction_factor,
                     slip_rad_s: 0.0,
                 };
-                let valve = ValveModel { valve: clutch.valve, delay_s: 0.5 * (shortest_s + longest_s) };
-                Some((valve, valve_limits(errors), Some(range)))
+                Some(FrictionElement {
+                    clutch: clutch.clutch,
+                    valve: ValveModel { valve: clutch.valve, delay_s: 0.5 * (shortest_s + longest_s) },
+                    limits: valve_limits(errors),
+                    piston: fill.map(|fill| piston(&clutch.cylinder, &fill)),
+                    budget: Some(range),
+                    uncertainty: element_uncertainty(errors, budget.valve_error_scale),
+                })
             },
             on_input_kg_m2,
-        )?;
-        // The friction over slip is the car's; the gearbox file has one coefficient. So are the strokes.
-        for (element, place) in tables.places.clone().into_iter().enumerate() {
-            if let (Some(place), Some(Some(clutch))) = (place, car.clutches.get(element)) {
-                let fill = clutch.standard_fill_budget(car.oil_temperature_degc);
-                tables.elements[place].clutch = clutch.clutch;
-                tables.elements[place].piston = fill.map(|fill| piston(&clutch.cylinder, &fill));
-            }
-        }
-        Ok(tables)
+        )
     }
 }
 
@@ -231,7 +235,7 @@ pub fn any_shift_filter<'a>(
             converter_share: deviation_of(budget.converter),
             engine_share: deviation_of(budget.engine),
         },
-        uncertainty: uncertainty(budget, budget.valve_error_scale),
+        uncertainty: uncertainty(budget),
         readings: [
             speed_reading(sensors.map(|sensors| &sensors.turbine), SPEED_QUANTUM_RAD_S),
             speed_reading(sensors.map(|sensors| &sensors.output), SPEED_QUANTUM_RAD_S),
@@ -261,27 +265,25 @@ fn shaft_n_m(car: &Car) -> f64 {
     engine * converter * ratio * car.driveline.final_ratio
 }
 
-/// What the filter of a car does not know by the bounds alone, whatever scale of the errors of its valves the budget has.
-pub fn shift_uncertainty(budget: &ErrorBudget) -> ShiftUncertainty<f64> {
-    uncertainty(budget, 1.0)
-}
-
-/// What the filter does not know; friction and valve err by this scale times the bounds. Of the elements it takes the widest bounds: its
-/// states of both clutches have one standard deviation.
-fn uncertainty(errors: &ErrorBudget, scale: f64) -> ShiftUncertainty<f64> {
-    let widest = |of: fn(&ElementErrors) -> f64| deviation_of(errors.widest(of));
-    let parts = [widest(ElementErrors::friction), widest(ElementErrors::valve_gain), MAP_SHARE];
+/// What the filter does not know of an element, whose friction and valve err by this scale times the bounds.
+pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncertainty<f64> {
+    let parts = [deviation_of(errors.friction()), deviation_of(errors.valve_gain()), MAP_SHARE];
     let square: f64 = parts.iter().map(|part| part * part).sum();
-    let slow_part = 1.0 - parts[2] * parts[2] / square;
-    ShiftUncertainty {
+    ElementUncertainty {
         torque_share: scale * square.sqrt(),
-        slow_part,
-        torque_share_s: 3.0,
+        slow_part: 1.0 - parts[2] * parts[2] / square,
         valve_gain: scale * parts[1],
         kiss_point_pa: scale * KISS_POINT_PA,
-        valve_lag_share: scale * widest(ElementErrors::valve_lag),
-        valve_delay_s: scale * widest(ElementErrors::valve_delay),
+        valve_lag_share: scale * deviation_of(errors.valve_lag()),
+        valve_delay_s: scale * deviation_of(errors.valve_delay()),
         pressure_pa: scale * PRESSURE_PA,
+    }
+}
+
+/// What the filter does not know beside the elements.
+fn uncertainty(errors: &ErrorBudget) -> ShiftUncertainty<f64> {
+    ShiftUncertainty {
+        torque_share_s: 3.0,
         pressure_s: 0.15,
         turbine_share: TURBINE_SHARE,
         turbine_share_s: 3.0,

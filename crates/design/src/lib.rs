@@ -43,7 +43,7 @@ pub mod rigid;
 pub mod rivals;
 pub mod sliding;
 
-pub use any_shift::{ShiftTables, any_shift_filter, shift_uncertainty};
+pub use any_shift::{ShiftTables, any_shift_filter, element_uncertainty};
 pub use budget::{ValveErrors, shift_time_constant};
 pub use certificate::{Certificate, VertexMargin, error_bound};
 pub use compliant::{CompliantCertificate, CompliantDesign, best_compliant, compliant_observer, design_compliant};

@@ -2,9 +2,9 @@
 
 use car::Car;
 use car::ErrorBudget;
-use design::{ShiftTables, any_shift_filter, shift_uncertainty};
+use design::{ShiftTables, any_shift_filter, element_uncertainty};
 use nalgebra::DMatrix;
-use observer::any_shift::AnyShiftFilter;
+use observer::any_shift::{AnyShiftFilter, ElementUncertainty};
 
 use super::shift_log::{ShiftLog, named_pair};
 use super::zero_offset::{sd_before_pa, zero_offsets};
@@ -127,10 +127,14 @@ impl Quantities {
         all.extend(of_balances.into_iter().zip(balances).filter(|(_, is_used)| *is_used).flat_map(|(some, _)| some));
         let budget = ErrorBudget::of_car(car);
         // That the valves of an earlier fit agreed with each other does not make the common factor of all torques better known.
-        let uncertainty = shift_uncertainty(&budget);
-        let filter = AnyShiftFilter { uncertainty, ..any_shift_filter(car, tables, &budget, None) };
+        let by_bounds =
+            |element: usize| Some((tables.place(element)?, element_uncertainty(budget.element(element)?, 1.0)));
+        let mut elements: Vec<_> = (0..car.gearbox.elements.len()).filter_map(by_bounds).collect();
+        elements.sort_by_key(|(place, _)| *place);
+        let elements: Vec<_> = elements.into_iter().map(|(_, uncertainty)| uncertainty).collect();
+        let filter = any_shift_filter(car, tables, &budget, None);
         let mass_share = car.error_bounds.mass_share.unwrap_or(MASS);
-        let known = Known { filter: &filter, has_converter, measured: &measured, mass_share };
+        let known = Known { filter: &filter, elements: &elements, has_converter, measured: &measured, mass_share };
         let before = DMatrix::from_fn(all.len(), all.len(), |i, j| {
             if i == j { known.sd(all[i]).powi(2) } else { known.covariance(all[i], all[j]) }
         });
@@ -235,6 +239,8 @@ impl Quantities {
 /// What is known before a fit: what the filter of the car does not know.
 struct Known<'a> {
     filter: &'a AnyShiftFilter<'a, f64>,
+    /// By place in the tables.
+    elements: &'a [ElementUncertainty<f64>],
     has_converter: bool,
     measured: &'a [bool],
     mass_share: f64,
@@ -243,21 +249,21 @@ struct Known<'a> {
 impl Known<'_> {
     /// Standard deviation of a quantity.
     fn sd(&self, quantity: Quantity) -> f64 {
-        let known = &self.filter.uncertainty;
+        let of = |at: usize| &self.elements[at];
         match quantity {
             Quantity::Input if self.has_converter => self.filter.turbine.converter_share,
             Quantity::Input => self.filter.turbine.engine_share,
             Quantity::TorqueRatio => deviation_of(TORQUE_RATIO),
             Quantity::InputDelay | Quantity::EngineDelay => deviation_of(INPUT_DELAY_S / DELAY_UNIT_S),
-            Quantity::Delay(_) => known.valve_delay_s / DELAY_UNIT_S,
+            Quantity::Delay(at) => of(at).valve_delay_s / DELAY_UNIT_S,
             Quantity::Drag(_) => DRAG_N_M / DRAG_UNIT_N_M,
-            Quantity::Torque(_) => known.torque_share,
-            Quantity::Kiss(at) => (known.kiss_point_pa / KISS_UNIT_PA).hypot(self.kiss_by_gain(at)),
-            Quantity::Gain(_) => known.valve_gain,
+            Quantity::Torque(at) => of(at).torque_share,
+            Quantity::Kiss(at) => (of(at).kiss_point_pa / KISS_UNIT_PA).hypot(self.kiss_by_gain(at)),
+            Quantity::Gain(at) => of(at).valve_gain,
             Quantity::PressureScale => PRESSURE_SCALE,
             Quantity::PressureOffset(_) => sd_before_pa() / OFFSET_UNIT_PA,
-            Quantity::Lag(_) => known.valve_lag_share,
-            Quantity::Inertia(_) => known.inertia_share,
+            Quantity::Lag(at) => of(at).valve_lag_share,
+            Quantity::Inertia(_) => self.filter.uncertainty.inertia_share,
             Quantity::Mass => deviation_of(self.mass_share),
             Quantity::Rolling => deviation_of(ROLLING),
             Quantity::Air => deviation_of(AIR),
@@ -270,13 +276,13 @@ impl Known<'_> {
     /// What a deviation of the gain does to a kiss point by the gain of the file.
     fn kiss_by_gain(&self, at: usize) -> f64 {
         let kiss_pa = self.filter.tables.elements[at].clutch.kiss_pressure();
-        -self.filter.uncertainty.valve_gain * kiss_pa / KISS_UNIT_PA
+        -self.elements[at].valve_gain * kiss_pa / KISS_UNIT_PA
     }
 
     /// The element of a quantity that the gain of its valve is part of, and what a deviation of the gain does to it.
     fn by_gain(&self, quantity: Quantity) -> Option<(usize, f64)> {
         match quantity {
-            Quantity::Torque(at) | Quantity::Gain(at) => Some((at, self.filter.uncertainty.valve_gain)),
+            Quantity::Torque(at) | Quantity::Gain(at) => Some((at, self.elements[at].valve_gain)),
             Quantity::Kiss(at) => Some((at, self.kiss_by_gain(at))),
             _ => None,
         }

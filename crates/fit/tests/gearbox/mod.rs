@@ -10,7 +10,7 @@ use std::path::Path;
 use car::ErrorBudget;
 use car::{Car, CarErrorBounds};
 use config::{CarFile, Source};
-use design::{any_shift_filter, shift_uncertainty};
+use design::element_uncertainty;
 use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
@@ -268,13 +268,16 @@ fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     // What the valves err by over their bounds is for the filter alone, and not for the ranges.
     let bounds = CarErrorBounds { valve_error_scale: Some(0.5), ..own.error_bounds.clone() };
     let trusted = Car { error_bounds: bounds, ..own.car.clone() };
-    let filter = |car: &Car| any_shift_filter(car, &tables[1], &ErrorBudget::of_car(car), None).uncertainty;
-    let [usual, half] = [&own, &trusted].map(filter);
+    let of_trusted = drawn::tables(&trusted);
+    let place = of_trusted.place(at).unwrap();
+    let [usual, half] = [&tables[1], &of_trusted].map(|tables| tables.tables().elements[place].uncertainty);
     assert_eq!([half.torque_share, half.kiss_point_pa], [0.5 * usual.torque_share, 0.5 * usual.kiss_point_pa]);
     assert_eq!([half.valve_delay_s, half.pressure_pa], [0.5 * usual.valve_delay_s, 0.5 * usual.pressure_pa]);
-    assert_eq!((half.slow_part, half.inertia_share), (usual.slow_part, usual.inertia_share));
-    assert_eq!(shift_uncertainty(&ErrorBudget::of_car(&trusted)), usual);
-    assert_eq!(drawn::tables(&trusted), tables[1]);
+    assert_eq!(half.slow_part, usual.slow_part);
+    assert_eq!(element_uncertainty(ErrorBudget::of_car(&trusted).element(at).unwrap(), 1.0), usual);
+    for (of_trusted, of_own) in of_trusted.tables().elements.iter().zip(tables[1].tables().elements) {
+        assert_eq!(of_trusted.budget, of_own.budget);
+    }
 }
 
 #[test]

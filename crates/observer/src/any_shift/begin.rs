@@ -113,7 +113,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             self.tables.out_of(gear.from).and_then(|shift| self.element(&state.elements, shift.clutches[0].element));
         found.is_some_and(|(memory, element)| {
             let kiss_pa = element.clutch.kiss_pressure();
-            memory.lower_pa() < kiss_pa + self.uncertainty.above_kiss_pa(&element.clutch)
+            memory.lower_pa() < kiss_pa + element.above_kiss_pa()
         })
     }
 

@@ -5,7 +5,7 @@ use drivetrain::{Clutch, Real};
 use super::pistons::Pistons;
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
-use super::{PIECE_S, ShiftUncertainty, pieces, square};
+use super::{ElementUncertainty, PIECE_S, pieces, square};
 use crate::bound::{capacity_min_n_m, pressure_and_torque};
 use crate::kalman::valve_model::Commands;
 use crate::{ChannelHealth, LOST_S, PressureRange, Reading};
@@ -151,13 +151,8 @@ impl<T: Real> ElementState<T> {
     }
 
     /// Goes on with what is learnt of lag and delay. A lag has a length, and no command arrives before it was sent.
-    pub(super) fn take_timing(
-        &mut self,
-        element: &FrictionElement<T>,
-        u: &ShiftUncertainty<T>,
-        timing: &ValveTiming<T>,
-    ) {
-        let [lag, delay] = timing.mean;
+    pub(super) fn take_timing(&mut self, element: &FrictionElement<T>, timing: &ValveTiming<T>) {
+        let ([lag, delay], u) = (timing.mean, &element.uncertainty);
         self.timing = *timing;
         self.lag = (T::one() + u.valve_lag_share * lag).at_least(T::of(LAG_LEAST));
         self.delay_s = (element.valve.delay_s + u.valve_delay_s * delay).at_least(T::zero());
@@ -231,9 +226,9 @@ impl<T: Real> ElementState<T> {
     }
 
     /// Lets time pass for the pistons, where they have a stroke, once there is a command: after [`Self::step`].
-    pub(super) fn move_pistons(&mut self, element: &FrictionElement<T>, u: &ShiftUncertainty<T>, dt_s: T) {
+    pub(super) fn move_pistons(&mut self, element: &FrictionElement<T>, dt_s: T) {
         let Some(piston) = element.piston.as_ref().filter(|_| self.newest.is_some()) else { return };
-        let (error_pa, moving_pa) = (u.above_kiss_pa(&element.clutch), self.deviation_pa(u));
+        let (error_pa, moving_pa) = (element.above_kiss_pa(), self.deviation_pa(&element.uncertainty));
         match &mut self.pistons {
             None => self.pistons = Some(Pistons::settled(piston, self.valve_pa, error_pa, moving_pa)),
             Some(pistons) => pistons.step(piston, self.valve_pa, [error_pa, moving_pa], dt_s),
@@ -281,9 +276,9 @@ impl<T: Real> ElementState<T> {
     }
 
     /// The error of that pressure, Pa, where `x` is that of the pressure in its deviations.
-    pub(super) fn error_pa(&self, u: &ShiftUncertainty<T>, x: T) -> T {
+    pub(super) fn error_pa(&self, element: &FrictionElement<T>, x: T) -> T {
         match &self.pistons {
-            None => self.deviation_pa(u) * x,
+            None => self.deviation_pa(&element.uncertainty) * x,
             Some(pistons) => pistons.mean_pa() - pistons.nominal_pa() + pistons.spread.all_pa * x,
         }
     }
@@ -296,22 +291,23 @@ impl<T: Real> ElementState<T> {
 
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
     /// moves, and at rest.
-    fn deviation_pa(&self, u: &ShiftUncertainty<T>) -> T {
+    fn deviation_pa(&self, u: &ElementUncertainty<T>) -> T {
         let [lag, delay] = self.timing.variance;
         let [by_lag_pa, by_delay_pa] = self.by_timing_pa(u);
         (lag * square(by_lag_pa) + delay * square(by_delay_pa) + square(u.pressure_pa)).sqrt()
     }
 
     /// Change of the pressure by a lag and a delay that are longer by one deviation, Pa.
-    fn by_timing_pa(&self, u: &ShiftUncertainty<T>) -> [T; 2] {
+    fn by_timing_pa(&self, u: &ElementUncertainty<T>) -> [T; 2] {
         [-u.valve_lag_share * self.per_lag_pa / self.lag, -u.valve_delay_s * self.rate_pa_s]
     }
 
     /// The pressure on the plates, by what is known of its errors. The plates do not pull: near the kiss point the mean of the
     /// positive part is more than that of the mean.
     #[inline]
-    fn pressing(&self, clutch: &Clutch<T>, u: &ShiftUncertainty<T>, wrong: &PressureError<T>) -> Pressing<T> {
-        let (kiss_pa, moving_pa) = (u.kiss_deviation_pa(clutch), self.deviation_pa(u));
+    fn pressing(&self, element: &FrictionElement<T>, wrong: &PressureError<T>) -> Pressing<T> {
+        let clutch = &element.clutch;
+        let (kiss_pa, moving_pa) = (element.kiss_deviation_pa(), self.deviation_pa(&element.uncertainty));
         if let Some(pistons) = &self.pistons {
             return pressing_of_pistons(pistons, clutch, [kiss_pa, moving_pa], wrong);
         }
@@ -328,15 +324,14 @@ impl<T: Real> ElementState<T> {
         &self,
         element: &FrictionElement<T>,
         shift: &ShiftClutch<T>,
-        u: &ShiftUncertainty<T>,
         [slip_rad_s, direction]: [T; 2],
         wrong: &PressureError<T>,
     ) -> ClutchTorque<T> {
-        let clutch = &element.clutch;
+        let (clutch, u) = (&element.clutch, &element.uncertainty);
         let slip = shift.alpha * slip_rad_s;
         let size = shift.alpha.abs() * direction;
         let per_pa = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
-        let pressing = self.pressing(clutch, u, wrong);
+        let pressing = self.pressing(element, wrong);
         let Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa, by_fill_pa, per_fill_pa } = pressing;
         let per_pressure_pa = slope * moving_pa + per_fill_pa;
         let per_timing = if per_pressure_pa > T::zero() { slope / per_pressure_pa } else { T::zero() };
@@ -358,14 +353,13 @@ impl<T: Real> ElementState<T> {
         &self,
         element: &FrictionElement<T>,
         shift: &ShiftClutch<T>,
-        u: &ShiftUncertainty<T>,
         factor: T,
         wrong: &PressureError<T>,
     ) -> T {
         let clutch = &element.clutch;
         let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
         let per_pa = shift.alpha.abs() * friction * clutch.lever() * clutch.piston_area_m2;
-        per_pa * self.pressing(clutch, u, wrong).pressed_pa * (T::one() + u.torque_share * factor)
+        per_pa * self.pressing(element, wrong).pressed_pa * (T::one() + element.uncertainty.torque_share * factor)
     }
 
     /// Guaranteed range of the pressure, Pa.

@@ -215,15 +215,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         slip: [T; 2],
         [f, k]: [T; 2],
     ) -> ClutchEstimate<T> {
-        let u = &self.uncertainty;
         let zero = T::zero();
         let (torque, valve_pa, pressure_pa, both) =
             self.element(elements, clutch.element).map_or((ClutchTorque::none(), zero, zero, zero), |found| {
                 let (memory, element) = found;
-                let torque = memory.torque(element, clutch, u, slip, &PressureError::unseen(k));
+                let torque = memory.torque(element, clutch, slip, &PressureError::unseen(k));
                 let valve_pa = memory.pressure_pa();
-                let pressure_pa = element.limits.possible_pressure(valve_pa * (T::one() + u.gain_error(element, f, k)));
-                (torque, valve_pa, pressure_pa, u.correlation_in_shift(element))
+                let pressure_pa = element.limits.possible_pressure(valve_pa * (T::one() + element.gain_error(f, k)));
+                (torque, valve_pa, pressure_pa, element.correlation_in_shift())
             });
         let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
         ClutchEstimate {
@@ -247,7 +246,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         shift: &ShiftRow<T>,
         c: usize,
     ) -> ClutchEstimate<T> {
-        let (u, x, zero) = (&self.uncertainty, &running.x, T::zero());
+        let (x, zero) = (&running.x, T::zero());
         let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
         let Some(torques) = running.torques else {
             let lasting = [x.mean[FRICTION[c]], x.mean[KISS[c]]];
@@ -266,11 +265,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let (valve_pa, pressure_pa, both) =
             self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
                 let modelled_pa = memory.pressure_pa();
-                let gain = modelled_pa * u.gain_error(element, x.mean[FRICTION[c]], x.mean[KISS[c]]);
+                let gain = modelled_pa * element.gain_error(x.mean[FRICTION[c]], x.mean[KISS[c]]);
                 // The error of the pressure itself.
-                let itself = memory.error_pa(u, x.mean[PRESSURE[c]]);
+                let itself = memory.error_pa(element, x.mean[PRESSURE[c]]);
                 let pressure_pa = modelled_pa + gain + if holds { zero } else { itself };
-                (modelled_pa, element.limits.possible_pressure(pressure_pa), u.correlation_in_shift(element))
+                (modelled_pa, element.limits.possible_pressure(pressure_pa), element.correlation_in_shift())
             });
         let open_loop_n_m = if holds { own.open_loop_n_m.abs() * torque.signum() } else { own.open_loop_n_m };
         let alone = own.unlearnt_variance(both).sqrt();

@@ -149,10 +149,8 @@ pub(super) type Correlations<T> = [T; MAX_ELEMENTS];
 pub(super) struct Acting<T> {
     /// Place of each, if it is learnt; else it is its own in this shift.
     places: [Option<usize>; ACTING],
-    /// Part of the variance of torque factors, kiss points, lags and delays that lasts.
-    slow_part: T,
-    /// Its root.
-    slow: T,
+    /// Part of the variance of torque factors, kiss points, lags and delays that lasts, of either clutch.
+    slow_part: [T; 2],
     /// How an error of the stiffness shows in each, per deviation of it.
     by_stiffness: [T; ACTING],
     /// Whether they act in a shift, and not in a gear.
@@ -168,7 +166,12 @@ pub(super) struct Known<T> {
 
 impl<T: Real> Acting<T> {
     /// In the order of the filter's states: torque factors, kiss points, inertia, torque at the gearbox input; then lag and delay of either clutch.
-    pub(super) fn new([off, on]: [usize; 2], pair: Option<usize>, slow_part: T, by_stiffness: [T; ACTING]) -> Self {
+    pub(super) fn new(
+        [off, on]: [usize; 2],
+        pair: Option<usize>,
+        slow_part: [T; 2],
+        by_stiffness: [T; ACTING],
+    ) -> Self {
         let element = |at: usize| (at < MAX_ELEMENTS).then_some(at);
         // A one-way clutch has no place among the elements.
         let [kiss, lag, delay] =
@@ -177,14 +180,14 @@ impl<T: Real> Acting<T> {
         let states = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
         let timings = [lag(off), delay(off), lag(on), delay(on)];
         let places = core::array::from_fn(|a| states.iter().chain(&timings).nth(a).copied().flatten());
-        Self { places, slow_part, slow: slow_part.sqrt(), by_stiffness, in_shift: true }
+        Self { places, slow_part, by_stiffness, in_shift: true }
     }
 
     /// Only the torque at the gearbox input, as in a gear.
     pub(super) fn turbine(by_stiffness: [T; ACTING]) -> Self {
         let mut places = [None; ACTING];
         places[STATES_ACTING - 1] = Some(TURBINE_AT);
-        Self { places, slow_part: T::one(), slow: T::one(), by_stiffness, in_shift: false }
+        Self { places, slow_part: [T::one(); 2], by_stiffness, in_shift: false }
     }
 
     /// Place of a quantity among all.
@@ -222,7 +225,11 @@ impl<T: Real> Acting<T> {
         match self.place(a) {
             None => (T::zero(), T::one()),
             Some(INERTIA_AT..LAG_AT) => (T::one(), T::zero()),
-            Some(_) => (self.slow, T::one() - self.slow_part),
+            Some(_) => {
+                let of_oncoming = if a < STATES_ACTING { a % 2 == 1 } else { a >= STATES_ACTING + 2 };
+                let slow_part = self.slow_part[usize::from(of_oncoming)];
+                (slow_part.sqrt(), T::one() - slow_part)
+            }
         }
     }
 }

@@ -48,8 +48,9 @@ mod systematic;
 mod tables;
 mod timing;
 mod turbine;
+mod uncertainty;
 
-use drivetrain::{Clutch, Driveline, Real};
+use drivetrain::{Driveline, Real};
 
 use crate::kalman::engine::Engine;
 use crate::kalman::gate::{Gate, Verdict};
@@ -74,6 +75,7 @@ pub use tables::{
     FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, ShiftClutch, ShiftRow, ValveLimits,
 };
 pub use turbine::TurbineTorque;
+pub use uncertainty::{ElementUncertainty, ShiftUncertainty};
 
 const N: usize = 16;
 /// The first of them are all that moves in a gear.
@@ -130,49 +132,6 @@ const SLIPS_IN_GEAR: u8 = 3;
 /// The same after a shift to a gear whose one-way clutch has not caught the turbine \[chosen\]: half a second of a log at 100 Hz.
 const NOT_CAUGHT: u8 = 50;
 
-/// What the filter does not know: standard deviations.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShiftUncertainty<T> {
-    /// `rho`: of a clutch's torque, as a share: friction, valve gain and valve map.
-    pub torque_share: T,
-    /// The part of its square that lasts from shift to shift: friction and gain. The same part of the kiss point's.
-    pub slow_part: T,
-    /// Time after which the rest is another, s.
-    pub torque_share_s: T,
-    /// Of the valve's gain, as a share: in `torque_share`, and in the kiss point.
-    pub valve_gain: T,
-    /// Of the kiss point beside the gain, Pa: what lasts.
-    pub kiss_point_pa: T,
-    /// Of the valve's lag, as a share.
-    pub valve_lag_share: T,
-    /// Of the valve's delay, s: the pressure errs by this much of its rate.
-    pub valve_delay_s: T,
-    /// Error of the pressure at rest that does not last, Pa.
-    pub pressure_pa: T,
-    /// Time after which an error of the pressure is another, s.
-    pub pressure_s: T,
-    /// Of the turbine torque beside what lasts, as a share.
-    pub turbine_share: T,
-    /// Time after which it is another, s.
-    pub turbine_share_s: T,
-    /// Of the turbine-side inertia `M11`, as a share.
-    pub inertia_share: T,
-    /// Of the stiffness of the drive shafts, as a share.
-    pub stiffness_share: T,
-    /// Of the scale of the wheel speed, as a share.
-    pub wheel_scale: T,
-    /// Its random walk, per root second.
-    pub wheel_scale_walk: T,
-    /// Of the rate of twist at the start, rad/s: what a scale leaves of the wheel speed's error.
-    pub rate_rad_s: T,
-    /// Its random walk, rad/s per root second.
-    pub rate_walk: T,
-    /// Random walk of the load at the wheels, N m per root second.
-    pub load_walk: T,
-    /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
-    pub output_least_rad_s: T,
-}
-
 /// The gear, or the shift, that the controller commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GearCommand {
@@ -221,7 +180,7 @@ pub struct AnyShiftFilter<'a, T> {
     pub wheels_kg_m2: T,
     /// The torque at the gearbox input.
     pub turbine: TurbineTorque<T>,
-    /// What it does not know.
+    /// What it does not know beside the elements.
     pub uncertainty: ShiftUncertainty<T>,
     /// How turbine, output and wheel speed are read.
     pub readings: [SpeedReading<T>; 3],
@@ -291,50 +250,6 @@ struct Running<T> {
     before: Option<Known<T>>,
     /// The converter's maps against the reported engine torque, in this gear.
     compared: Compared<T>,
-}
-
-impl<T: Real> ShiftUncertainty<T> {
-    /// Standard deviation of an element's kiss point, Pa: what lasts is an own one and that of the valve's gain.
-    fn kiss_deviation_pa(&self, clutch: &Clutch<T>) -> T {
-        let by_gain_pa = self.valve_gain * clutch.kiss_pressure();
-        ((square(self.kiss_point_pa) + square(by_gain_pa)) / self.slow_part).sqrt()
-    }
-
-    /// Standard deviation of the pressure at rest above the kiss point, Pa: what drives the piston of a slow fill.
-    fn above_kiss_pa(&self, clutch: &Clutch<T>) -> T {
-        (square(self.kiss_deviation_pa(clutch)) + square(self.pressure_pa)).sqrt()
-    }
-
-    /// Times in which the errors of turbine torque and pressure fade, s.
-    fn fading_s(&self) -> [T; 2] {
-        [self.turbine_share_s, self.pressure_s]
-    }
-
-    /// The same in another precision.
-    pub fn cast<U: Real>(&self) -> ShiftUncertainty<U> {
-        let to = |x: T| U::of(x.to_f64_exact());
-        ShiftUncertainty {
-            torque_share: to(self.torque_share),
-            slow_part: to(self.slow_part),
-            torque_share_s: to(self.torque_share_s),
-            valve_gain: to(self.valve_gain),
-            kiss_point_pa: to(self.kiss_point_pa),
-            valve_lag_share: to(self.valve_lag_share),
-            valve_delay_s: to(self.valve_delay_s),
-            pressure_pa: to(self.pressure_pa),
-            pressure_s: to(self.pressure_s),
-            turbine_share: to(self.turbine_share),
-            turbine_share_s: to(self.turbine_share_s),
-            inertia_share: to(self.inertia_share),
-            stiffness_share: to(self.stiffness_share),
-            wheel_scale: to(self.wheel_scale),
-            wheel_scale_walk: to(self.wheel_scale_walk),
-            rate_rad_s: to(self.rate_rad_s),
-            rate_walk: to(self.rate_walk),
-            load_walk: to(self.load_walk),
-            output_least_rad_s: to(self.output_least_rad_s),
-        }
-    }
 }
 
 impl<T: Real> AnyShiftFilter<'_, T> {

@@ -41,7 +41,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 let direction = running.phase.direction(c, &slip);
                 if let Some((memory, element)) = self.element(elements, clutch.element) {
                     let wrong = running.x.pressure_error(c.min(1));
-                    *torque = memory.torque(element, clutch, u, [slip.value, direction], &wrong);
+                    *torque = memory.torque(element, clutch, [slip.value, direction], &wrong);
                 }
             }
         }
@@ -102,7 +102,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let motion = running.motion.get_or_insert_with(new);
         let (rows, rest) = motion.rows(torques);
         let (by_torque, [share, pressure]) = (motion.per_turbine_torque(), motion.stay);
-        let in_shift = running.shift.is_some();
         let x = &mut running.x;
         let twist_rate = self.driveline.twist_rate(x.mean[OUTPUT], x.mean[WHEEL]) + x.mean[RATE];
         let by_timing = torques.by_timing();
@@ -113,9 +112,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         // An error of the stiffness that does not last: in one direction of the torque it is another than in the other.
         let by_stiffness = u.stiffness_share * self.driveline.shaft_stiffness_n_m_rad * twist_rate;
         x.add(SPRING, SPRING, T::of(2.0 * TWIST_S) * dt_s * square(by_stiffness));
-        if in_shift {
-            let walked = u.friction_walk(dt_s);
-            for c in 0..2 {
+        if let Some(shift) = running.shift {
+            for (c, clutch) in shift.clutches.iter().enumerate().take(2) {
+                let walked = self
+                    .tables
+                    .elements
+                    .get(clutch.element)
+                    .map_or(T::zero(), |element| u.friction_walk(element.uncertainty.slow_part, dt_s));
                 x.fade(PRESSURE[c], pressure);
                 x.add(FRICTION[c], FRICTION[c], walked);
                 x.add(PRESSURE[c], PRESSURE[c], T::one() - pressure * pressure);
@@ -179,9 +182,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 return Contact { slip, needed_n_m, holds_n_m };
             }
             let (factor, wrong) = (running.x.mean[FRICTION[c.min(1)]], running.x.pressure_error(c));
-            let holds_n_m = self.element(elements, clutch.element).map_or(T::zero(), |(memory, element)| {
-                memory.holds(element, clutch, &self.uncertainty, factor, &wrong)
-            });
+            let holds_n_m = self
+                .element(elements, clutch.element)
+                .map_or(T::zero(), |(memory, element)| memory.holds(element, clutch, factor, &wrong));
             Contact { slip, needed_n_m, holds_n_m }
         };
         let contacts = [contact(0), contact(1)];

@@ -27,7 +27,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         if state.strokes {
             for (memory, element) in state.elements.iter_mut().flatten().zip(self.tables.elements) {
-                memory.move_pistons(element, &self.uncertainty, dt_s);
+                memory.move_pistons(element, dt_s);
             }
         }
         health

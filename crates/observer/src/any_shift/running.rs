@@ -2,9 +2,9 @@
 
 use super::timing::ByTiming;
 use super::{
-    ACTING, Acting, AnyShiftFilter, Compared, Correlations, ElementState, FRICTION, FrictionElement, IN_GEAR, INERTIA,
-    KISS, Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SCALE,
-    SLOW_SHARE, STATES_ACTING, ShiftPhase, ShiftRow, ShiftUncertainty, Slip,
+    ACTING, Acting, AnyShiftFilter, Compared, Correlations, ElementState, ElementUncertainty, FRICTION, IN_GEAR,
+    INERTIA, KISS, Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, ONE_WAY, PRESSURE, PhaseMemory,
+    Running, SCALE, SLOW_SHARE, STATES_ACTING, ShiftPhase, ShiftRow, Slip,
 };
 use drivetrain::Real;
 
@@ -12,46 +12,6 @@ use drivetrain::Real;
 pub(super) const TURBINE_ACTS: usize = STATES_ACTING - 1;
 /// That of the inertia.
 const INERTIA_ACTS: usize = 4;
-
-impl<T: Real> ShiftUncertainty<T> {
-    /// Variance by which the error of a clutch's torque walks: after [`ShiftUncertainty::torque_share_s`] the part that
-    /// does not last is another.
-    pub(super) fn friction_walk(&self, dt_s: T) -> T {
-        (T::one() - self.slow_part) * T::of(2.0) * dt_s / self.torque_share_s
-    }
-
-    /// Error of the valve's gain, as a share, that the factor of an element's torque `f` and its kiss point `k` speak for.
-    pub(super) fn gain_error(&self, element: &FrictionElement<T>, f: T, k: T) -> T {
-        let [by_f, by_k] = self.gain_by(element, self.slow_part.sqrt());
-        by_f * f + by_k * k
-    }
-
-    /// Regression of the gain on torque factor and kiss point; `slow` is the deviation of what lasts of them in their own.
-    fn gain_by(&self, element: &FrictionElement<T>, slow: T) -> [T; 2] {
-        let variance = self.valve_gain * self.valve_gain;
-        let clutch = &element.clutch;
-        // Covariances of the gain with both, and of these two.
-        let per = variance * slow / self.slow_part.sqrt();
-        let with_f = per / self.torque_share;
-        let with_k = -per * clutch.kiss_pressure() / self.kiss_deviation_pa(clutch);
-        let both = slow * slow * self.correlation(element);
-        let left = T::one() - both * both;
-        [(with_f - both * with_k) / left, (with_k - both * with_f) / left]
-    }
-
-    /// Correlation of what lasts of torque factor and kiss point of an element: a higher gain is more torque and an earlier
-    /// kiss point.
-    pub(super) fn correlation(&self, element: &FrictionElement<T>) -> T {
-        let slow = self.torque_share * self.slow_part.sqrt();
-        let by_gain = self.valve_gain * self.valve_gain * element.clutch.kiss_pressure();
-        -by_gain / (slow * self.slow_part.sqrt() * self.kiss_deviation_pa(&element.clutch))
-    }
-
-    /// The same of the states of a shift, of which a part does not last.
-    pub(super) fn correlation_in_shift(&self, element: &FrictionElement<T>) -> T {
-        self.slow_part * self.correlation(element)
-    }
-}
 
 impl<T: Real> Running<T> {
     /// The states of a shift, as they are where there is none.
@@ -80,20 +40,21 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn correlations(&self) -> Correlations<T> {
         let mut correlations = [T::zero(); MAX_ELEMENTS];
         for (correlation, element) in correlations.iter_mut().zip(self.tables.elements) {
-            *correlation = self.uncertainty.correlation(element);
+            *correlation = element.correlation();
         }
         correlations
     }
 
     /// What is learnt of an element, by its place in [`super::GearboxTables::elements`]; `None` if there is no such element.
     pub fn learnt_element(&self, learnt: &Learnt<T>, at: usize) -> Option<LearntElement<T>> {
-        let (u, element) = (&self.uncertainty, self.tables.elements.get(at).filter(|_| at < MAX_ELEMENTS)?);
+        let element = self.tables.elements.get(at).filter(|_| at < MAX_ELEMENTS)?;
+        let u = &element.uncertainty;
         let ([s, k], [[s_s, s_k], [_, k_k]]) = learnt.of_element(at)?;
         let torque = u.torque_share * u.slow_part.sqrt();
-        let kiss_pa = u.kiss_deviation_pa(&element.clutch) * u.slow_part.sqrt();
-        let [by_s, by_k] = u.gain_by(element, T::one());
+        let kiss_pa = element.kiss_deviation_pa() * u.slow_part.sqrt();
+        let [by_s, by_k] = element.gain_by(T::one());
         // Unlearnt both vary by one, with their correlation.
-        let both = u.correlation(element);
+        let both = element.correlation();
         let seen = by_s * by_s * (T::one() - s_s)
             + (by_s * by_k + by_s * by_k) * (both - s_k)
             + by_k * by_k * (T::one() - k_k);
@@ -125,7 +86,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// deviation; `None` if there is no such element.
     pub fn learnt_timing(&self, learnt: &Learnt<T>, at: usize) -> Option<[[T; 2]; 2]> {
         let ([lag, delay], [lag_variance, delay_variance]) = learnt.of_timing(at)?;
-        let u = &self.uncertainty;
+        let u = &self.tables.elements.get(at)?.uncertainty;
         let [per_lag, per_delay] = [u.valve_lag_share, u.valve_delay_s].map(|deviation| u.slow_part.sqrt() * deviation);
         let of = |per: T, mean: T, variance: T| [per * mean, per * variance.sqrt()];
         Some([of(per_lag, lag, lag_variance), of(per_delay, delay, delay_variance)])
@@ -149,21 +110,28 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn acting(&self, shift: &ShiftRow<T>) -> Acting<T> {
         let elements = shift.clutches.map(|clutch| clutch.element);
         let pair = self.tables.pair(shift.from, shift.to);
-        Acting::new(elements, pair, self.uncertainty.slow_part, self.by_stiffness())
+        let slow_parts = self.of_elements(elements, |u| u.slow_part);
+        Acting::new(elements, pair, slow_parts, self.by_stiffness(elements))
     }
 
     /// The same in a gear.
     pub(super) fn acting_in_gear(&self) -> Acting<T> {
-        Acting::turbine(self.by_stiffness())
+        Acting::turbine(self.by_stiffness([ONE_WAY; 2]))
+    }
+
+    /// A value of what is not known of two elements; infinite for one that is not in the tables, as a one-way clutch.
+    fn of_elements(&self, elements: [usize; 2], of: impl Fn(&ElementUncertainty<T>) -> T) -> [T; 2] {
+        elements.map(|at| self.tables.elements.get(at).map_or(T::infinity(), |element| of(&element.uncertainty)))
     }
 
     /// How an error of the stiffness of the drive shafts shows in the lasting states, per deviation of it: as one of all
     /// torques alike, and of no kiss point and no timing.
-    fn by_stiffness(&self) -> [T; ACTING] {
+    fn by_stiffness(&self, elements: [usize; 2]) -> [T; ACTING] {
         let u = &self.uncertainty;
         let source =
             if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share };
-        let in_shares = [u.torque_share, u.torque_share, T::infinity(), T::infinity(), u.inertia_share, source];
+        let [off, on] = self.of_elements(elements, |u| u.torque_share);
+        let in_shares = [off, on, T::infinity(), T::infinity(), u.inertia_share, source];
         let mut by = [T::zero(); ACTING];
         for (by, share) in by.iter_mut().zip(in_shares).filter(|(_, share)| *share > T::zero()) {
             *by = u.stiffness_share / share;
@@ -173,10 +141,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Lets the valve models go on with what is learnt of lag and delay.
     pub(super) fn take_timing(&self, elements: &mut [Option<ElementState<T>>; MAX_ELEMENTS], learnt: &Learnt<T>) {
-        let u = &self.uncertainty;
         for (at, (memory, element)) in elements.iter_mut().zip(self.tables.elements).enumerate() {
             if let Some(memory) = memory {
-                memory.take_timing(element, u, &learnt.known_timing(at, u.slow_part));
+                memory.take_timing(element, &learnt.known_timing(at, element.uncertainty.slow_part));
             }
         }
     }

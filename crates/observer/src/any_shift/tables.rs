@@ -9,8 +9,8 @@
 
 use drivetrain::{Clutch, Real, ReducedShift};
 
-use super::GearCommand;
 use super::pistons::Piston;
+use super::{ElementUncertainty, GearCommand};
 use crate::{Budget, Reading, ValveModel};
 
 /// Most clutches and brakes of a gearbox.
@@ -32,6 +32,8 @@ pub struct FrictionElement<T> {
     pub piston: Option<Piston<T>>,
     /// Largest errors, for the guaranteed ranges; without it there are none.
     pub budget: Option<Budget<T>>,
+    /// What the filter does not know of it.
+    pub uncertainty: ElementUncertainty<T>,
 }
 
 /// Time from the request of a shift until the dog of its gear is in, s \[chosen\]: synchronisers take 0.1 to 0.2 s.
@@ -193,6 +195,7 @@ impl<T: Real> FrictionElement<T> {
             limits: self.limits.cast(),
             piston: self.piston.as_ref().map(Piston::cast),
             budget: self.budget.as_ref().map(Budget::cast),
+            uncertainty: self.uncertainty.cast(),
         }
     }
 }

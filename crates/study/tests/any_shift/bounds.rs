@@ -228,6 +228,34 @@ fn ranges_hold_where_an_element_that_stays_engaged_may_slip() {
     assert!(outside.is_empty() && values > 10_000 && slipped > 20, "{} of {values}, {slipped} slip", outside.len());
 }
 
+/// What the file states of one element is nothing about the others.
+#[test]
+fn wide_bounds_of_one_clutch_leave_shifts_of_other_clutches_as_they_are() {
+    let mut compared = 0;
+    for known in [cars(), cars_with_strokes()].concat().into_iter().step_by(3) {
+        let [(from, to, throttle), ..] = shifts(&known)[..] else { continue };
+        let shifting = known.gearbox.shift(from, to).unwrap().change.single().unwrap();
+        let mut wide = known.clone();
+        wide.error_bounds.elements = vec![ElementErrorBounds::default(); known.clutches.len()];
+        for (at, element) in wide.error_bounds.elements.iter_mut().enumerate() {
+            if !shifting.contains(&at) {
+                // Only upwards: then elements that stay engaged hold as before.
+                element.friction_factor = Some([0.85, 1.6]);
+                element.valve_lag_factor = Some([0.3, 2.5]);
+            }
+        }
+        let shift = CarShift::usual(&known, from, to, throttle);
+        let [usual, wide] = [&known, &wide].map(|car| scored(car, &known, &known, &shift, &sensors(), true, 3));
+        for (usual, wide) in usual.iter().zip(&wide) {
+            for (usual, wide) in usual.clutches.iter().zip(&wide.clutches) {
+                assert_eq!((usual.torque_n_m, usual.pressure_pa), (wide.torque_n_m, wide.pressure_pa));
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 500, "{compared}");
+}
+
 /// A dual clutch that leaves a gear two steps below at once: the oncoming clutch of the second shift has just been the offgoing one of the
 /// first, and its shaft turns at the ratio of the old gear until the dog of the new one is in.
 #[test]

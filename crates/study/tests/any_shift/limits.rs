@@ -6,7 +6,7 @@ use car::{ElementErrors, ErrorBudget};
 use design::{ShiftTables, any_shift_filter};
 use drivetrain::{ClutchValve, ShiftKind, Table1};
 use observer::Reading;
-use observer::any_shift::{AnyShiftFilter, ShiftInput};
+use observer::any_shift::ShiftInput;
 use plant::car::{CarSample, CarShift};
 use study::any_shift::matrix::{
     CLASSES, ErrorsByPhase, MatrixCounts, MatrixRow, MatrixShift, Pooled, class, counts, drawn_car, errors_by_phase,
@@ -134,15 +134,18 @@ impl Without {
         let filter = any_shift_filter(known, &tables, &standard, Some(&seen));
         let untold = score_samples(&tables, &filter, samples, &read(&seen, &tables));
         let (car, errors) = self.known(known, truth);
-        let tables = ShiftTables::of_car(&car, &errors).unwrap();
+        let mut tables = ShiftTables::of_car(&car, &errors).unwrap();
+        if self == Self::Clutches {
+            tables.uncertainties_mut().for_each(|u| u.kiss_point_pa = LITTLE * 1e5);
+        }
+        if self == Self::AllButDrawn {
+            sure_of_all_but_drawn(&mut tables, &standard);
+        }
         let mut filter = any_shift_filter(&car, &tables, &errors, Some(&seen));
         let mut inputs = read(&self.sensors(&seen), &tables);
         // Without a converter the reported torque of the engine is already exact.
         if self == Self::TurbineTorque {
             (filter.turbine.engine_share, filter.uncertainty.turbine_share) = (LITTLE, 0.5 * LITTLE);
-        }
-        if self == Self::Clutches {
-            filter.uncertainty.kiss_point_pa = LITTLE * 1e5;
         }
         if self == Self::SpeedErrors {
             for (reading, deviation_rad_s) in filter.readings.iter_mut().zip(EXACT_RAD_S) {
@@ -150,7 +153,11 @@ impl Without {
             }
         }
         if self == Self::AllButDrawn {
-            sure_of_all_but_drawn(&mut filter, &standard);
+            (filter.uncertainty.torque_share_s, filter.uncertainty.turbine_share) = (1e6, LITTLE);
+            // Without a converter the reported torque of the engine is exact.
+            if filter.turbine.converter.is_none() {
+                filter.turbine.engine_share = LITTLE;
+            }
         }
         if self != Self::TurbineTorque || filter.turbine.converter.take().is_some() {
             inputs.iter_mut().for_each(|(at, input)| self.tell(input, &samples[*at]));
@@ -167,17 +174,13 @@ impl Without {
 }
 
 /// Leaves the covariance of friction, gain and converter alone, as they are drawn: uniformly, and once for a shift.
-fn sure_of_all_but_drawn(filter: &mut AnyShiftFilter<'_, f64>, budget: &ErrorBudget) {
+fn sure_of_all_but_drawn(tables: &mut ShiftTables<f64>, budget: &ErrorBudget) {
     let [friction, valve_gain] = [budget.widest(ElementErrors::friction), budget.widest(ElementErrors::valve_gain)];
-    let u = &mut filter.uncertainty;
-    u.torque_share = ((friction * friction + valve_gain * valve_gain) / 3.0).sqrt();
-    (u.slow_part, u.torque_share_s) = (0.9999, 1e6);
-    (u.kiss_point_pa, u.pressure_pa) = (100.0, 300.0);
-    (u.valve_lag_share, u.valve_delay_s) = (0.001, 2e-4);
-    u.turbine_share = LITTLE;
-    // Without a converter the reported torque of the engine is exact.
-    if filter.turbine.converter.is_none() {
-        filter.turbine.engine_share = LITTLE;
+    for u in tables.uncertainties_mut() {
+        u.torque_share = ((friction * friction + valve_gain * valve_gain) / 3.0).sqrt();
+        u.slow_part = 0.9999;
+        (u.kiss_point_pa, u.pressure_pa) = (100.0, 300.0);
+        (u.valve_lag_share, u.valve_delay_s) = (0.001, 2e-4);
     }
 }
 

@@ -7,26 +7,14 @@ use drivetrain::{Clutch, ClutchValve, Cylinder, Table1, ValveMaps};
 
 const LIMITS: ValveLimits<f64> = ValveLimits { command_max: 1.2, command_error: 0.01, pressure_max_pa: 1.1e6 };
 
-const UNCERTAINTY: ShiftUncertainty<f64> = ShiftUncertainty {
+const UNCERTAINTY: ElementUncertainty<f64> = ElementUncertainty {
     torque_share: 0.12,
     slow_part: 0.75,
-    torque_share_s: 3.0,
     valve_gain: 0.06,
     kiss_point_pa: 7e3,
     valve_lag_share: 0.3,
     valve_delay_s: 9e-3,
     pressure_pa: 7e3,
-    pressure_s: 0.15,
-    turbine_share: 0.03,
-    turbine_share_s: 3.0,
-    inertia_share: 0.14,
-    stiffness_share: 0.12,
-    wheel_scale: 0.0115,
-    wheel_scale_walk: 4e-5,
-    rate_rad_s: 0.1,
-    rate_walk: 0.01,
-    load_walk: 1500.0,
-    output_least_rad_s: 15.0,
 };
 
 fn element() -> FrictionElement<f64> {
@@ -48,6 +36,7 @@ fn element() -> FrictionElement<f64> {
         limits: LIMITS,
         piston: None,
         budget: None,
+        uncertainty: UNCERTAINTY,
     }
 }
 
@@ -74,7 +63,7 @@ fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
         let command = (at < 9 || held % 2 == 0).then_some(Reading { value, age_s });
         let health = [&mut rests, &mut moves].map(|valve: &mut ElementState<f64>| valve.step(element, command, 0.01));
         assert_eq!(health[0], health[1]);
-        [&mut rests, &mut moves].into_iter().for_each(|valve| valve.move_pistons(element, &UNCERTAINTY, 0.01));
+        [&mut rests, &mut moves].into_iter().for_each(|valve| valve.move_pistons(element, 0.01));
         // So it never begins to rest.
         moves.newest.iter_mut().for_each(|newest| newest.alike_s = 0.0);
         rested += usize::from(rests.rate_pa_s == 0.0);
@@ -90,7 +79,6 @@ fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
 /// Near the kiss point and above it, with errors that are known.
 #[test]
 fn an_element_holds_what_it_carries_by_the_estimate() {
-    let u = UNCERTAINTY;
     let (element, shift) = (element(), ShiftClutch { element: 0, alpha: -1.4, ratio: 2.0 });
     let mut state = ElementState::new(&element);
     for (valve_pa, factor, pressure, kiss) in [
@@ -102,13 +90,13 @@ fn an_element_holds_what_it_carries_by_the_estimate() {
     ] {
         (state.valve_pa, state.rate_pa_s) = (valve_pa, 3e5);
         let wrong = PressureError { pressure, kiss, variance: [0.5, 0.7], covariance: -0.2 };
-        let slips = state.torque(&element, &shift, &u, [0.0, -1.0], &wrong);
+        let slips = state.torque(&element, &shift, [0.0, -1.0], &wrong);
         let carries = slips.base_n_m
             + factor * slips.per_friction_n_m
             + kiss * slips.per_kiss_n_m
             + pressure * slips.per_pressure_n_m;
         // Its static friction is larger.
-        let holds = state.holds(&element, &shift, &u, factor, &wrong);
+        let holds = state.holds(&element, &shift, factor, &wrong);
         assert!((holds + carries * 0.14 / 0.13).abs() < 1e-9, "{valve_pa}: {holds} {carries}");
         assert!((holds > 0.0) == (valve_pa > 1.5e4), "{valve_pa}: {holds}");
     }
@@ -117,7 +105,6 @@ fn an_element_holds_what_it_carries_by_the_estimate() {
 /// While its piston strokes it carries nothing, whatever the pressure at the valve; then it is as one without a stroke.
 #[test]
 fn an_element_whose_plates_do_not_touch_carries_nothing() {
-    let u = UNCERTAINTY;
     let (with, without) = (with_stroke(), element());
     let shift = ShiftClutch { element: 0, alpha: 1.0, ratio: 2.0 };
     let wrong = PressureError { pressure: 0.4, kiss: 0.3, variance: [0.8, 0.9], covariance: 0.0 };
@@ -127,11 +114,11 @@ fn an_element_whose_plates_do_not_touch_carries_nothing() {
         let command = Some(Reading::now(if k < 5 { 0.0 } else { 0.25 }));
         let [stroke, none] = states.each_mut().map(|(element, state)| {
             state.step(element, command, 0.01);
-            state.move_pistons(element, &u, 0.01);
-            let torque = state.torque(element, &shift, &u, [50.0, 1.0], &wrong);
+            state.move_pistons(element, 0.01);
+            let torque = state.torque(element, &shift, [50.0, 1.0], &wrong);
             let all = torque.base_n_m + 0.3 * torque.per_kiss_n_m + 0.4 * torque.per_pressure_n_m;
             // The static friction is larger.
-            let holds = state.holds(element, &shift, &u, 0.0, &wrong);
+            let holds = state.holds(element, &shift, 0.0, &wrong);
             assert!((holds - all * 0.14 / 0.13).abs() < 1e-9 || all < 0.0, "{k}: {holds} {all}");
             (all, torque.open_loop_n_m, state.pressure_pa())
         });
@@ -152,13 +139,13 @@ fn an_element_whose_plates_do_not_touch_carries_nothing() {
 /// A valve model with what is learnt is that of a valve with this lag and delay, which are so far off by the change per deviation.
 #[test]
 fn a_learnt_lag_and_delay_are_those_of_the_valve() {
-    let (known, u) = (element(), UNCERTAINTY);
+    let known = element();
     let truth = ValveModel { valve: known.valve.valve.changed(1.0 + 0.8 * 0.3, 1.0, None), delay_s: 0.006 };
     let truth = FrictionElement { valve: truth, ..known };
     let [mut learnt, mut slow, mut late, mut unlearnt] = [ElementState::new(&known); 4];
     let mut true_state = ElementState::new(&truth);
     for (state, mean) in [(&mut learnt, [0.8, -1.0]), (&mut slow, [0.01, 0.0]), (&mut late, [0.0, 0.01])] {
-        state.take_timing(&known, &u, &ValveTiming { mean, variance: [0.3; 2] });
+        state.take_timing(&known, &ValveTiming { mean, variance: [0.3; 2] });
         assert_eq!(state.taken_off(), mean);
     }
     let (mut most_pa, mut found, mut expected) = (0.0_f64, [0.0; 2], [0.0; 2]);
@@ -170,7 +157,7 @@ fn a_learnt_lag_and_delay_are_those_of_the_valve() {
         }
         assert!((learnt.valve_pa - true_state.valve_pa).abs() < 1.0, "{k}");
         most_pa = most_pa.max((unlearnt.valve_pa - true_state.valve_pa).abs());
-        let by_pa = unlearnt.by_timing_pa(&u);
+        let by_pa = unlearnt.by_timing_pa(&UNCERTAINTY);
         for (k, state) in [&slow, &late].into_iter().enumerate() {
             found[k] += (state.valve_pa - unlearnt.valve_pa) / 0.01;
             expected[k] += by_pa[k];
@@ -181,7 +168,7 @@ fn a_learnt_lag_and_delay_are_those_of_the_valve() {
         assert!(expected < -1e5 && (found / expected - 1.0).abs() < 0.1, "{found} {expected}");
     }
     // No length of the lag and no command before it was sent.
-    learnt.take_timing(&known, &u, &ValveTiming { mean: [-9.0, -9.0], variance: [1.0; 2] });
+    learnt.take_timing(&known, &ValveTiming { mean: [-9.0, -9.0], variance: [1.0; 2] });
     assert_eq!((learnt.lag, learnt.delay_s), (LAG_LEAST, 0.0));
 }
 
