@@ -148,15 +148,18 @@ impl CarStudy {
     }
 }
 
+/// Largest relative error of a friction or a gain: a clutch without friction or pressure cannot be simulated.
+const FACTOR_MAX: f64 = 0.95;
+
 impl RawErrors {
     fn checked(&self, check: &Check<'_>) -> Result<SampledErrors, ConfigError> {
-        let share = |key: &str, value: &Option<Number>| {
-            value.as_ref().map(|value| check.number(format_args!("errors.{key}"), value, 0.0..=0.5)).transpose()
+        let share = |key: &str, value: &Option<Number>, max: f64| {
+            value.as_ref().map(|value| check.number(format_args!("errors.{key}"), value, 0.0..=max)).transpose()
         };
         Ok(SampledErrors {
-            friction: share("friction", &self.friction)?,
-            valve_gain: share("valve_gain", &self.valve_gain)?,
-            converter: share("converter", &self.converter)?,
+            friction: share("friction", &self.friction, FACTOR_MAX)?,
+            valve_gain: share("valve_gain", &self.valve_gain, FACTOR_MAX)?,
+            converter: share("converter", &self.converter, 0.5)?,
         })
     }
 }

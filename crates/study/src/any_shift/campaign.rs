@@ -131,9 +131,10 @@ impl CarCampaign {
         &self.sampled
     }
 
-    /// Where the sampled cars exceed the error bounds of the vehicle file, by which the ranges are made: a phrase each.
+    /// Where the sampled cars exceed the error bounds of the vehicle file, by which the ranges are made: a phrase for all elements
+    /// with the same figures.
     pub fn exceeded(&self) -> Vec<String> {
-        let mut exceeded = Vec::new();
+        let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
         for (at, element) in self.study.car.gearbox.elements.iter().enumerate() {
             let (Some(bounds), Some(sampled)) = (self.budget.element(at), self.sampled.element(at)) else { continue };
             type Factor = fn(&ElementErrors) -> [f64; 2];
@@ -141,11 +142,18 @@ impl CarCampaign {
                 [("friction", |element| element.friction_factor), ("valve gain", |element| element.valve_gain_factor)];
             for (what, of) in of {
                 let ([low, high], [from, to]) = (of(bounds), of(sampled));
-                if from < low || to > high {
-                    exceeded.push(format!("{what} of {} {from} to {to} (bounds {low} to {high})", element.name));
+                if from >= low && to <= high {
+                    continue;
+                }
+                let figures = format!("{what} {from} to {to} (bounds {low} to {high})");
+                match groups.iter_mut().find(|(other, _)| *other == figures) {
+                    Some((_, names)) => names.push(&element.name),
+                    None => groups.push((figures, vec![&element.name])),
                 }
             }
         }
+        let phrase = |(figures, names): &(String, Vec<&str>)| format!("{figures} of {}", names.join(", "));
+        let mut exceeded: Vec<String> = groups.iter().map(phrase).collect();
         let (bound, sampled) = (self.budget.converter, self.sampled.converter);
         if sampled > bound && self.study.car.converter.is_some() {
             exceeded.push(format!("converter capacity +-{:.0} % (bound {:.0} %)", 100.0 * sampled, 100.0 * bound));

@@ -93,7 +93,7 @@ fn warn_of_exceeded(campaign: &CarCampaign) {
         output::note(&format!(
             "warning: [errors] of the study exceeds the error bounds of the vehicle file: {}. The guaranteed ranges are those of the file and need \
              not hold for these cars\nhint: give the bounds under [clutch.NAME.error_bounds] of the vehicle file",
-            exceeded.join(", ")
+            exceeded.join("; ")
         ));
     }
 }
