@@ -113,7 +113,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let by_stiffness = u.stiffness_share * self.driveline.shaft_stiffness_n_m_rad * twist_rate;
         x.add(SPRING, SPRING, T::of(2.0 * TWIST_S) * dt_s * square(by_stiffness));
         if let Some(shift) = running.shift {
-            for (c, clutch) in shift.clutches.iter().enumerate().take(2) {
+            for (c, clutch) in shift.clutches.iter().enumerate() {
+                let c = c.min(1);
                 let walked = self
                     .tables
                     .elements
