@@ -170,32 +170,55 @@ fn a_length_code_above_eight_is_eight_bytes() {
     );
 }
 
+/// The head of a BLF file.
+fn blf_head() -> Vec<u8> {
+    [b"LOGG".as_slice(), &144_u32.to_le_bytes(), &[0; 136]].concat()
+}
+
+/// An object of a BLF file, of this kind, without what pads it.
+fn blf_object(kind: u32, head: &[u8], body: &[u8]) -> Vec<u8> {
+    let heads = 16 + head.len();
+    let [size, heads] = [heads + body.len(), heads].map(|size| u32::try_from(size).unwrap().to_le_bytes());
+    [b"LOBJ", &heads[..2], &1_u16.to_le_bytes(), &size, &kind.to_le_bytes(), head, body].concat()
+}
+
+/// A frame with the identifier 0x100 in a BLF file.
+fn blf_frame(ns: i64, data: [u8; 8]) -> Vec<u8> {
+    let stamp = [2_u32.to_le_bytes().as_slice(), &[0; 4], &ns.to_le_bytes()].concat();
+    let body = [1_u16.to_le_bytes().as_slice(), &[0, 8], &0x100_u32.to_le_bytes(), &data].concat();
+    blf_object(1, &stamp, &body)
+}
+
+#[test]
+fn frames_behind_padding_of_any_size_and_value_are_read() {
+    let folder = Folder::new("padding");
+    let frame = |i: i64| blf_frame(10_000_000 * i, [0x40, 0x0c, 0, 0, 0, 0, 0, 0]);
+    for padding in [[].as_slice(), &[0; 3], &[0xcc; 3], &[0; 5], &[7; 8]] {
+        for text in 103..107 {
+            let other = [blf_object(66, &[0; 16], &vec![b'y'; text]), padding.to_vec()].concat();
+            let objects = [frame(0), other.clone(), frame(1), frame(2), other].concat();
+            let container = blf_object(10, &[], &[[0; 16].as_slice(), &objects].concat());
+            for (place, objects) in [("file", objects), ("container", container)] {
+                let name = format!("{padding:?} behind {text} bytes in a {place}");
+                let bytes = [blf_head(), objects].concat();
+                let (log, samples, notes) = read(&folder.write("bus.blf", bytes), &with_dbc()).expect(&name);
+                assert_eq!((channel(&log, &samples, "N_Eng").len(), notes), (3, vec![]), "{name}");
+            }
+        }
+    }
+}
+
 #[test]
 fn frames_before_the_start_of_a_recording_have_negative_times() {
     let folder = Folder::new("negative-times");
-    // The stamps of a BLF with one container that is not packed: 64 bits from the 24th byte of each object on.
-    let object = |ns: i64, frame: [u8; 8]| {
-        let head = [
-            b"LOBJ".as_slice(),
-            &32_u16.to_le_bytes(),
-            &1_u16.to_le_bytes(),
-            &48_u32.to_le_bytes(),
-            &1_u32.to_le_bytes(),
-        ]
-        .concat();
-        let stamp = [2_u32.to_le_bytes().as_slice(), &[0; 4], &ns.to_le_bytes()].concat();
-        let body = [1_u16.to_le_bytes().as_slice(), &[0, 8], &0x100_u32.to_le_bytes(), &frame].concat();
-        [head, stamp, body].concat()
-    };
     let frames: Vec<u8> =
-        (0..500_i64).flat_map(|i| object(-1_000_000_000 + 10_000_000 * i, [0x40, 0x0c, 0, 0, 0, 0, 0, 0])).collect();
-    let head = [b"LOGG".as_slice(), &144_u32.to_le_bytes(), &[0; 136]].concat();
+        (0..500_i64).flat_map(|i| blf_frame(-1_000_000_000 + 10_000_000 * i, [0x40, 0x0c, 0, 0, 0, 0, 0, 0])).collect();
     let asc: String =
         (0..500).map(|i| format!("{:.6} 1 100 Rx d 8 40 0C 00 00 00 00 00 00\n", -1.0 + 0.01 * f64::from(i))).collect();
     let candump: String =
         (0..500).map(|i| format!("({:.6}) can0 100#400C000000000000\n", -1.0 + 0.01 * f64::from(i))).collect();
     for (name, bytes) in [
-        ("blf", [head, frames].concat()),
+        ("blf", [blf_head(), frames].concat()),
         ("asc", format!("date Sun Mar 31 12:00:00 2024\nbase hex  timestamps absolute\n{asc}").into_bytes()),
         ("candump", candump.into_bytes()),
     ] {

@@ -36,6 +36,11 @@ pub(crate) struct Blf {
     ended: bool,
 }
 
+/// The first bytes of an object.
+const OBJECT: &[u8] = b"LOBJ";
+/// The most bytes of padding between two objects.
+const PADDING_MAX: usize = 8;
+
 /// The head of an object.
 struct Object {
     kind: u32,
@@ -45,7 +50,7 @@ struct Object {
 
 impl Object {
     fn parse(bytes: &[u8]) -> Result<Self, String> {
-        if bytes.get(..4) != Some(b"LOBJ") {
+        if bytes.get(..4) != Some(OBJECT) {
             return Err("there is no object where one should begin".to_owned());
         }
         let (header, size, kind) = (u16_at(bytes, 4), u32_at(bytes, 8), u32_at(bytes, 12));
@@ -54,6 +59,11 @@ impl Object {
         }
         Ok(Self { kind, header: usize::from(header), size: size as usize })
     }
+}
+
+/// Where the next object begins. Between objects lies padding of up to eight bytes; its size and its values depend on the writer.
+fn begin_of_object(bytes: &[u8]) -> Option<usize> {
+    bytes.windows(OBJECT.len()).take(PADDING_MAX + 1).position(|window| window == OBJECT)
 }
 
 /// Little-endian numbers; zero beyond the end.
@@ -108,9 +118,13 @@ impl Blf {
     fn read_outer(&mut self) -> Result<bool, LogError> {
         let offset = self.offset;
         let mut bytes = self.bytes(BASE)?;
-        if bytes.is_empty() {
+        let begins = begin_of_object(&bytes);
+        if begins.is_none() && bytes.len() < BASE {
+            // Nothing but the padding of the last object.
             return Ok(false);
         }
+        bytes.drain(..begins.unwrap_or(0));
+        bytes.extend(self.bytes(BASE - bytes.len())?);
         let object = Object::parse(&bytes).map_err(|message| self.damaged(offset, message))?;
         let body = self.bytes(object.size - BASE)?;
         bytes.extend(body);
@@ -119,8 +133,6 @@ impl Blf {
             self.damage =
                 Some(self.damaged(offset, format!("the object is cut: {} of {} bytes", bytes.len(), object.size)));
         }
-        // Objects begin at multiples of four bytes, counted as their writers do.
-        self.bytes(object.size % 4)?;
         self.inner.drain(..self.at);
         self.at = 0;
         if object.kind != CONTAINER {
@@ -152,9 +164,8 @@ impl Blf {
 
     /// The next object that lies whole in the memory; none if there is none.
     fn next_inner(&mut self) -> Result<Option<(usize, Object)>, LogError> {
-        // Between objects lie up to three bytes of padding.
         let left = self.inner.get(self.at..).unwrap_or_default();
-        let skip = left.iter().take(3).take_while(|byte| **byte == 0).count();
+        let skip = begin_of_object(left).unwrap_or(0);
         let left = left.get(skip..).unwrap_or_default();
         if left.len() < BASE {
             return Ok(None);
