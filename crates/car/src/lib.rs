@@ -67,7 +67,8 @@ pub use self::{
     speed_trace::SpeedTrace,
     template::{CarSize, TemplateError},
     vehicle::{
-        CompliantRequirement, DesignRequirement, FilterSettings, PhaseSlips, Uncertainty, ValveUncertainty, Vehicle,
+        CompliantRequirement, DesignRequirement, FilterSettings, ObserverSettings, PhaseSlips, Requirements,
+        Uncertainty, ValveUncertainty, Vehicle,
     },
 };
 

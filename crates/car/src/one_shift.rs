@@ -7,8 +7,8 @@ use geartrain::{Change, Shift};
 
 use crate::error_budget::{BACKLASH_RAD, CHANNEL_SKEW_S, COMMAND_AGE_S, WHEEL_DELAY_S, around, command_limits};
 use crate::{
-    Car, CompliantRequirement, DesignRequirement, ElementErrors, ErrorBounds, ErrorBudget, FilterSettings, PhaseSlips,
-    ShiftClutch, Uncertainty, ValveUncertainty, Vehicle,
+    Car, CompliantRequirement, DesignRequirement, ElementErrors, ErrorBounds, ErrorBudget, FilterSettings,
+    ObserverSettings, PhaseSlips, Requirements, ShiftClutch, Uncertainty, ValveUncertainty, Vehicle,
 };
 
 /// The car whose values are scaled, that of `vehicles/two_speed_at.toml`: greatest engine torque, N m.
@@ -249,31 +249,35 @@ impl<'c> OneShift<'c> {
             oil_temperature_degc: car.oil_temperature_degc,
             tyre: car.tyre,
             road: car.road,
-            observer_valve: self.observer_valve(self.oncoming.clutch.kiss_pressure() + error_bounds.shift_pressure_pa),
-            uncertainty: Uncertainty { friction: self.friction(), valve: kind.valve },
-            phase_slips: PhaseSlips { release_slip_rad_s: 1.0, lock_slip_rad_s: 3.0, lock_hold_s: 0.02 },
-            speed_max_rad_s: 1000.0,
-            command_max: match self.oncoming.valve.command_kind() {
-                CommandKind::Current => {
-                    command_limits(&self.oncoming.valve, car.line_pressure_pa, self.element.valve_gain_factor)[1]
-                }
-                CommandKind::DutyCycle => kind.command_max,
+            settings: ObserverSettings {
+                valve: self.observer_valve(self.oncoming.clutch.kiss_pressure() + error_bounds.shift_pressure_pa),
+                uncertainty: Uncertainty { friction: self.friction(), valve: kind.valve },
+                phase_slips: PhaseSlips { release_slip_rad_s: 1.0, lock_slip_rad_s: 3.0, lock_hold_s: 0.02 },
+                speed_max_rad_s: 1000.0,
+                command_max: match self.oncoming.valve.command_kind() {
+                    CommandKind::Current => {
+                        command_limits(&self.oncoming.valve, car.line_pressure_pa, self.element.valve_gain_factor)[1]
+                    }
+                    CommandKind::DutyCycle => kind.command_max,
+                },
+                filter: FilterSettings {
+                    turbine_share: 0.10,
+                    turbine_share_s: 3.0,
+                    twist_rate_rad_s: 0.05,
+                    valve_rate_s: 0.1,
+                    offgoing_n_m: self.torque_size() * OFFGOING_N_M * self.offgoing_size(),
+                    offgoing_release_s: 0.03,
+                    output_least_rad_s: 20.0,
+                },
+                shaft_settling_s: 0.5,
             },
-            torque_phase: self.requirement(torque_s, None, in_torque_phase * 36.7, 0.06e6),
-            inertia_phase: self.requirement(inertia_s, Some(15.0), in_inertia_phase * 1600.0, 0.05e6),
-            compliant_torque_phase: self.compliant(compliant_torque_s, 15.0, 0.18e6),
-            compliant_inertia_phase: self.compliant(compliant_inertia_s, 5.0, 0.04e6),
+            requirements: Requirements {
+                torque_phase: self.requirement(torque_s, None, in_torque_phase * 36.7, 0.06e6),
+                inertia_phase: self.requirement(inertia_s, Some(15.0), in_inertia_phase * 1600.0, 0.05e6),
+                compliant_torque_phase: self.compliant(compliant_torque_s, 15.0, 0.18e6),
+                compliant_inertia_phase: self.compliant(compliant_inertia_s, 5.0, 0.04e6),
+            },
             error_bounds,
-            filter: FilterSettings {
-                turbine_share: 0.10,
-                turbine_share_s: 3.0,
-                twist_rate_rad_s: 0.05,
-                valve_rate_s: 0.1,
-                offgoing_n_m: self.torque_size() * OFFGOING_N_M * self.offgoing_size(),
-                offgoing_release_s: 0.03,
-                output_least_rad_s: 20.0,
-            },
-            shaft_settling_s: 0.5,
         }
     }
 

@@ -86,6 +86,38 @@ pub struct PhaseSlips {
     pub lock_hold_s: f64,
 }
 
+/// What the gain designs of one shift must reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Requirements {
+    /// In the torque phase.
+    pub torque_phase: DesignRequirement,
+    /// In the inertia phase.
+    pub inertia_phase: DesignRequirement,
+    /// On the compliant observer in the torque phase.
+    pub compliant_torque_phase: CompliantRequirement,
+    /// On the compliant observer in the inertia phase.
+    pub compliant_inertia_phase: CompliantRequirement,
+}
+
+/// What the observers of one shift assume, beside the car and its error budget.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObserverSettings {
+    /// Their model of the oncoming clutch's valve.
+    pub valve: Valve<f64>,
+    /// What varies in their model.
+    pub uncertainty: Uncertainty,
+    /// Slips that decide on the phase.
+    pub phase_slips: PhaseSlips,
+    /// Highest speed that is taken for a measurement, rad/s.
+    pub speed_max_rad_s: f64,
+    /// Largest command of the valve that is taken for a measurement, A or %.
+    pub command_max: f64,
+    /// The Kalman filter's model of the unknown torques.
+    pub filter: FilterSettings,
+    /// Time in which the estimated shaft torque leans towards its steady value outside the shift, s.
+    pub shaft_settling_s: f64,
+}
+
 /// A vehicle: everything the plant, the observers and the design need to know.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vehicle {
@@ -113,30 +145,12 @@ pub struct Vehicle {
     pub tyre: Tyre<f64>,
     /// Vehicle body and road.
     pub road: RoadLoad<f64>,
-    /// The observers' model of the oncoming clutch's valve.
-    pub observer_valve: Valve<f64>,
-    /// What varies in the observers' model.
-    pub uncertainty: Uncertainty,
-    /// Slips that decide on the phase.
-    pub phase_slips: PhaseSlips,
-    /// Highest speed that is taken for a measurement, rad/s.
-    pub speed_max_rad_s: f64,
-    /// Largest command of the valve that is taken for a measurement, A or %.
-    pub command_max: f64,
-    /// Requirement in the torque phase.
-    pub torque_phase: DesignRequirement,
-    /// Requirement in the inertia phase.
-    pub inertia_phase: DesignRequirement,
-    /// Requirement on the compliant observer in the torque phase.
-    pub compliant_torque_phase: CompliantRequirement,
-    /// Requirement on the compliant observer in the inertia phase.
-    pub compliant_inertia_phase: CompliantRequirement,
+    /// What the observers assume.
+    pub settings: ObserverSettings,
+    /// What the gain design must reach.
+    pub requirements: Requirements,
     /// The error budget.
     pub error_bounds: ErrorBounds,
-    /// The Kalman filter's model of the unknown torques.
-    pub filter: FilterSettings,
-    /// Time in which the estimated shaft torque leans towards its steady value outside the shift, s.
-    pub shaft_settling_s: f64,
 }
 
 impl Vehicle {

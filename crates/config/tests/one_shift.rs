@@ -56,10 +56,10 @@ fn the_two_speed_gearbox_gives_the_built_in_vehicle() {
     near(own.slip_rad_s, other.slip_rad_s, 1e-9);
     // A turbine torque within 13.3 N m, and in the inertia phase 7.9 N m of the inertia, in place of 20 N m.
     let model_error = |phase: fn(&Vehicle) -> f64| phase(&found) / phase(&built_in);
-    assert!((0.9..1.0).contains(&model_error(|vehicle| vehicle.torque_phase.model_error_max_rad_s2)));
-    near(model_error(|vehicle| vehicle.inertia_phase.model_error_max_rad_s2), 1.0, 0.1);
-    near(found.filter.offgoing_n_m, built_in.filter.offgoing_n_m, 1e-9);
-    assert_eq!(found.phase_slips, built_in.phase_slips);
+    assert!((0.9..1.0).contains(&model_error(|vehicle| vehicle.requirements.torque_phase.model_error_max_rad_s2)));
+    near(model_error(|vehicle| vehicle.requirements.inertia_phase.model_error_max_rad_s2), 1.0, 0.1);
+    near(found.settings.filter.offgoing_n_m, built_in.settings.filter.offgoing_n_m, 1e-9);
+    assert_eq!(found.settings.phase_slips, built_in.settings.phase_slips);
     // The turbine torque is within 10 % of 133 N m, the inertia of 0.06 kg m^2 and more within 20 %.
     near(own.turbine_torque_n_m, 13.3, 1e-9);
     near(own.inertia_torque_n_m, 0.2 * found.shift.mass_kg_m2[0][0] * 600.0, 1e-9);
@@ -77,14 +77,18 @@ fn what_no_car_scales_is_that_of_the_vehicle_files_of_one_shift() {
     let pwm = VehicleFile::read(path.as_ref()).unwrap().vehicle;
     let built_in = VehicleFile::built_in().unwrap().vehicle;
     for (found, other) in [(of(&eight_speed(), "2-3").unwrap(), built_in), (of(&by_duty_cycle, "2-3").unwrap(), pwm)] {
-        assert_eq!((found.phase_slips, found.speed_max_rad_s), (other.phase_slips, other.speed_max_rad_s));
         assert_eq!(
-            (found.uncertainty.valve, found.shaft_settling_s),
-            (other.uncertainty.valve, other.shaft_settling_s)
+            (found.settings.phase_slips, found.settings.speed_max_rad_s),
+            (other.settings.phase_slips, other.settings.speed_max_rad_s)
+        );
+        assert_eq!(
+            (found.settings.uncertainty.valve, found.settings.shaft_settling_s),
+            (other.settings.uncertainty.valve, other.settings.shaft_settling_s)
         );
         let settling = |vehicle: &Vehicle| {
-            let (torque, inertia) = (&vehicle.torque_phase, &vehicle.inertia_phase);
-            let compliant = (&vehicle.compliant_torque_phase, &vehicle.compliant_inertia_phase);
+            let (torque, inertia) = (&vehicle.requirements.torque_phase, &vehicle.requirements.inertia_phase);
+            let compliant =
+                (&vehicle.requirements.compliant_torque_phase, &vehicle.requirements.compliant_inertia_phase);
             [
                 (torque.settling_time_s, torque.kappa1_per_s),
                 (inertia.settling_time_s, inertia.kappa1_per_s),
@@ -95,14 +99,18 @@ fn what_no_car_scales_is_that_of_the_vehicle_files_of_one_shift() {
         assert_eq!(settling(&found), settling(&other));
         let of_pressure = |vehicle: &Vehicle| {
             let size = vehicle.error_bounds.shift_pressure_pa;
-            [vehicle.torque_phase.offset_max_pa, vehicle.inertia_phase.offset_max_pa, vehicle.error_bounds.pressure_pa]
-                .map(|pressure_pa| pressure_pa / size)
+            [
+                vehicle.requirements.torque_phase.offset_max_pa,
+                vehicle.requirements.inertia_phase.offset_max_pa,
+                vehicle.error_bounds.pressure_pa,
+            ]
+            .map(|pressure_pa| pressure_pa / size)
         };
         for (own, other) in of_pressure(&found).into_iter().zip(of_pressure(&other)) {
             near(own, other, 1e-12);
         }
         let same = |vehicle: &Vehicle| {
-            let (bounds, filter) = (&vehicle.error_bounds, &vehicle.filter);
+            let (bounds, filter) = (&vehicle.error_bounds, &vehicle.settings.filter);
             let of_bounds = [
                 bounds.grade_rad,
                 bounds.offgoing_drain_s,
@@ -143,11 +151,11 @@ fn the_bounds_are_those_of_the_car_and_of_the_oncoming_element() {
     assert_eq!((bounds.valve_lag_factor, bounds.valve_delay_s), ([0.5, 1.5], [0.0, 0.03]));
     assert_eq!((bounds.valve_hysteresis_pa, bounds.shaft_stiffness_factor), (10e3, [0.8, 1.2]));
     near(bounds.pressure_max_pa, 1.1 * 1.6e6, 1e-12);
-    let (least, greatest) = vehicle.uncertainty.friction;
+    let (least, greatest) = vehicle.settings.uncertainty.friction;
     near(least, 0.85 * 0.12, 1e-9);
     near(greatest, 1.15 * 0.12 * 1.21, 1e-9);
     // The valve is as it is at the pressure of a shift.
-    let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve else { panic!() };
+    let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.settings.valve else { panic!() };
     let pressure_pa = vehicle.oncoming.clutch.kiss_pressure() + bounds.shift_pressure_pa;
     let valve = vehicle.oncoming.valve;
     near(valve.settled_pressure(pressure_pa / gain_pa_a), pressure_pa, 1e-9);
@@ -197,7 +205,7 @@ fn a_normally_high_valve_is_commanded_by_the_current_below_the_one_without_press
     let car = CarFile::from_sources(Source::built_in("car.toml", &text), gearbox).unwrap().car;
     let vehicle = of(&car, "2-3").unwrap();
     assert!(car.clutches[2].unwrap().valve.falls() && !vehicle.oncoming.valve.falls());
-    assert_eq!(vehicle.observer_valve, Valve::Proportional { time_constant_s: 0.05, gain_pa_a: 1.5e6 });
+    assert_eq!(vehicle.settings.valve, Valve::Proportional { time_constant_s: 0.05, gain_pa_a: 1.5e6 });
 }
 
 #[test]

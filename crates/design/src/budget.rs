@@ -23,12 +23,12 @@ impl ValveErrors {
     pub fn of(vehicle: &Vehicle) -> Self {
         let (budget, real) = (&vehicle.error_bounds, &vehicle.oncoming.valve);
         let (pressure_pa, time_constant_s) = (shift_pressure(vehicle), shift_time_constant(vehicle));
-        let lag = match (&vehicle.observer_valve, real) {
+        let lag = match (&vehicle.settings.valve, real) {
             (Valve::PulseWidth(told), ClutchValve::PulseWidth { law, .. }) => told.flow_sqrt_pa_s / law.flow_sqrt_pa_s,
             (_, real) => real.maps().map_or(1.0, |maps| maps.time_constant_s.at(pressure_pa) / time_constant_s),
         };
         let command = real.command_for(pressure_pa);
-        let gain = pressure_pa / vehicle.observer_valve.settled_pressure(command);
+        let gain = pressure_pa / vehicle.settings.valve.settled_pressure(command);
         let furthest =
             |factors: [f64; 2], by: f64| factors.map(|f| (f * by - 1.0).abs()).into_iter().fold(0.0, f64::max);
         Self {
@@ -47,7 +47,7 @@ impl ValveErrors {
 /// Time constant of the observers' valve model in a shift, s; of a pulse-width valve, at the pressure drop that moves the
 /// pressure as fast as the budget takes for a shift.
 pub fn shift_time_constant(vehicle: &Vehicle) -> f64 {
-    match &vehicle.observer_valve {
+    match &vehicle.settings.valve {
         Valve::Proportional { time_constant_s, .. } => *time_constant_s,
         Valve::PulseWidth(law) => 1.0 / law.rate_per_drop(law.drop_for(vehicle.error_bounds.shift_ramp_pa_s)),
     }
@@ -87,7 +87,7 @@ mod tests {
     #[test]
     fn a_valve_that_is_what_the_observers_are_told_has_no_error() {
         let mut vehicle = VehicleFile::built_in().unwrap().vehicle;
-        let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve else { panic!() };
+        let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.settings.valve else { panic!() };
         vehicle.oncoming.valve = ClutchValve::Proportional(ValveMaps {
             time_constant_s: Table1::constant(time_constant_s),
             gain_pa_a: Table1::constant(gain_pa_a),

@@ -183,7 +183,7 @@ pub fn compliant_observer(
         model: compliant_model(vehicle),
         gains: gains.into(),
         tracker: tracker(vehicle),
-        shaft_settling_s: vehicle.shaft_settling_s,
+        shaft_settling_s: vehicle.settings.shaft_settling_s,
     }
 }
 
@@ -219,8 +219,8 @@ pub fn error_matrix(vehicle: &Vehicle, phase: Phase) -> DMatrix<f64> {
 
 fn required(vehicle: &Vehicle, phase: Phase) -> &car::CompliantRequirement {
     match phase {
-        Phase::InertiaPhase | Phase::AfterShift => &vehicle.compliant_inertia_phase,
-        Phase::BeforeShift | Phase::TorquePhase => &vehicle.compliant_torque_phase,
+        Phase::InertiaPhase | Phase::AfterShift => &vehicle.requirements.compliant_inertia_phase,
+        Phase::BeforeShift | Phase::TorquePhase => &vehicle.requirements.compliant_torque_phase,
     }
 }
 
@@ -326,8 +326,8 @@ fn vertices(vehicle: &Vehicle, phase: Phase) -> Vec<Vertex> {
     let model = compliant_model(vehicle);
     let outputs = outputs(phase);
     let mut vertices = Vec::new();
-    for (valve_label, a22_per_s) in valve_extremes(&model.rigid, &vehicle.uncertainty) {
-        for friction in distinct(vehicle.uncertainty.friction) {
+    for (valve_label, a22_per_s) in valve_extremes(&model.rigid, &vehicle.settings.uncertainty) {
+        for friction in distinct(vehicle.settings.uncertainty.friction) {
             let influence = model.influence(phase, friction);
             let unit = [SHAFT_UNIT_N_M, PRESSURE_UNIT_PA];
             vertices.push(Vertex {

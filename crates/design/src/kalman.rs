@@ -149,7 +149,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
 
 /// What the filter does not know.
 fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64> {
-    let (budget, told) = (&vehicle.error_bounds, &vehicle.filter);
+    let (budget, told) = (&vehicle.error_bounds, &vehicle.settings.filter);
     let line = &vehicle.driveline;
     let wheels = vehicle.road.inertia_at_wheel() + line.wheel_inertia_kg_m2;
     // A quarter of a swing of the shafts between the gearbox, with the gear's share of the turbine, and the wheels.
@@ -202,7 +202,7 @@ pub fn unscented_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> Unscent
 }
 
 fn aged_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> ExtendedFilter<f64> {
-    let (budget, told) = (&vehicle.error_bounds, &vehicle.filter);
+    let (budget, told) = (&vehicle.error_bounds, &vehicle.settings.filter);
     let valve = ValveErrors::of(vehicle);
     let noise = FilterNoise {
         turbine_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.turbine), budget.turbine_quantum_rad_s),

@@ -47,8 +47,8 @@ impl RigidDesign {
 /// What the vehicle file requires in a phase; before and after the shift there is nothing to design.
 pub fn requirement(vehicle: &Vehicle, phase: Phase) -> &DesignRequirement {
     match phase {
-        Phase::InertiaPhase | Phase::AfterShift => &vehicle.inertia_phase,
-        Phase::BeforeShift | Phase::TorquePhase => &vehicle.torque_phase,
+        Phase::InertiaPhase | Phase::AfterShift => &vehicle.requirements.inertia_phase,
+        Phase::BeforeShift | Phase::TorquePhase => &vehicle.requirements.torque_phase,
     }
 }
 
@@ -59,7 +59,7 @@ pub fn rigid_model(vehicle: &Vehicle) -> RigidModel<f64> {
         vehicle.output_inertia_kg_m2,
         vehicle.converter,
         vehicle.oncoming.clutch,
-        vehicle.observer_valve,
+        vehicle.settings.valve,
         vehicle.road,
         vehicle.driveline,
     )
@@ -78,7 +78,7 @@ const SAMPLE_MAX_S: f64 = 0.04;
 /// Checks, valve and phase for the observers of this vehicle.
 pub fn tracker(vehicle: &Vehicle) -> Tracker<f64> {
     Tracker {
-        valve: vehicle.observer_valve,
+        valve: vehicle.settings.valve,
         shift: vehicle.shift,
         supervisor: supervisor(vehicle),
         limits: input_limits(vehicle),
@@ -89,7 +89,7 @@ pub fn tracker(vehicle: &Vehicle) -> Tracker<f64> {
 
 /// The phase supervisor of this vehicle.
 pub fn supervisor(vehicle: &Vehicle) -> Supervisor<f64> {
-    let slips = &vehicle.phase_slips;
+    let slips = &vehicle.settings.phase_slips;
     Supervisor {
         kiss_pressure_pa: vehicle.oncoming.clutch.kiss_pressure(),
         release_slip_rad_s: slips.release_slip_rad_s,
@@ -101,8 +101,8 @@ pub fn supervisor(vehicle: &Vehicle) -> Supervisor<f64> {
 /// What a reading or an estimate of this vehicle can be.
 pub fn input_limits(vehicle: &Vehicle) -> InputLimits<f64> {
     InputLimits {
-        speed_max_rad_s: vehicle.speed_max_rad_s,
-        command_max: vehicle.command_max,
+        speed_max_rad_s: vehicle.settings.speed_max_rad_s,
+        command_max: vehicle.settings.command_max,
         command_error: vehicle.error_bounds.command,
         pressure_max_pa: vehicle.error_bounds.pressure_max_pa,
         shaft_torque_max_n_m: vehicle.shaft_torque_max_n_m(),
@@ -187,7 +187,7 @@ pub fn best_phase(
     phase: Phase,
     requirement: &IssRequirement,
 ) -> Result<(Certificate, Option<OffsetMissed>), DesignError> {
-    let polytope = Polytope::of(&rigid_model(vehicle), &vehicle.uncertainty, phase);
+    let polytope = Polytope::of(&rigid_model(vehicle), &vehicle.settings.uncertainty, phase);
     let design = |kappa2_per_s| design_iss(&IssRequirement { kappa2_per_s, ..*requirement }, &polytope);
     let certificate = design(requirement.kappa2_per_s).map_err(|error| error.in_phase(phase))?;
     let missed = (certificate.offset_pa > requirement.offset_max_pa).then(|| {

@@ -16,7 +16,7 @@ pub fn super_twisting(vehicle: &Vehicle) -> SuperTwisting<f64> {
     let model = rigid_model(vehicle);
     let valve_rate_pa_s = ValveErrors::of(vehicle).largest_pa_s();
     let rate = |phase| {
-        let [turbine, slip] = model.influence(phase, vehicle.uncertainty.friction.1);
+        let [turbine, slip] = model.influence(phase, vehicle.settings.uncertainty.friction.1);
         turbine.hypot(slip) * valve_rate_pa_s
     };
     let error_rate_rad_s3 = [rate(Phase::TorquePhase), rate(Phase::InertiaPhase)];
@@ -28,7 +28,7 @@ pub fn inversion(vehicle: &Vehicle) -> Inversion<f64> {
     Inversion {
         model: compliant_model(vehicle),
         smoothing_s: SMOOTHING_SHARE * shift_time_constant(vehicle),
-        shaft_settling_s: vehicle.shaft_settling_s,
+        shaft_settling_s: vehicle.settings.shaft_settling_s,
         tracker: tracker(vehicle),
     }
 }

@@ -34,7 +34,7 @@ pub fn design_sliding(vehicle: &Vehicle) -> SlidingGains<f64> {
 /// Speed gains, rad/s^2, and pressure gains, Pa/s, on `(w_t, dw)`.
 fn phase_gains(vehicle: &Vehicle, phase: Phase) -> ([f64; 2], [f64; 2]) {
     let model = rigid_model(vehicle);
-    let (weak, strong) = vehicle.uncertainty.friction;
+    let (weak, strong) = vehicle.settings.uncertainty.friction;
     let bounds = &vehicle.error_bounds;
     let error = ShiftTorques { turbine_n_m: turbine_n_m(vehicle, phase), ..ShiftTorques::default() };
     let rows = model.coefficients(phase);
@@ -46,7 +46,7 @@ fn phase_gains(vehicle: &Vehicle, phase: Phase) -> ([f64; 2], [f64; 2]) {
         speed[i] = torque_error[i] + influence[i].abs() * bounds.pressure_pa;
     }
 
-    let a22 = slowest_valve(&model, &vehicle.uncertainty);
+    let a22 = slowest_valve(&model, &vehicle.settings.uncertainty);
     let kappa2 = 4.0 / requirement(vehicle, phase).settling_time_s;
     // Decay that the switching must add at the weakest friction; the valve gives its own.
     let added_per_s = (kappa2 + a22).max(0.0);

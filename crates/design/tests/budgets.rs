@@ -86,7 +86,7 @@ const ENTRIES: [Entry; 22] = [
 /// The built-in car with a valve that is what the observers are told, so that nothing is left of its errors.
 fn known_valve() -> Vehicle {
     let mut vehicle = VehicleFile::built_in().unwrap().vehicle;
-    let drivetrain::Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve else { panic!() };
+    let drivetrain::Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.settings.valve else { panic!() };
     vehicle.oncoming.valve = ClutchValve::Proportional(ValveMaps {
         time_constant_s: Table1::constant(time_constant_s),
         gain_pa_a: Table1::constant(gain_pa_a),

@@ -96,7 +96,7 @@ fn a_missed_offset_says_who_requires_it_and_with_which_settling_time_it_can_be_h
 #[test]
 fn the_best_certified_gain_is_there_where_the_offset_is_missed() {
     let mut vehicle = vehicle();
-    vehicle.torque_phase.model_error_max_rad_s2 = 84.5;
+    vehicle.requirements.torque_phase.model_error_max_rad_s2 = 84.5;
     let (design, missed) = design::best_rigid(&vehicle).unwrap();
     assert!(design.torque_phase.smallest_margin_per_s() >= 0.0 && design.torque_phase.offset_pa > 0.06e6);
     assert_eq!(missed.iter().map(|missed| missed.phase).collect::<Vec<_>>(), [Phase::TorquePhase]);
@@ -144,7 +144,7 @@ fn a_valve_that_is_fast_enough_alone_needs_no_gain() {
 #[test]
 fn a_varying_valve_adds_its_vertices() {
     let mut vehicle = vehicle();
-    vehicle.uncertainty.valve = ValveUncertainty::TimeConstant((0.02, 0.2));
+    vehicle.settings.uncertainty.valve = ValveUncertainty::TimeConstant((0.02, 0.2));
     let certificate = design_phase(&vehicle, Phase::InertiaPhase, &requirement(Some(15.0))).unwrap();
     assert_eq!(certificate.vertices.len(), 4);
     // The slow valve asks for 55 - 5 = 50/s from the gain in place of 30/s.
@@ -264,7 +264,7 @@ fn largest_of_two(a: f64, b: f64, d: f64) -> f64 {
 fn a_compliant_certificate_is_what_the_closed_forms_say() {
     let vehicle = vehicle();
     let (model, design) = (compliant_model(&vehicle), design_compliant(&vehicle).unwrap());
-    let (weak, strong) = vehicle.uncertainty.friction;
+    let (weak, strong) = vehicle.settings.uncertainty.friction;
     let a22 = model.rigid.valve.linear(0.0, 0.0).a22_per_s;
     for (phase, outputs) in [(Phase::TorquePhase, &[0, 2][..]), (Phase::InertiaPhase, &[0, 1, 2][..])] {
         let certificate = design.of(phase).unwrap();
@@ -324,7 +324,7 @@ fn the_certificate_holds_for_backward_slip_too() {
     for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
         let certificate = design_rigid(&vehicle).unwrap().of(phase).unwrap().clone();
         let model = rigid_model(&vehicle);
-        let (least, greatest) = vehicle.uncertainty.friction;
+        let (least, greatest) = vehicle.settings.uncertainty.friction;
         for (friction, vertex) in [least, greatest].into_iter().zip(&certificate.vertices) {
             // The direction of the slip goes with the friction.
             let backward = model.influence(phase, -friction);

@@ -229,30 +229,30 @@ fn vehicle() -> impl Strategy<Value = Vehicle> {
             clutch.return_spring_n = within(1.0, 10e3);
             clutch.friction = Table1::constant(within(0.02, 0.5));
             clutch.static_friction = 0.5;
-            v.speed_max_rad_s = within(100.0, 5e3);
+            v.settings.speed_max_rad_s = within(100.0, 5e3);
             v.error_bounds.pressure_max_pa = within(1e5, 10e6);
             valve_and_stroke(&mut v, budget);
             v.error_bounds.turbine_torque_share = within(1e-3, 0.9);
             v.error_bounds.sampling_delay_s = within(1e-6, 0.2);
             v.error_bounds.valve_delay_s = [0.0, within(1e-6, 0.5)];
-            v.filter.turbine_share = within(1e-4, 1.0);
-            v.filter.turbine_share_s = within(0.01, 1e3);
-            v.filter.valve_rate_s = within(1e-3, 10.0);
-            v.filter.offgoing_n_m = within(0.1, 1e5);
-            v.filter.offgoing_release_s = within(1e-3, 10.0);
-            v.filter.output_least_rad_s = within(0.1, 500.0);
-            v.shaft_settling_s = within(0.01, 10.0);
-            v.phase_slips.lock_slip_rad_s = within(0.1, 100.0);
-            v.phase_slips.release_slip_rad_s = within(0.1, 100.0);
+            v.settings.filter.turbine_share = within(1e-4, 1.0);
+            v.settings.filter.turbine_share_s = within(0.01, 1e3);
+            v.settings.filter.valve_rate_s = within(1e-3, 10.0);
+            v.settings.filter.offgoing_n_m = within(0.1, 1e5);
+            v.settings.filter.offgoing_release_s = within(1e-3, 10.0);
+            v.settings.filter.output_least_rad_s = within(0.1, 500.0);
+            v.settings.shaft_settling_s = within(0.01, 10.0);
+            v.settings.phase_slips.lock_slip_rad_s = within(0.1, 100.0);
+            v.settings.phase_slips.release_slip_rad_s = within(0.1, 100.0);
             let time_constant_s = within(0.001, 2.0);
             if pulse_width {
                 let law =
                     PulseWidth { flow_sqrt_pa_s: within(1e3, 1e6), line_pressure_pa: v.error_bounds.pressure_max_pa };
-                v.observer_valve = Valve::PulseWidth(law);
+                v.settings.valve = Valve::PulseWidth(law);
                 v.oncoming.valve = ClutchValve::PulseWidth { law, delay_s: Table1::constant(0.01) };
-                v.command_max = 100.0;
+                v.settings.command_max = 100.0;
             } else {
-                v.observer_valve = Valve::Proportional { time_constant_s, gain_pa_a: within(1e4, 20e6) };
+                v.settings.valve = Valve::Proportional { time_constant_s, gain_pa_a: within(1e4, 20e6) };
             }
             v
         },

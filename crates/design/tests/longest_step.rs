@@ -39,7 +39,7 @@ fn up_to_the_longest_step_a_sampled_gain_contracts_as_it_does_over_its_sample() 
     for sample_s in [0.01, 0.001] {
         let design = design_discrete(&vehicle, Model::Rigid, GainMethod::IssDiscrete, sample_s).unwrap();
         let gain = design.rigid_gains().ends[0].inertia_phase_pa_s_rad;
-        let rho = (-4.0 / vehicle.inertia_phase.settling_time_s * sample_s).exp();
+        let rho = (-4.0 / vehicle.requirements.inertia_phase.settling_time_s * sample_s).exp();
         let longest_s = design.inertia_phase.longest_step_s;
         let contracts = |step_s: f64| [0.10, 0.16].iter().all(|&mu| factor(&vehicle, gain, mu, step_s).abs() <= rho);
         assert!(
@@ -55,7 +55,7 @@ fn up_to_the_longest_step_a_sampled_gain_contracts_as_it_does_over_its_sample() 
 #[test]
 fn the_longest_step_is_that_of_the_car() {
     let (car, mut grippy) = (vehicle(), vehicle());
-    grippy.uncertainty.friction.1 = 0.22;
+    grippy.settings.uncertainty.friction.1 = 0.22;
     let longest = |vehicle: &Vehicle| {
         let rigid = design_rigid(vehicle).unwrap().longest_step_s(vehicle, Discretisation::Exact);
         let compliant = design_compliant(vehicle).unwrap().longest_step_s(vehicle, Discretisation::Exact);

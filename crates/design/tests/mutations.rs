@@ -22,7 +22,7 @@ fn runs(observer: &impl Estimator<f64>, vehicle: &Vehicle, name: &str) {
             turbine_rad_s: 330.0 - 3.0 * f64::from(n),
             slip_rad_s: 190.0 - 6.0 * f64::from(n),
             wheel_rad_s: 45.0 + turned,
-            command: vehicle.command_max * (0.3 + 0.2 * turned),
+            command: vehicle.settings.command_max * (0.3 + 0.2 * turned),
         };
         let estimate = observer.step(&mut state, &Input::of_sample(&input, &vehicle.shift));
         assert!(estimate.pressure_pa.is_finite() && estimate.clutch_torque_n_m.is_finite(), "{name}: {n} {estimate:?}");

@@ -51,7 +51,7 @@ fn car(vehicle: &Vehicle, design: &DiscreteDesign, phase: Phase) -> impl Fn(f64,
     let turbine = 340.0;
     let ratio = if phase == Phase::InertiaPhase { 0.5 * (off + on) } else { off };
     let speeds = [turbine, shift.oncoming_slip(turbine, turbine / ratio)];
-    let Valve::Proportional { gain_pa_a, .. } = vehicle.observer_valve else { panic!() };
+    let Valve::Proportional { gain_pa_a, .. } = vehicle.settings.valve else { panic!() };
     let kiss_pa = vehicle.oncoming.clutch.kiss_pressure();
     let command = (kiss_pa + vehicle.error_bounds.shift_pressure_pa) / gain_pa_a;
     let (vehicle, gains) = (vehicle.clone(), design.rigid_gains());

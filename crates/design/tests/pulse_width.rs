@@ -12,8 +12,8 @@ use observer::{RigidGains, SampleEstimator};
 fn the_open_loop_of_a_pulse_width_valve_is_its_law() {
     let mut vehicle = VehicleFile::built_in().unwrap().vehicle;
     let law = PulseWidth { flow_sqrt_pa_s: 6000.0, line_pressure_pa: 1e6 };
-    vehicle.observer_valve = Valve::PulseWidth(law);
-    vehicle.command_max = 100.0;
+    vehicle.settings.valve = Valve::PulseWidth(law);
+    vehicle.settings.command_max = 100.0;
     let observer = rigid_observer(&vehicle, RigidGains::open_loop());
     let mut state = observer.start_sample();
     let (mut truth, mut last) = (0.0_f64, 0.0);
@@ -33,10 +33,10 @@ fn the_open_loop_of_a_pulse_width_valve_is_its_law() {
 fn a_pulse_width_valve_adds_its_operating_points_as_vertices() {
     let mut vehicle = VehicleFile::built_in().unwrap().vehicle;
     let law = PulseWidth { flow_sqrt_pa_s: 12e3, line_pressure_pa: 1e6 };
-    vehicle.observer_valve = Valve::PulseWidth(law);
-    vehicle.uncertainty.valve = ValveUncertainty::PressureDrop((0.0, 0.09e6));
-    vehicle.torque_phase.offset_max_pa = 1e6;
-    vehicle.inertia_phase.offset_max_pa = 1e6;
+    vehicle.settings.valve = Valve::PulseWidth(law);
+    vehicle.settings.uncertainty.valve = ValveUncertainty::PressureDrop((0.0, 0.09e6));
+    vehicle.requirements.torque_phase.offset_max_pa = 1e6;
+    vehicle.requirements.inertia_phase.offset_max_pa = 1e6;
     let certificate = design_rigid(&vehicle).unwrap().inertia_phase;
     let mut a22: Vec<f64> = certificate.vertices.iter().map(|vertex| vertex.vertex.a22_per_s).collect();
     a22.dedup();

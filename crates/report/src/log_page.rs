@@ -56,7 +56,7 @@ impl LogPage<'_> {
         let drawn: Vec<&ShiftEstimate> =
             self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MOST_DRAWN).collect();
         let points = POINTS / CURVES / drawn.len().max(1);
-        let command = self.vehicle.observer_valve.command_kind();
+        let command = self.vehicle.settings.valve.command_kind();
         let figures = within_bytes(drawn.iter().map(|shift| compact(&shift_figure(shift, command, points).svg())));
         let figures = drawn.iter().zip(figures).map(|(shift, svg)| {
             context! {

@@ -62,7 +62,7 @@ impl<C: Copy> Signals<C> {
     ) -> Result<Self, TraceError> {
         let required = |name: &str| require(name).map(|value| Channel::new(name, value, &find));
         let found = |name: &str| find(name).map(|value| Channel::new(name, value, &find));
-        let kind = vehicle.observer_valve.command_kind();
+        let kind = vehicle.settings.valve.command_kind();
         let command_name = command(kind, &find, &require)?;
         Ok(Self {
             turbine_rad_s: required(signal::TURBINE_SPEED)?,

@@ -150,7 +150,7 @@ fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2
     if phase == Phase::InertiaPhase {
         columns.push(("slip reading, over 10 ms", "rad/s", bounds.slip_quantum_rad_s, [0.0, 1.0 / sample_s]));
     }
-    let rounding_rad_s = bounds.float32_rounding * vehicle.speed_max_rad_s;
+    let rounding_rad_s = bounds.float32_rounding * vehicle.settings.speed_max_rad_s;
     columns.push(("float32 rounding of a speed, over 10 ms", "rad/s", rounding_rad_s, [1.0 / sample_s, 0.0]));
     columns
 }
@@ -208,7 +208,7 @@ fn drift_n_m(vehicle: &Vehicle) -> f64 {
 }
 
 fn friction(vehicle: &Vehicle) -> f64 {
-    0.5 * (vehicle.uncertainty.friction.0 + vehicle.uncertainty.friction.1)
+    0.5 * (vehicle.settings.uncertainty.friction.0 + vehicle.settings.uncertainty.friction.1)
 }
 
 fn evaluate(vehicle: &Vehicle, phase: Phase, view: View, pressure: [f64; 2], columns: &[Column]) -> PhaseSensitivity {

@@ -214,8 +214,8 @@ fn the_model_error_is_of_the_chapters_order_and_a_design_reads_it() {
     let vehicle = VehicleFile::read_with(&experiments().join("../vehicles/two_speed_at.toml"), &path);
     std::fs::remove_file(path).unwrap();
     let vehicle = vehicle.unwrap();
-    assert!((vehicle.inertia_phase.model_error_max_rad_s2 - inertia.rigid.largest).abs() < 0.1);
-    let h = vehicle.compliant_inertia_phase.error_matrix.unwrap();
+    assert!((vehicle.requirements.inertia_phase.model_error_max_rad_s2 - inertia.rigid.largest).abs() < 0.1);
+    let h = vehicle.requirements.compliant_inertia_phase.error_matrix.unwrap();
     assert!((h[0][0] - inertia.compliant_matrix.as_ref().unwrap()[0][0]).abs() < 1e-3);
 }
 

@@ -117,7 +117,7 @@ impl ExperimentFile {
     /// The sample time of an observer with forward Euler is longer than the time constant of its valve model; or the
     /// sample time is shorter than that of the recorded signals.
     pub fn check_observers(&self, vehicle: &Vehicle) -> Result<(), ConfigError> {
-        let fastest_s = -1.0 / vehicle.observer_valve.linear(0.0, 0.0).a22_per_s;
+        let fastest_s = -1.0 / vehicle.settings.valve.linear(0.0, 0.0).a22_per_s;
         for (entry, sample_time_s) in self.observers.iter().flat_map(|entry| self.sample_times_s(entry)) {
             let (message, hint) = if entry.discretisation == Discretisation::Euler && sample_time_s > fastest_s {
                 let message = format!(

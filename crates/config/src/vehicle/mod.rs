@@ -15,7 +15,10 @@ mod valves;
 
 use std::path::Path;
 
-use ::car::{CompliantRequirement, DesignRequirement, FilterSettings, OIL_TEMPERATURES_DEGC, PhaseSlips, Vehicle};
+use ::car::{
+    CompliantRequirement, DesignRequirement, FilterSettings, OIL_TEMPERATURES_DEGC, ObserverSettings, PhaseSlips,
+    Requirements, Vehicle,
+};
 use drivetrain::{Converter, Driveline, Engine, RoadLoad, Table2, TableError, Tyre};
 
 use drivetrain::oil::WARM_OIL_DEGC;
@@ -206,18 +209,22 @@ fn checked(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Vehicle, ConfigErr
         oil_temperature_degc,
         tyre,
         road,
-        observer_valve,
-        uncertainty: valves::uncertainty(check, &raw.observer.uncertainty, command_kind)?,
-        phase_slips,
-        speed_max_rad_s,
-        command_max,
-        torque_phase: requirement(check, "design.torque_phase", &raw.design.torque_phase)?,
-        inertia_phase: requirement(check, "design.inertia_phase", &raw.design.inertia_phase)?,
-        compliant_torque_phase: compliant(check, "torque_phase", &raw.design.compliant.torque_phase)?,
-        compliant_inertia_phase: compliant(check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
+        settings: ObserverSettings {
+            valve: observer_valve,
+            uncertainty: valves::uncertainty(check, &raw.observer.uncertainty, command_kind)?,
+            phase_slips,
+            speed_max_rad_s,
+            command_max,
+            filter: filter(check, &raw.observer.filter)?,
+            shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
+        },
+        requirements: Requirements {
+            torque_phase: requirement(check, "design.torque_phase", &raw.design.torque_phase)?,
+            inertia_phase: requirement(check, "design.inertia_phase", &raw.design.inertia_phase)?,
+            compliant_torque_phase: compliant(check, "torque_phase", &raw.design.compliant.torque_phase)?,
+            compliant_inertia_phase: compliant(check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
+        },
         error_bounds,
-        filter: filter(check, &raw.observer.filter)?,
-        shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
     })
 }
 

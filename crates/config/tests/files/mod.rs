@@ -62,7 +62,7 @@ fn an_error_of_two_files_names_the_one_that_the_value_is_from() {
     let error = VehicleFile::read_with(&good, &broken).unwrap_err().to_string();
     assert!(error.starts_with(&format!("{}:2: ", broken.display())), "{error}");
     let vehicle = VehicleFile::read_with(&good, &fine).unwrap();
-    assert_eq!((vehicle.torque_phase.model_error_max_rad_s2, vehicle.road.mass_kg), (5.0, 1500.0));
+    assert_eq!((vehicle.requirements.torque_phase.model_error_max_rad_s2, vehicle.road.mass_kg), (5.0, 1500.0));
 }
 
 #[test]

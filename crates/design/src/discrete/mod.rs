@@ -255,7 +255,7 @@ fn best_gain(
 
 /// Clutch torque of 1 MPa at the middle of the friction's range, N m.
 fn torque_n_m_mpa(vehicle: &Vehicle) -> f64 {
-    let (least, greatest) = vehicle.uncertainty.friction;
+    let (least, greatest) = vehicle.settings.uncertainty.friction;
     let clutch = &vehicle.oncoming.clutch;
     1e6 * 0.5 * (least + greatest) * clutch.lever() * clutch.piston_area_m2
 }
@@ -317,7 +317,7 @@ impl DiscreteCertificate {
 }
 
 fn end_friction(vehicle: &Vehicle, end: usize) -> f64 {
-    if end == 0 { vehicle.uncertainty.friction.0 } else { vehicle.uncertainty.friction.1 }
+    if end == 0 { vehicle.settings.uncertainty.friction.0 } else { vehicle.settings.uncertainty.friction.1 }
 }
 
 /// What the open loop has as a gain: none. Its inequality is that of a valve that forgets: `1 - Phi` of the pressure.

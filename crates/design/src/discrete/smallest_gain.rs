@@ -133,7 +133,7 @@ mod tests {
         poor.error_bounds.valve_delay_s[1] *= 5.0;
         let certificate = design(&poor, Phase::InertiaPhase);
         assert!(!certificate.uses_open_loop && certificate.bound_pa < certificate.open_loop_bound_pa);
-        let rho = (-4.0 / vehicle.inertia_phase.settling_time_s * 0.01).exp();
+        let rho = (-4.0 / vehicle.requirements.inertia_phase.settling_time_s * 0.01).exp();
         let model = crate::rigid_model(&vehicle);
         let valve = model.valve.linear(0.0, 0.0);
         let phi = (valve.a22_per_s * 0.01).exp();

@@ -114,7 +114,7 @@ impl ErrorSystem {
         let mut through_gain: Vec<Cause> = (accelerations.into_iter())
             .map(|Cause { name, column }| Cause { name, column: column * sample_time_s })
             .collect();
-        let rounding = ROUNDINGS * vehicle.error_bounds.float32_rounding * vehicle.speed_max_rad_s;
+        let rounding = ROUNDINGS * vehicle.error_bounds.float32_rounding * vehicle.settings.speed_max_rad_s;
         through_gain.extend((0..outputs.len()).map(|i| Cause {
             name: "float32 rounding",
             column: unit_vector(outputs.len(), i) * (rounding / SPEED_UNITS_RAD_S[outputs[i]]),
@@ -177,7 +177,7 @@ fn friction_step(vehicle: &Vehicle, sample_time_s: f64) -> f64 {
     let (slips, coefficients) = (friction.axis(), friction.values());
     let slopes = slips.windows(2).zip(coefficients.windows(2)).map(|(x, y)| ((y[1] - y[0]) / (x[1] - x[0])).abs());
     let slope = slopes.fold(0.0, f64::max);
-    let (least, greatest) = vehicle.uncertainty.friction;
+    let (least, greatest) = vehicle.settings.uncertainty.friction;
     if slope == 0.0 || greatest <= least {
         return 0.0;
     }
@@ -214,13 +214,15 @@ pub(crate) fn corners(
     let (rigid, compliant) = (rigid_model(vehicle), compliant_model(vehicle));
     let (outputs, units) = (outputs(model, phase), state_units(model));
     let mut corners = Vec::new();
-    for (valve, (valve_label, a22_per_s)) in valve_extremes(&rigid, &vehicle.uncertainty).into_iter().enumerate() {
+    for (valve, (valve_label, a22_per_s)) in
+        valve_extremes(&rigid, &vehicle.settings.uncertainty).into_iter().enumerate()
+    {
         let phi = match discretisation {
             Discretisation::Exact => (a22_per_s * sample_time_s).exp(),
             Discretisation::Euler => 1.0 + a22_per_s * sample_time_s,
         };
         let psi = (phi - 1.0) / a22_per_s;
-        for friction in distinct(vehicle.uncertainty.friction) {
+        for friction in distinct(vehicle.settings.uncertainty.friction) {
             let (phi, held, influence) = match model {
                 Model::Rigid => {
                     let on_speeds = rigid.influence(phase, friction);

@@ -24,7 +24,7 @@ impl Without {
         let mut stiff = vehicle.clone();
         stiff.tyre.slip_scale /= 20.0;
         let mut ideal = vehicle.clone();
-        if let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve {
+        if let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.settings.valve {
             for clutch in [&mut ideal.offgoing, &mut ideal.oncoming] {
                 clutch.valve = ClutchValve::Proportional(ValveMaps {
                     time_constant_s: Table1::constant(time_constant_s),
@@ -123,7 +123,7 @@ fn in_mpa(pascal: f64) -> String {
 fn visibility(vehicle: &Vehicle) -> f64 {
     let model = design::rigid_model(vehicle);
     let size = |phase| {
-        let [turbine, slip] = model.influence(phase, vehicle.uncertainty.friction.0);
+        let [turbine, slip] = model.influence(phase, vehicle.settings.uncertainty.friction.0);
         turbine.hypot(slip)
     };
     size(I) / size(T)

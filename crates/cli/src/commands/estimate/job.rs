@@ -155,7 +155,7 @@ fn check_findings(
     observer: ObserverKind,
 ) -> Result<(), Failure> {
     check_span(path, log.median_step_s(), findings.span_s())?;
-    let commands = match vehicle.observer_valve.command_kind() {
+    let commands = match vehicle.settings.valve.command_kind() {
         CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
         CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],
     };

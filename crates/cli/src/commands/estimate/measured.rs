@@ -213,7 +213,7 @@ impl<'a> Measured<'a> {
         vehicle: &Vehicle,
         is_followed: bool,
     ) -> Result<Self, Failure> {
-        let command = match vehicle.observer_valve.command_kind() {
+        let command = match vehicle.settings.valve.command_kind() {
             CommandKind::Current => Role::OncomingCurrent,
             CommandKind::DutyCycle => Role::OncomingDuty,
         };
@@ -416,7 +416,7 @@ fn has(log: &study::log::Log, role: Role) -> bool {
 
 /// The signals that observers read, in the columns of a table.
 fn watched(rows: &CsvRows, vehicle: &Vehicle, look: usize) -> WatchedColumns {
-    let command = match vehicle.observer_valve.command_kind() {
+    let command = match vehicle.settings.valve.command_kind() {
         CommandKind::Current => (Role::OncomingCurrent, signal::ONCOMING_CURRENT),
         CommandKind::DutyCycle => (Role::OncomingDuty, signal::ONCOMING_DUTY),
     };

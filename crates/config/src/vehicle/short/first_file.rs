@@ -167,7 +167,7 @@ mod tests {
             ..facts(2.5, 1.0)
         };
         let (short, shipped) = (vehicle(&numbers).unwrap(), VehicleFile::built_in().unwrap());
-        assert_eq!((short.filter, short.error_bounds), (shipped.filter, shipped.error_bounds));
+        assert_eq!((short.settings.filter, short.error_bounds), (shipped.settings.filter, shipped.error_bounds));
         assert_eq!(short.engine, shipped.engine);
         let supply = |vehicle: &VehicleFile| vehicle.offgoing.cylinder.supply;
         assert_eq!(supply(&short), supply(&shipped));
@@ -182,7 +182,7 @@ mod tests {
         let two = vehicle(&Facts { engine_torque_n_m: 700.0, mass_kg: 3600.0, ..facts(3.0, 2.0) }).unwrap();
         let twice = |a: f64, b: f64| assert!((b / a - 2.0).abs() < 1e-3, "{a} {b}");
         twice(one.engine.inertia_kg_m2, two.engine.inertia_kg_m2);
-        twice(one.filter.offgoing_n_m, two.filter.offgoing_n_m);
+        twice(one.settings.filter.offgoing_n_m, two.settings.filter.offgoing_n_m);
         twice(one.error_bounds.offgoing_torque_n_m, two.error_bounds.offgoing_torque_n_m);
         twice(one.error_bounds.output_torque_n_m, two.error_bounds.output_torque_n_m);
         twice(one.error_bounds.shaft_torque_n_m, two.error_bounds.shaft_torque_n_m);
