@@ -1,7 +1,7 @@
 //! Bounds on the errors of a car's values, as a file states them.
 
 use drivetrain::road::GRAVITY_M_S2;
-use drivetrain::{CommandKind, RoadLoad};
+use drivetrain::{CommandKind, Real, RoadLoad};
 
 use crate::{FillBudget, Sensors};
 
@@ -93,7 +93,7 @@ impl ErrorBounds {
 
     /// What a grade at its bound does at the wheels of a car with this load, N m.
     pub fn grade_n_m(&self, road: &RoadLoad<f64>) -> f64 {
-        road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * self.grade_rad.sin()
+        road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * Real::sin(self.grade_rad)
     }
 
     /// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its share.

@@ -6,6 +6,7 @@
 //! What an observer takes ([`Step`], [`Reading`], [`Gear`]) is there without the feature `std`: it is `no_std`, allocates
 //! nothing and is generic over `f32` and `f64`.
 #![cfg_attr(not(feature = "std"), no_std)]
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 #[cfg(feature = "std")]
 mod capacity;

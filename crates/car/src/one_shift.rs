@@ -1,7 +1,7 @@
 //! The vehicle of one shift of a car with a gearbox: what designs of gains are made for.
 
 use drivetrain::{
-    AccelerationRow, ClutchValve, CommandKind, Converter, Driveline, Engagement, ReducedShift, RoadLoad, Valve,
+    AccelerationRow, ClutchValve, CommandKind, Converter, Driveline, Engagement, Real, ReducedShift, RoadLoad, Valve,
 };
 use geartrain::{Change, Shift};
 
@@ -302,7 +302,7 @@ impl<'c> OneShift<'c> {
             offgoing_drain_s: 0.1,
             turbine_quantum_rad_s,
             output_quantum_rad_s,
-            slip_quantum_rad_s: (on_turbine * turbine_quantum_rad_s).hypot(on_output * output_quantum_rad_s),
+            slip_quantum_rad_s: Real::hypot(on_turbine * turbine_quantum_rad_s, on_output * output_quantum_rad_s),
             wheel_quantum_rad_s: 0.14,
             sampling_delay_s: 0.02,
             float32_rounding: 6e-8,
@@ -430,5 +430,5 @@ fn acceleration_errors(
     };
     let turbine_n_m = bounds.turbine_torque_n_m;
     let slipping = |row| size(row, turbine_n_m + bounds.inertia_torque_n_m, bounds.offgoing_torque_n_m);
-    [size(&torque.turbine, turbine_n_m, 0.0), slipping(&inertia.turbine).hypot(slipping(&inertia.slip_oncoming))]
+    [size(&torque.turbine, turbine_n_m, 0.0), Real::hypot(slipping(&inertia.turbine), slipping(&inertia.slip_oncoming))]
 }

@@ -5,6 +5,7 @@ use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use drivetrain::Real;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use toml::Spanned;
@@ -83,7 +84,7 @@ pub fn toml_number(value: f64) -> String {
         return format!("{value:.1}");
     }
     #[expect(clippy::cast_possible_truncation, reason = "the exponent of a number is small")]
-    let exponent = value.abs().log10().floor() as i32;
+    let exponent = Real::log10(value.abs()).floor() as i32;
     if (-3..6).contains(&exponent) {
         let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);
         let text = format!("{value:.decimals$}");

@@ -203,7 +203,7 @@ fn piston(cylinder: &Cylinder<f64>, fill: &FillBudget<f64>) -> Piston<f64> {
     let share = |[least, most]: [f64; 2], value: f64| deviation_of(0.5 * (most - least)) / value;
     let flow = |k: usize| fill.supply[k].flow(FILL_PA, fill.viscosity_m2_s[k]).min(cylinder.flow_max_m3_s);
     let volume = share(fill.volume_m3, cylinder.stroke_m3);
-    Piston::new(*cylinder, volume.hypot(share([flow(1), flow(0)], cylinder.flow(FILL_PA))))
+    Piston::new(*cylinder, Real::hypot(volume, share([flow(1), flow(0)], cylinder.flow(FILL_PA))))
 }
 
 /// What the valve of an element can be commanded and can give.

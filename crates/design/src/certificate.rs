@@ -1,6 +1,7 @@
 //! What is promised about a gain, and the check of it that needs no solver.
 
 use car::Vehicle;
+use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::{Discretisation, Phase};
 use serde::Serialize;
@@ -78,8 +79,8 @@ impl Certificate {
             return None;
         }
         let gain_squared = largest_eigenvalue(&(l.transpose() * &l));
-        let offset_squared =
-            requirement.model_error_max_rad_s2.powi(2) * gain_squared / (4.0 * kappa1_per_s * requirement.kappa2_per_s);
+        let offset_squared = Real::powi(requirement.model_error_max_rad_s2, 2) * gain_squared
+            / (4.0 * kappa1_per_s * requirement.kappa2_per_s);
         Some(Self {
             gain_pa_s_rad,
             kappa1_per_s,
@@ -124,8 +125,8 @@ impl Certificate {
 /// Bound on an error after `elapsed_s`, in its own unit, if it was `initial` at first and decays with `kappa2_per_s` to
 /// `offset`, Eq. (2.40).
 pub fn error_bound(offset: f64, kappa2_per_s: f64, initial: f64, elapsed_s: f64) -> f64 {
-    let remains = (-2.0 * kappa2_per_s * elapsed_s).exp();
-    (initial.powi(2) * remains + offset.powi(2) * (1.0 - remains)).sqrt()
+    let remains = Real::exp(-2.0 * kappa2_per_s * elapsed_s);
+    (Real::powi(initial, 2) * remains + Real::powi(offset, 2) * (1.0 - remains)).sqrt()
 }
 
 #[cfg(test)]

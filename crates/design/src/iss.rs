@@ -13,6 +13,7 @@
 use std::fmt;
 
 use car::DesignRequirement;
+use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::Phase;
 
@@ -230,7 +231,7 @@ fn smallest_gain(
     let decay_per_s = kappa1_per_s + requirement.kappa2_per_s;
     let asked = decay_per_s * (1.0 + DECAY_RESERVE);
     // In units of the gain that one vertex alone would need, the unknowns (alpha, L) are of order 1.
-    let needed = |a22: f64, g: [f64; 2]| (asked + a22).max(0.0) / g[0].hypot(g[1]);
+    let needed = |a22: f64, g: [f64; 2]| (asked + a22).max(0.0) / Real::hypot(g[0], g[1]);
     let unit = (polytope.vertices.iter()).map(|v| needed(v.a22_per_s, v.g_rad_s2_pa)).fold(0.0, f64::max);
     if unit == 0.0 {
         return certify([0.0; 2], kappa1_per_s, requirement, polytope, 0);

@@ -1,7 +1,7 @@
 //! The Kalman filters of a vehicle: what it does not know, from the error budget and the sensors.
 
 use car::{Sensors, SpeedSensor, Vehicle};
-use drivetrain::ReducedShift;
+use drivetrain::{Real, ReducedShift};
 use observer::{
     EngineNoise, ExtendedFilter, FilterNoise, KalmanFilter, OffgoingClutch, Readings, ReportedTorque, SpeedReading,
     Uncertainty, UnscentedFilter, ValveModel,
@@ -153,7 +153,7 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
     let line = &vehicle.driveline;
     let wheels = vehicle.road.inertia_at_wheel() + line.wheel_inertia_kg_m2;
     // A quarter of a swing of the shafts between the gearbox, with the gear's share of the turbine, and the wheels.
-    let gearbox = shift.mass_kg_m2[1][1] * line.final_ratio.powi(2);
+    let gearbox = shift.mass_kg_m2[1][1] * Real::powi(line.final_ratio, 2);
     let swing_rad_s = (line.shaft_stiffness_n_m_rad * (gearbox.recip() + wheels.recip())).sqrt();
     let quarter_swing_s = 0.5 * std::f64::consts::PI / swing_rad_s;
     let [delay_least_s, delay_most_s] = budget.valve_delay_s;
@@ -164,7 +164,7 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
         turbine_share_s: told.turbine_share_s,
         stiffness_share: deviation_within(budget.shaft_stiffness_factor),
         backlash_n_m: budget.backlash_rad * line.shaft_stiffness_n_m_rad,
-        valve_share: lag.hypot(delay),
+        valve_share: Real::hypot(lag, delay),
         valve_gain: deviation_within(budget.valve_gain_factor),
         rate_s: told.valve_rate_s,
         friction: deviation_within(budget.friction_factor),
@@ -212,7 +212,7 @@ fn aged_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> ExtendedFilter<f
         turbine_share_s: told.turbine_share_s,
         twist_rate_rad_s: told.twist_rate_rad_s,
         output_least_rad_s: told.output_least_rad_s,
-        valve_moving: share(deviation_of(valve.lag_pa_s.hypot(valve.delay_pa_s)), budget.shift_ramp_pa_s),
+        valve_moving: share(deviation_of(Real::hypot(valve.lag_pa_s, valve.delay_pa_s)), budget.shift_ramp_pa_s),
         valve_resting_per_s: share(deviation_of(valve.gain_pa_s), shift_pressure(vehicle)),
         valve_rate_s: told.valve_rate_s,
         offgoing_n_m: told.offgoing_n_m,

@@ -1,6 +1,7 @@
 //! Observers without a certificate, with the parameters that the vehicle file's error budget gives them.
 
 use car::Vehicle;
+use drivetrain::Real;
 use observer::{Inversion, Phase, SuperTwisting};
 
 use crate::budget::{ValveErrors, shift_time_constant};
@@ -17,7 +18,7 @@ pub fn super_twisting(vehicle: &Vehicle) -> SuperTwisting<f64> {
     let valve_rate_pa_s = ValveErrors::of(vehicle).largest_pa_s();
     let rate = |phase| {
         let [turbine, slip] = model.influence(phase, vehicle.settings.uncertainty.friction.1);
-        turbine.hypot(slip) * valve_rate_pa_s
+        Real::hypot(turbine, slip) * valve_rate_pa_s
     };
     let error_rate_rad_s3 = [rate(Phase::TorquePhase), rate(Phase::InertiaPhase)];
     SuperTwisting { model, error_rate_rad_s3, tracker: tracker(vehicle) }

@@ -1,5 +1,7 @@
 //! The error budget of a fitted file: what a fit leaves open, as ranges.
 
+use drivetrain::Real;
+
 use crate::fitted_file::SIDES;
 
 /// Standard deviations in the error budget of a fitted file \[chosen: the ranges of `estimate` are to hold nearly always, not in 95 %
@@ -15,11 +17,11 @@ pub(crate) const BUDGET_COMMENT: &str =
 /// `given` the range that was known around the given value: the fitted one lies elsewhere in it. The 95 % interval stays.
 pub(crate) fn factors(sd: f64, value: f64, given: [f64; 2]) -> [f64; 2] {
     // No wider than the whole of what was known before, however much is open of it.
-    let known = (given[1] / given[0]).ln();
+    let known = Real::ln(given[1] / given[0]);
     let half = (BUDGET_SIDES * sd).min(known);
     let [least, greatest] = given.map(|end| end / value);
     let stated = half * SIDES / BUDGET_SIDES;
-    [(-half).exp().max(least.min((-stated).exp())), half.exp().min(greatest.max(stated.exp()))]
+    [Real::exp(-half).max(least.min(Real::exp(-stated))), Real::exp(half).min(greatest.max(Real::exp(stated)))]
 }
 
 /// Least and greatest delay of a fitted valve, s, from its delays at the ends of the command, with so much open to each side.

@@ -4,6 +4,7 @@
 //! has a mass of its own, so has each log: a deviation that is eliminated.
 
 use car::Vehicle;
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use crate::driving::{DrivenCar, Driving, DrivingModel, DrivingWeights, Evaluated, Term, misfit, usable};
@@ -79,7 +80,7 @@ impl DriveErrors {
     /// Why it is not that of the car, if so.
     fn reason_against(self) -> Option<String> {
         let mass = self.mass / MASS_SHARE_SD;
-        let other = || format!("its car has {:.2} times the mass of that of the shifts", self.mass.exp());
+        let other = || format!("its car has {:.2} times the mass of that of the shifts", Real::exp(self.mass));
         misfit("car", self.scale).or_else(|| (mass.abs() > POSSIBLE).then(other))
     }
 }
@@ -140,7 +141,7 @@ impl<'a> Drives<'a> {
     pub(crate) fn cost(&self, priors: &[Prior], at: [&[f64]; 2], weights: &[DrivingWeights]) -> f64 {
         let drives = self.evaluated(priors, at, weights);
         let data = drives.iter().map(|drive| drive.cost).sum::<f64>();
-        data + 0.5 * at[1].iter().map(|deviation| (deviation / MASS_SHARE_SD).powi(2)).sum::<f64>()
+        data + 0.5 * at[1].iter().map(|deviation| Real::powi(deviation / MASS_SHARE_SD, 2)).sum::<f64>()
     }
 
     /// What each drive adds to the normal equations.
@@ -156,7 +157,7 @@ impl<'a> Drives<'a> {
         let drives = self.evaluated(priors, at, weights);
         let normal = |(drive, deviation): (&Evaluated, &f64)| {
             let mass = place(priors, Term::Mass).ok_or_else(|| FitError::Work("the mass is not fitted".to_owned()))?;
-            let precision = MASS_SHARE_SD.powi(-2);
+            let precision = Real::powi(MASS_SHARE_SD, -2);
             let own = drive.information[(mass, mass)] + precision;
             let own_gradient = precision * deviation - drive.score[mass];
             let mixed = drive.information.column(mass).into_owned();

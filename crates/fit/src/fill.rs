@@ -8,7 +8,7 @@
 //! The pressure shows how long the piston moves: the volume over the flow of the passages. Both multiplied by one number give the same pressures, so
 //! passages and oil are those of the file, and the volume is the one by their flow.
 
-use drivetrain::Cylinder;
+use drivetrain::{Cylinder, Real};
 use observer::FillBudget;
 
 use crate::parameters::between;
@@ -83,11 +83,11 @@ impl FillFit {
         }
         let of = |found: &[Found]| found.iter().map(|found| found.log_volume).sum::<f64>() / found.len() as f64;
         let log_volume = of(&found);
-        let scatter = found.iter().map(|found| (found.log_volume - log_volume).powi(2)).sum::<f64>();
+        let scatter = found.iter().map(|found| Real::powi(found.log_volume - log_volume, 2)).sum::<f64>();
         let scatter = FACTOR * FACTOR * scatter / (count * count.saturating_sub(1).max(1)) as f64;
         let by_others = moved.iter().map(|other| {
             let moved: Vec<Found> = chosen.iter().map(|log| log.search(other, before)).collect();
-            (of(&moved) - log_volume).powi(2)
+            Real::powi(of(&moved) - log_volume, 2)
         });
         let variance = FILL_FLOOR * FILL_FLOOR + scatter + by_others.sum::<f64>();
         let preload = found.iter().map(|found| found.preload).sum::<f64>() / count as f64;
@@ -101,7 +101,7 @@ impl FillFit {
 
     /// Factor on the volume in the fitted file: that of the given file where it is not told.
     pub(crate) fn factor(&self) -> f64 {
-        if self.verdict() == Verdict::NotTold { 1.0 } else { self.log_volume.exp() }
+        if self.verdict() == Verdict::NotTold { 1.0 } else { Real::exp(self.log_volume) }
     }
 
     /// Factor on the preload of its spring beside the fitted kiss point: volume and preload were found together, and are written together.
@@ -180,7 +180,7 @@ impl FillLog<'_> {
         let mut of = filling.hydraulics;
         of.set_kiss(filling.kiss_pa);
         of.scale_preload(preload);
-        of.scale_stroke(log_volume.exp());
+        of.scale_stroke(Real::exp(log_volume));
         let begin_s = self.readings().next().map_or(self.until_s, |(time_s, _)| time_s) - filling.sensor_late_s;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over milliseconds")]
         let points = ((self.until_s - begin_s).max(0.0) / STEP_S) as usize + 2;
@@ -202,7 +202,7 @@ pub(crate) fn fill_sd(cylinder: &Cylinder<f64>, budget: &FillBudget<f64>) -> f64
     let [wide, narrow] = budget.supply;
     let [thin, thick] = budget.viscosity_m2_s;
     let flows = [narrow.flow(FILL_DROP_PA, thick), wide.flow(FILL_DROP_PA, thin)];
-    between(volume).hypot(between(flows))
+    Real::hypot(between(volume), between(flows))
 }
 
 /// When the fill of a clutch begins: the first command that asks for half of the preload or more, with the next one; none where the commands begin within

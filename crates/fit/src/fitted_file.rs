@@ -1,6 +1,7 @@
 //! The vehicle file of a fit: the text of the given one with other values.
 
 use config::{Source, VehicleFile};
+use drivetrain::Real;
 
 use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
@@ -96,7 +97,7 @@ impl Fit {
         if parameter == Parameter::Hysteresis {
             return format!("95 % +- {:.1} kPa, {told}", 1e-3 * SIDES * HYSTERESIS_UNIT_PA * sd);
         }
-        let (least, greatest) = (value * (-SIDES * sd).exp(), value * (SIDES * sd).exp());
+        let (least, greatest) = (value * Real::exp(-SIDES * sd), value * Real::exp(SIDES * sd));
         format!("x {value:.3}, 95 % {least:.3} to {greatest:.3}, {told}")
     }
 
@@ -104,7 +105,7 @@ impl Fit {
     fn write_budget(&self, text: &mut VehicleText, vehicle: &VehicleFile) -> Result<(), FitError> {
         let bound = |key: &str| keys(&["design", "error_bounds", key]);
         let sd = |parameters: &[Parameter]| {
-            parameters.iter().map(|p| self.sd(*p).unwrap_or(0.0).powi(2)).sum::<f64>().sqrt()
+            parameters.iter().map(|p| Real::powi(self.sd(*p).unwrap_or(0.0), 2)).sum::<f64>().sqrt()
         };
         let half = |parameters: &[Parameter]| BUDGET_SIDES * sd(parameters);
         let factors = |parameters: &[Parameter], given: [f64; 2]| {
@@ -247,7 +248,7 @@ fn write_clutch(
 
 /// What a fitted fill volume says of itself.
 pub(crate) fn fill_comment(fill: &FillFit) -> String {
-    let [least, value, most] = [-SIDES, 0.0, SIDES].map(|sides| (fill.log_volume + sides * fill.sd[0]).exp());
+    let [least, value, most] = [-SIDES, 0.0, SIDES].map(|sides| Real::exp(fill.log_volume + sides * fill.sd[0]));
     match fill.verdict() {
         Verdict::NotTold => format!("as in the given file: {}", Verdict::NotTold.name()),
         told => format!(

@@ -2,6 +2,7 @@
 
 use car::Vehicle;
 use config::VehicleFile;
+use drivetrain::Real;
 use nalgebra::DVector;
 
 use crate::car::Car;
@@ -249,9 +250,9 @@ fn fill_of(
     };
     let known = |parameter: Parameter| sd(parameter).unwrap_or(0.0);
     let [spring, gain, lag] = [Parameter::Spring, Parameter::Gain, Parameter::Lag].map(known);
-    let late_s = known(Parameter::CommandDelay).hypot(known(Parameter::PressureDelay)) * DELAY_UNIT_S;
+    let late_s = Real::hypot(known(Parameter::CommandDelay), known(Parameter::PressureDelay)) * DELAY_UNIT_S;
     let moved = [
-        Filling { kiss_pa: filling.kiss_pa * spring.exp(), ..filling },
+        Filling { kiss_pa: filling.kiss_pa * Real::exp(spring), ..filling },
         Filling { hydraulics: filling.hydraulics.with_valve(0.0, gain), ..filling },
         Filling { hydraulics: filling.hydraulics.with_valve(lag, 0.0), ..filling },
         Filling { late_s: filling.late_s + late_s, ..filling },
@@ -402,7 +403,7 @@ impl Fit {
                 along[i] = *power;
             }
         }
-        let before: f64 = along.iter().zip(&self.priors).map(|(power, prior)| (power * prior.sd).powi(2)).sum();
+        let before: f64 = along.iter().zip(&self.priors).map(|(power, prior)| Real::powi(power * prior.sd, 2)).sum();
         [before.sqrt(), self.precision.combination_sd(&along)]
     }
 

@@ -9,6 +9,7 @@
 //! of the shifts scatter around zero. [Hotelling's T2](crate::hotelling) compares their mean with their own scatter, so it
 //! needs neither the noise of the readings nor its correlation in time.
 
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::fitted_file::SIDES;
@@ -43,9 +44,9 @@ pub(crate) fn differing(priors: &[Prior], unknowns: &[f64], stated: &DMatrix<f64
         let evidence = |(_, [i, j]): &(Map, [usize; 2])| {
             let (x, of) = chosen(&at, &covariance, [*i, *j]);
             let Some(inverse) = of.try_inverse() else { return 0.0 };
-            let before = (priors[*i].sd * priors[*j].sd).powi(2);
+            let before = Real::powi(priors[*i].sd * priors[*j].sd, 2);
             let size = x.dot(&(inverse * x));
-            (freedom + 2.0) * (size / freedom).ln_1p() - (before / of.determinant()).ln()
+            (freedom + 2.0) * Real::ln_1p(size / freedom) - Real::ln(before / of.determinant())
         };
         let least = free.iter().enumerate().min_by(|one, other| evidence(one.1).total_cmp(&evidence(other.1)));
         let Some((place, bound)) = least.filter(|(_, map)| evidence(map) <= 0.0) else { break };
@@ -86,7 +87,7 @@ pub(crate) fn misfits(
     normal: &Normal,
     unknowns: &[f64],
 ) -> Option<Vec<Misfit>> {
-    let precision = |j: usize| priors[j].sd.powi(-2);
+    let precision = |j: usize| Real::powi(priors[j].sd, -2);
     let mut fitted = normal.information.view((0, 0), (known, known)).into_owned();
     (0..known).for_each(|j| fitted[(j, j)] += precision(j));
     let fitted = fitted.cholesky()?;

@@ -8,6 +8,7 @@
 //! `((n - 2)/2) (level^(-2/(n - 2)) - 1)` with probability `level`: of two and `n - 2` degrees of freedom it has a closed form. So T2
 //! exceeds `(n - 1) (level^(-2/(n - 2)) - 1)`.
 
+use drivetrain::Real;
 use nalgebra::{Matrix2, Vector2};
 
 /// Fewer pairs tell nothing.
@@ -19,7 +20,7 @@ pub(crate) fn excess(pairs: &[Vector2<f64>], level: f64) -> f64 {
         return 0.0;
     }
     let count = pairs.len() as f64;
-    let limit = (count - 1.0) * (level.powf(-2.0 / (count - 2.0)) - 1.0);
+    let limit = (count - 1.0) * (Real::powf(level, -2.0 / (count - 2.0)) - 1.0);
     let mean = pairs.iter().sum::<Vector2<f64>>() / count;
     let scatter =
         pairs.iter().map(|pair| (pair - mean) * (pair - mean).transpose()).sum::<Matrix2<f64>>() / (count - 1.0);

@@ -4,6 +4,7 @@
 //! and "cluster", the spread of the shifts' own gradients. What the model leaves out (tyres with inertia, noise of the command) is in
 //! neither: a factor and a floor stand for it.
 
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use crate::Parameter;
@@ -57,7 +58,7 @@ impl Precision {
     pub(crate) fn combination_sd(&self, along: &DVector<f64>) -> f64 {
         /// Least one: what the model leaves out does not shrink with more shifts.
         const FLOOR: f64 = 0.005;
-        along.dot(&(&self.auto * along)).max(0.0).sqrt().hypot(FLOOR)
+        Real::hypot(along.dot(&(&self.auto * along)).max(0.0).sqrt(), FLOOR)
     }
 }
 
@@ -79,13 +80,13 @@ pub(crate) fn floor(parameter: Parameter) -> f64 {
 /// The precision at a minimum with these normal equations.
 pub(crate) fn precision(priors: &[Prior], normal: &Normal, held: &[Held]) -> Option<Precision> {
     let count = priors.len();
-    let prior = DMatrix::from_diagonal(&DVector::from_iterator(count, priors.iter().map(|p| p.sd.powi(-2))));
+    let prior = DMatrix::from_diagonal(&DVector::from_iterator(count, priors.iter().map(|p| Real::powi(p.sd, -2))));
     let mut auto = (&normal.information + &prior).cholesky()?.inverse();
     let cluster = cluster(&auto, &normal.all_scores(), &prior);
     let mut stated = auto.clone();
     // Each parameter takes the larger variance; the correlations are those of "auto".
     for (i, prior) in priors.iter().enumerate() {
-        let found = auto[(i, i)].max(cluster[(i, i)]).sqrt().hypot(prior.floor);
+        let found = Real::hypot(auto[(i, i)].max(cluster[(i, i)]).sqrt(), prior.floor);
         // No fit knows less than was known before.
         let scale = found.min(prior.sd) / auto[(i, i)].sqrt();
         stated.row_mut(i).scale_mut(scale);
@@ -119,7 +120,7 @@ fn untold(priors: &[Prior], held: &[Held]) -> Vec<(DVector<f64>, f64)> {
 /// The logarithm of the factor of all torques as a combination of the unknowns, and its precision, by the priors alone.
 pub(crate) fn torque_scale(priors: &[Prior]) -> (DVector<f64>, f64) {
     let power = |prior: &Prior| prior.parameter.power_of_torque();
-    let precision: f64 = priors.iter().map(|prior| (power(prior) / prior.sd).powi(2)).sum();
+    let precision: f64 = priors.iter().map(|prior| Real::powi(power(prior) / prior.sd, 2)).sum();
     let weights = priors.iter().map(|prior| power(prior) / (prior.sd * prior.sd * precision));
     (DVector::from_iterator(priors.len(), weights), precision)
 }

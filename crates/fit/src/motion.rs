@@ -277,10 +277,11 @@ impl<'a, const N: usize> Field<'a, N> {
     fn new(kind: SegmentKind, runs: [&'a Run<'a>; N]) -> Self {
         let of = |number: &dyn Fn(&Run<'_>) -> f64| runs.map(number);
         let mass_kg = |run: &Run<'_>| run.car.road.mass_kg * (1.0 + run.of.mass_share);
-        let moved_kg =
-            |run: &Run<'_>| mass_kg(run) + run.car.driveline.wheel_inertia_kg_m2 / run.car.road.wheel_radius_m.powi(2);
+        let moved_kg = |run: &Run<'_>| {
+            mass_kg(run) + run.car.driveline.wheel_inertia_kg_m2 / Real::powi(run.car.road.wheel_radius_m, 2)
+        };
         let slip_per_n_m = |run: &Run<'_>| {
-            0.5 * run.car.tyre.slip_scale / (run.car.road.wheel_radius_m.powi(2) * run.car.tyre.max_force_n)
+            0.5 * run.car.tyre.slip_scale / (Real::powi(run.car.road.wheel_radius_m, 2) * run.car.tyre.max_force_n)
         };
         Self {
             kind,
@@ -441,7 +442,7 @@ fn inverse_tanh<const N: usize>(x: Lanes<N>) -> Lanes<N> {
 #[cold]
 #[inline(never)]
 fn at_tyre_limit(x: f64) -> f64 {
-    x.clamp(-0.999, 0.999).atanh()
+    Real::atanh(x.clamp(-0.999, 0.999))
 }
 
 #[cfg(test)]
@@ -519,9 +520,9 @@ mod tests {
         for i in -998..=998 {
             let x = 1e-3 * f64::from(i);
             let [found, other] = inverse_tanh([x, 0.5]);
-            assert!((found - x.atanh()).abs() <= 1e-6 * x.abs().atanh(), "{x}: {found}");
+            assert!((found - Real::atanh(x)).abs() <= 1e-6 * Real::atanh(x.abs()), "{x}: {found}");
             assert_eq!([other], inverse_tanh([0.5]), "beside {x}");
         }
-        assert_eq!(inverse_tanh([2.0, -2.0]), [0.999_f64.atanh(), (-0.999_f64).atanh()]);
+        assert_eq!(inverse_tanh([2.0, -2.0]), [Real::atanh(0.999), Real::atanh(-0.999)]);
     }
 }

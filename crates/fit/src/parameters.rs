@@ -2,6 +2,7 @@
 
 use car::Vehicle;
 use config::VehicleFile;
+use drivetrain::Real;
 
 use crate::driving::{AIR, ROLLING, rolling_floor};
 use crate::shape::{Knots, Map};
@@ -144,7 +145,7 @@ impl Parameter {
             _ if self.is_shape() => x,
             Self::Hysteresis => HYSTERESIS_UNIT_PA * x.max(0.0),
             Self::PressureOffset => OFFSET_UNIT_PA * x,
-            _ => x.exp(),
+            _ => Real::exp(x),
         }
     }
 }
@@ -229,7 +230,7 @@ fn uniform(share: f64) -> f64 {
 
 /// The standard deviation of the logarithm of a factor that lies anywhere between these.
 pub(crate) fn between([least, greatest]: [f64; 2]) -> f64 {
-    ((greatest / least).ln() / 12.0_f64.sqrt()).max(1e-3)
+    (Real::ln(greatest / least) / 12.0_f64.sqrt()).max(1e-3)
 }
 
 /// The parameters of a fit with their priors, from the error budget of the vehicle file; what it does not have is \[chosen\].

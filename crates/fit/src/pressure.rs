@@ -1,6 +1,6 @@
 //! Pressure of a clutch from the commands of its valve.
 
-use drivetrain::{ClutchValve, Cylinder, Play};
+use drivetrain::{ClutchValve, Cylinder, Play, Real};
 
 use crate::Series;
 
@@ -33,7 +33,7 @@ impl Hydraulics {
 
     /// With these logarithms of factors on lag and gain of the valve.
     pub(crate) fn with_valve(&self, log_lag: f64, log_gain: f64) -> Self {
-        Self { valve: self.valve.changed(log_lag.exp(), log_gain.exp(), None), ..*self }
+        Self { valve: self.valve.changed(Real::exp(log_lag), Real::exp(log_gain), None), ..*self }
     }
 
     /// Multiplies the volume of the piston's stroke.
@@ -167,11 +167,11 @@ impl Piston {
             let ahead = ends.into_iter().map(|end| end + sign * BEYOND_M3 - self.volume_m3);
             let end = ahead.filter(|way| way * sign > 0.0).min_by(|one, other| one.abs().total_cmp(&other.abs()));
             let way =
-                if (slope * left_s).abs() > 1e-9 { rate * (slope * left_s).exp_m1() / slope } else { rate * left_s };
+                if (slope * left_s).abs() > 1e-9 { rate * Real::exp_m1(slope * left_s) / slope } else { rate * left_s };
             match end {
                 Some(end) if way.abs() > end.abs() => {
                     let share = slope * end / rate;
-                    let passed_s = if share.abs() > 1e-9 { share.ln_1p() / slope } else { end / rate };
+                    let passed_s = if share.abs() > 1e-9 { Real::ln_1p(share) / slope } else { end / rate };
                     self.volume_m3 += end;
                     left_s -= passed_s;
                 }
@@ -190,7 +190,7 @@ fn step(valve: &ClutchValve<f64>, settled_pa: f64, pressure_pa: f64, dt_s: f64) 
     match valve {
         ClutchValve::Proportional(maps) | ClutchValve::NormallyHigh { maps, .. } => {
             let middle_pa = pressure_pa + 0.5 * dt_s * maps.pressure_rate(pressure_pa, settled_pa);
-            settled_pa + (pressure_pa - settled_pa) * (-dt_s / maps.time_constant_s.at(middle_pa)).exp()
+            settled_pa + (pressure_pa - settled_pa) * Real::exp(-dt_s / maps.time_constant_s.at(middle_pa))
         }
         ClutchValve::PulseWidth { .. } => {
             let step = valve.step(settled_pa, pressure_pa, dt_s);

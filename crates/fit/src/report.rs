@@ -1,5 +1,6 @@
 //! What a fit has found, in words.
 
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use crate::fill::{FILL_TOLD_BY, FillFit};
@@ -292,7 +293,9 @@ pub(crate) fn fill_row(name: &str, fill: &FillFit) -> ReportRow {
 fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -> ReportRow {
     let half = SIDES * sd;
     let (value, interval) = match kind {
-        Kind::Factor => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
+        Kind::Factor => {
+            (format!("x {:.3}", Real::exp(x)), format!("{:.3} to {:.3}", Real::exp(x - half), Real::exp(x + half)))
+        }
         Kind::Delay => {
             let ms = |x: f64| 1e3 * DELAY_UNIT_S * x;
             (format!("{:+.1} ms", ms(x)), format!("{:+.1} to {:+.1} ms", ms(x - half), ms(x + half)))
@@ -326,7 +329,7 @@ pub(crate) fn cautions(is_converged: bool, shifts: usize) -> impl Iterator<Item 
 /// What the sum of the squares of so many independent normal numbers is below in 95 %, by the cube root of Wilson and Hilferty.
 fn chi_squared_95(count: usize) -> f64 {
     let (count, ninth) = (count as f64, 2.0 / (9.0 * count as f64));
-    count * (1.0 - ninth + 1.645 * ninth.sqrt()).powi(3)
+    count * Real::powi(1.0 - ninth + 1.645 * ninth.sqrt(), 3)
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! Each shift has unknowns of its own (load, start of each segment). They are eliminated by their Schur complement, so the
 //! cost grows linearly with the shifts, and a step has only as many unknowns as there are parameters.
 
+use drivetrain::Real;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::FitError;
@@ -101,12 +102,12 @@ impl Problem<'_> {
 
     /// Half the robust sum of squares, priors included.
     fn cost(&self, shifts: &[ShiftModel], at: &Unknowns, residuals: &[DVector<f64>], weights: &Weights) -> f64 {
-        let prior: f64 = (self.priors.iter().zip(&at.shared)).map(|(p, x)| ((x - p.mean) / p.sd).powi(2)).sum();
+        let prior: f64 = (self.priors.iter().zip(&at.shared)).map(|(p, x)| Real::powi((x - p.mean) / p.sd, 2)).sum();
         let data = shifts.iter().zip(residuals).zip(&at.own).map(|((shift, rows), own)| {
             let mut errors = rows.clone();
             weights.errors(&shift.blocks, errors.as_mut_slice());
             let huber = |e: f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
-            let own: f64 = shift.own.iter().zip(own).map(|(u, x)| ((x - u.mean) / u.sd).powi(2)).sum();
+            let own: f64 = shift.own.iter().zip(own).map(|(u, x)| Real::powi((x - u.mean) / u.sd, 2)).sum();
             let of_block = |block: &Block| {
                 let sum: f64 = errors.as_slice()[block.rows.clone()].iter().map(|e| huber(*e)).sum();
                 sum / weights.inflation[block.channel as usize]
@@ -165,7 +166,7 @@ impl Problem<'_> {
             let mut own_square = squares.view((count, count), (own_count, own_count)).into_owned();
             let mut own_gradient = gradient.rows(count, own_count).into_owned();
             for (j, (unknown, x)) in shift.own.iter().zip(own).enumerate() {
-                let precision = unknown.sd.powi(-2);
+                let precision = Real::powi(unknown.sd, -2);
                 own_square[(j, j)] += precision;
                 own_gradient[j] += precision * (x - unknown.mean);
             }
@@ -250,7 +251,7 @@ impl Objective for Weighed<'_> {
         let mut information = normal.information.clone();
         let mut gradient: DVector<f64> = normal.scores.iter().sum::<DVector<f64>>() + &normal.driving;
         for (j, (prior, x)) in self.problem.priors.iter().zip(&unknowns.shared).enumerate() {
-            let precision = prior.sd.powi(-2);
+            let precision = Real::powi(prior.sd, -2);
             information[(j, j)] += precision;
             gradient[j] += precision * (x - prior.mean);
         }

@@ -3,6 +3,7 @@
 //! `e_k = r_k - s_(k-1)`, `s_k = s_(k-1) + g e_k`: `g = 0` is the error of the output, `g = 1` that of its changes. The errors of engine
 //! speed and maps act as torques and add up in the speeds; how much they do so, `g` is found from the residuals themselves.
 
+use drivetrain::Real;
 use nalgebra::DVector;
 
 use crate::Channel;
@@ -146,7 +147,7 @@ fn spread(blocks: &[&[f64]], gain: f64) -> (f64, f64) {
     errors.iter_mut().for_each(|error| *error = error.abs());
     let (_, median, _) = errors.select_nth_unstable_by(middle, f64::total_cmp);
     let scale = MAD * *median;
-    (errors.iter().map(|error| error.min(3.0 * HUBER * scale).powi(2)).sum(), scale)
+    (errors.iter().map(|error| Real::powi(error.min(3.0 * HUBER * scale), 2)).sum(), scale)
 }
 
 /// Correlation factor of the one-step errors, at least 1.
@@ -166,7 +167,7 @@ pub(crate) fn correlation(blocks: &[&[f64]], gain: f64, scale: f64) -> f64 {
 fn correlation_factor(blocks: &[&[f64]]) -> f64 {
     const LAGS: usize = 30;
     let limited = |error: f64| error.clamp(-HUBER, HUBER);
-    let variance: f64 = blocks.iter().copied().flatten().map(|error| limited(*error).powi(2)).sum();
+    let variance: f64 = blocks.iter().copied().flatten().map(|error| Real::powi(limited(*error), 2)).sum();
     let mut factor = 1.0;
     for lag in 1..=LAGS {
         let product: f64 = (blocks.iter())

@@ -1,6 +1,6 @@
 //! What a gearbox file says, before it is checked.
 
-use drivetrain::Clutch;
+use drivetrain::{Clutch, Real};
 
 /// Name of the gearbox housing as a member of a set or a side of an element.
 pub const HOUSING: &str = "housing";
@@ -157,7 +157,7 @@ pub struct StatedRatio {
 impl StatedRatio {
     /// Whether this ratio can be printed so, rounded or truncated.
     pub fn prints(&self, ratio: f64) -> bool {
-        let unit = 10f64.powi(-self.decimals);
+        let unit = Real::powi(10.0, -self.decimals);
         // A little more for the rounding of the numbers themselves.
         let truncated = (ratio.abs() - self.value.abs() + 1e-9 * unit) / unit;
         ratio * self.value > 0.0 && (-0.5..1.0).contains(&truncated)

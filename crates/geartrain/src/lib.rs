@@ -7,6 +7,7 @@
 //!
 //! Torques are static and per N m of turbine torque. Slip is input side minus output side; a positive torque drives the
 //! output side; the input side of a brake is the housing.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod capacity;
 pub mod description;

@@ -1,5 +1,7 @@
 //! Teeth that can mesh.
 
+use drivetrain::Real;
+
 use crate::description::{PlanetarySet, Planets};
 use crate::finding::Fault;
 
@@ -60,7 +62,7 @@ pub(crate) fn check<M>(set: &PlanetarySet<M>) -> Result<Vec<(&'static str, Fault
         let (pitch, planet_size) = (f64::from(sun) + f64::from(planet), f64::from(planet) + TIPS);
         if set.planets == Planets::Single
             && count > 1
-            && pitch * (std::f64::consts::PI / f64::from(count)).sin() < planet_size
+            && pitch * Real::sin(std::f64::consts::PI / f64::from(count)) < planet_size
         {
             unusual.push(("planet_count", Fault::Crowded { count, planet }));
         }

@@ -7,6 +7,7 @@ use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+use drivetrain::Real;
 use half::f16;
 use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
@@ -251,7 +252,7 @@ impl Form {
                 let scale = leaf.type_scale();
                 let fits = (0..=38).contains(&scale)
                     && (physical != Physical::FIXED_LEN_BYTE_ARRAY || leaf.type_length() <= 16);
-                fits.then(|| Self::Scaled(10_f64.powi(scale)))
+                fits.then(|| Self::Scaled(Real::powi(10.0, scale)))
             }
             Physical::INT32 | Physical::INT64 if [UINT_8, UINT_16, UINT_32, UINT_64].contains(&converted) => {
                 Some(Self::Unsigned)
@@ -488,5 +489,5 @@ fn stamp96_ns(stamp: &Int96) -> f64 {
     const DAY_NS: f64 = 86_400e9;
     const JULIAN_DAY_OF_1970: f64 = 2_440_588.0;
     let [low, high, day] = [0, 1, 2].map(|i| stamp.data().get(i).map_or(0.0, |word| f64::from(*word)));
-    (day - JULIAN_DAY_OF_1970) * DAY_NS + high * 2_f64.powi(32) + low
+    (day - JULIAN_DAY_OF_1970) * DAY_NS + high * Real::powi(2.0, 32) + low
 }

@@ -1,5 +1,6 @@
 //! Units that are wrong by all appearances.
 
+use drivetrain::Real;
 use trace::Quantity;
 use trace::units::{mpa, rpm};
 
@@ -55,7 +56,7 @@ impl Extremes {
         self.greatest = self.greatest.max(value);
         if value != 0.0 {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the table")]
-            let size = ((value.abs().log2() + 32.0) * PARTS as f64).clamp(0.0, (SIZES - 1) as f64) as usize;
+            let size = ((Real::log2(value.abs()) + 32.0) * PARTS as f64).clamp(0.0, (SIZES - 1) as f64) as usize;
             self.sizes[size] = self.sizes[size].saturating_add(1);
         }
     }
@@ -67,7 +68,7 @@ impl Extremes {
         for (size, count) in (0_u32..).zip(&self.sizes) {
             below += u64::from(*count);
             if 2 * below > all {
-                return Some(((f64::from(size) + 0.5) / PARTS as f64 - 32.0).exp2());
+                return Some(Real::exp2((f64::from(size) + 0.5) / PARTS as f64 - 32.0));
             }
         }
         None
@@ -103,7 +104,7 @@ impl Extremes {
             below += **count;
             100 * below >= 99 * all
         });
-        let limit = nearly_all.map_or(f64::INFINITY, |(size, _)| f64::from(size - 31).exp2());
+        let limit = nearly_all.map_or(f64::INFINITY, |(size, _)| Real::exp2(f64::from(size - 31)));
         self.greatest.abs().max(self.least.abs()).min(limit)
     }
 
@@ -115,7 +116,7 @@ impl Extremes {
         let (mut above, mut limit) = (0, f64::INFINITY);
         for (size, count) in (0_i32..64).zip(&octaves).rev() {
             if *count == 0 && above > 0 {
-                limit = f64::from(size - 32).exp2();
+                limit = Real::exp2(f64::from(size - 32));
             }
             above += *count;
             if 10 * above > all {

@@ -6,7 +6,7 @@
 //! does not know pressures, torques, or the present delay and lag of the valves.
 
 use car::{ShiftCalibration, ShiftClutch, Vehicle};
-use drivetrain::{Engagement, ShiftCoefficients, ShiftTorques};
+use drivetrain::{Engagement, Real, ShiftCoefficients, ShiftTorques};
 
 use crate::FillPlan;
 
@@ -233,5 +233,8 @@ fn falling(from: f64, elapsed_s: f64, duration_s: f64) -> (f64, f64) {
     let share = (elapsed_s / duration_s).clamp(0.0, 1.0);
     let angle = std::f64::consts::PI * share;
     let running = if share < 1.0 { 1.0 } else { 0.0 };
-    (0.5 * from * (1.0 + angle.cos()), -0.5 * from * std::f64::consts::PI / duration_s * angle.sin() * running)
+    (
+        0.5 * from * (1.0 + Real::cos(angle)),
+        -0.5 * from * std::f64::consts::PI / duration_s * Real::sin(angle) * running,
+    )
 }

@@ -11,6 +11,8 @@
 
 use std::ops::Range;
 
+use drivetrain::Real;
+
 const GAMMA: f64 = 0.435_866_521_508_459;
 const ALPHA: [[f64; 3]; 4] = [
     [0.0, 0.0, 0.0],
@@ -153,7 +155,7 @@ impl StepSize {
                 // It stays the longest one: most of a drive needs no root.
                 return Some((step_s, trial));
             }
-            let factor = (0.9 / trial.error.cbrt()).clamp(0.2, 4.0);
+            let factor = (0.9 / Real::cbrt(trial.error)).clamp(0.2, 4.0);
             if trial.error <= 1.0 {
                 // A step cut short by the end of the segment says nothing against the usual length.
                 let usual = if step_s < self.0 { self.0 } else { 0.0 };

@@ -17,6 +17,8 @@ use teeth::Teeth;
 const STANDSTILL_S: f64 = 0.2;
 /// What two times may differ by and still be one, s: rounding, far below the period of any bus.
 const SAME_TIME_S: f64 = 1e-9;
+/// Where the tails of the normal distribution begin in the tables of `rand_distr`.
+const TAIL: f64 = 3.654_152_885_361_009;
 
 /// Random numbers of one sensor; the same seed and name give the same numbers.
 #[derive(Debug, Clone)]
@@ -32,8 +34,13 @@ impl Noise {
         Self(Pcg64Mcg::new((u128::from(seed) << 64) | u128::from(hash) | 1))
     }
 
+    /// A standard normal number. In the tails `rand_distr` takes it from the platform's logarithm: its last digits, which are another
+    /// platform's own, are rounded away.
     fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.0)
+        let x: f64 = StandardNormal.sample(&mut self.0);
+        #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+        let rounded = f64::from(x as f32);
+        if x.abs() < TAIL { x } else { rounded }
     }
 
     /// A number from 0 to 1, less than 1.

@@ -1,5 +1,7 @@
 //! The range of an axis and its ticks.
 
+use drivetrain::Real;
+
 /// What an axis has to show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Axis {
@@ -91,14 +93,14 @@ fn short(value: f64) -> String {
 
 /// The next larger number of the form 1, 2 or 5 times a power of ten.
 pub(crate) fn nice_step(least: f64) -> f64 {
-    let power = 10f64.powf(least.log10().floor());
+    let power = Real::powf(10.0, Real::log10(least).floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|&step| step >= least * 0.999).unwrap_or(least)
 }
 
 /// Decimals that tell multiples of a step apart.
 pub(crate) fn decimals(step: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a small count")]
-    let digits = (-(step * 1.001).log10().floor()).clamp(0.0, 6.0) as usize;
+    let digits = (-Real::log10(step * 1.001).floor()).clamp(0.0, 6.0) as usize;
     digits
 }
 

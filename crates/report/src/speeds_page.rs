@@ -4,6 +4,7 @@ use std::path::Path;
 
 use car::TURBINE_SIDE_INERTIA_KG_M2;
 use config::Source;
+use drivetrain::Real;
 use fit::drive::{ConverterFit, DriveRecord, Moment, ShiftTorque};
 use fit::{Series as Readings, Verdict};
 use logs::Shift;
@@ -350,7 +351,7 @@ impl SpeedsPage<'_> {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bin of a ratio")]
             let bin = (moment.speed_ratio().max(0.0) / BIN) as usize;
             if let Some(bin) = bins.get_mut(bin) {
-                bin.push(fit.by_engine(self.record, moment) / moment.engine_rad_s.powi(2));
+                bin.push(fit.by_engine(self.record, moment) / Real::powi(moment.engine_rad_s, 2));
             }
         }
         let quantile = |bin: &mut Vec<f64>, share: f64| {

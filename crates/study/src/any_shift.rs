@@ -36,7 +36,7 @@ pub mod worth_a_look;
 use car::{Car, Sensors, ShiftClutch};
 use car::{ElementErrors, ErrorBudget};
 use design::{ShiftTables, any_shift_filter};
-use drivetrain::{Cylinder, Passage};
+use drivetrain::{Cylinder, Passage, Real};
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput};
 use plant::TrainError;
@@ -364,8 +364,8 @@ impl SquaredErrors {
             if truth.is_nan() {
                 continue;
             }
-            sum.estimate += (truth - estimate).powi(2);
-            sum.open_loop += (truth - open_loop).powi(2);
+            sum.estimate += Real::powi(truth - estimate, 2);
+            sum.open_loop += Real::powi(truth - open_loop, 2);
             sum.size += truth.abs();
             sum.rows += 1.0;
         }

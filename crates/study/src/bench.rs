@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use car::{Experiment, ObserverEntry, ObserverKind, Vehicle};
 use config::{ConfigError, ExperimentFile};
+use drivetrain::Real;
 use observer::{Estimate, KalmanFilter, Phase};
 use serde::Serialize;
 use trace::Trace;
@@ -278,7 +279,7 @@ fn over_draws<'a>(draws: impl Iterator<Item = &'a BenchCell>) -> BenchCell {
     let draws: Vec<&BenchCell> = draws.collect();
     let mean =
         |value: &dyn Fn(&BenchCell) -> f64| draws.iter().map(|cell| value(cell)).sum::<f64>() / draws.len() as f64;
-    let rms = |value: &dyn Fn(&BenchCell) -> f64| mean(&|cell| value(cell).powi(2)).sqrt();
+    let rms = |value: &dyn Fn(&BenchCell) -> f64| mean(&|cell| Real::powi(value(cell), 2)).sqrt();
     let some = |value: fn(&BenchCell) -> Option<f64>| {
         let values: Option<Vec<f64>> = draws.iter().map(|cell| value(cell)).collect();
         values.filter(|values| !values.is_empty())

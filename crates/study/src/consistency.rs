@@ -1,5 +1,6 @@
 //! Whether a Kalman filter is as sure as it may be, and whether it gives the same in single precision.
 
+use drivetrain::Real;
 use observer::{Estimator, Health, KalmanFilter, Phase};
 use serde::Serialize;
 use trace::{Trace, TraceError, signal};
@@ -69,7 +70,7 @@ impl Consistency {
                 *sum += error * error;
             }
             let Some(states) = double_state.states() else { continue };
-            let squared = ((double.pressure_pa - truth) / states[PRESSURE].1).powi(2);
+            let squared = Real::powi((double.pressure_pa - truth) / states[PRESSURE].1, 2);
             sums.samples += 1;
             sums.inside += u64::from(squared <= BAND_95 * BAND_95);
             sums.squared_errors += squared;

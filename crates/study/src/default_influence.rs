@@ -5,7 +5,7 @@
 
 use car::{GainMethod, ObserverKind, Vehicle};
 use config::{Change, DefaultTaken, ExperimentFile, VehicleFile};
-use drivetrain::Table1;
+use drivetrain::{Real, Table1};
 use observer::{Estimate, Phase};
 use trace::Trace;
 
@@ -110,7 +110,7 @@ impl Shift {
         let rms = |signal: fn(&Estimate<f64>) -> f64| {
             let weighed = nominal.iter().zip(other).zip(&self.is_weighed).filter(|(_, weighed)| **weighed);
             let (squares, count) = weighed.fold((0.0, 0.0), |(squares, count), ((nominal, other), _)| {
-                (squares + (signal(other) - signal(nominal)).powi(2), count + 1.0)
+                (squares + Real::powi(signal(other) - signal(nominal), 2), count + 1.0)
             });
             (squares / f64::max(count, 1.0)).sqrt()
         };

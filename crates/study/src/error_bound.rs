@@ -9,6 +9,7 @@ use config::{Study, Varied, toml_string};
 use design::compliant::{SPEED_UNITS_RAD_S, compliant_model};
 use design::enclosing::enclosing_matrix;
 use design::rigid_model;
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 use observer::{CompliantModel, Phase, RigidModel};
 use serde::Serialize;
@@ -235,7 +236,7 @@ impl Models {
         if !with_slip {
             w[1] = 0.0;
         }
-        let norm = |w: [f64; 2]| w[0].hypot(w[1]);
+        let norm = |w: [f64; 2]| Real::hypot(w[0], w[1]);
         keep(&mut errors.rigid, norm(w));
         (0..2).for_each(|k| keep(&mut errors.rigid_channels[k], w[k]));
 

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use drivetrain::Real;
+
 /// Counts of ratios from 1/20 to 20 by their logarithm, in so many bins for a factor of e.
 pub struct RatioHistogram<const FINE: u32> {
     counts: Vec<u32>,
@@ -26,7 +28,7 @@ impl<const FINE: u32> RatioHistogram<FINE> {
         /// Share by which a ratio near the end of a bin may be taken for one in the next.
         const ROUNDING: f64 = 1e-9;
         if !self.within.contains(&ratio) {
-            let place = ratio.ln() * Self::FINE + Self::ONE;
+            let place = Real::ln(ratio) * Self::FINE + Self::ONE;
             if !(0.0..2.0 * Self::ONE).contains(&place) {
                 return;
             }
@@ -43,7 +45,7 @@ impl<const FINE: u32> RatioHistogram<FINE> {
 
     /// Share of the ratios that are within this share of one.
     pub fn share_near(&self, ratio: f64, within: f64) -> f64 {
-        let place = |ratio: f64| ratio.ln() * Self::FINE + Self::ONE;
+        let place = |ratio: f64| Real::ln(ratio) * Self::FINE + Self::ONE;
         let [least, most] = [1.0 - within, 1.0 + within].map(|factor| place(ratio * factor));
         let (mut all, mut near) = (0.0, 0.0);
         for (bin, count) in (0_u32..).zip(&self.counts) {
@@ -62,7 +64,7 @@ impl<const FINE: u32> RatioHistogram<FINE> {
         for (place, count) in (0_u32..).zip(&self.counts) {
             below += u64::from(*count);
             if 2 * below > all {
-                return ((f64::from(place) + 0.5 - Self::ONE) / Self::FINE).exp();
+                return Real::exp((f64::from(place) + 0.5 - Self::ONE) / Self::FINE);
             }
         }
         f64::NAN

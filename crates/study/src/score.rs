@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use drivetrain::{PeakJerk, ReducedShift};
+use drivetrain::{PeakJerk, Real, ReducedShift};
 use observer::{Bounds, Phase};
 use trace::{Trace, signal};
 
@@ -350,7 +350,7 @@ impl ShiftRating {
             flare_rad_s: self.flare_rad_s,
             least_shaft_torque_n_m: self.least_shaft_torque_n_m,
             jerk_peak_m_s3: self.jerk.peak_m_s3().unwrap_or(0.0),
-            vibration_dose_m_s175: self.vibration.dose.powf(0.25),
+            vibration_dose_m_s175: Real::powf(self.vibration.dose, 0.25),
             friction_work_j: self.friction_work_j,
         })
     }
@@ -392,8 +392,8 @@ impl VibrationDose {
     fn push(&mut self, time_s: f64, acceleration: f64) {
         let (last_s, mut slow) = self.last.unwrap_or((time_s, acceleration));
         let dt = time_s - last_s;
-        slow += (1.0 - (-std::f64::consts::TAU * VIBRATION_FROM_HZ * dt).exp()) * (acceleration - slow);
-        self.dose += (acceleration - slow).powi(4) * dt;
+        slow += (1.0 - Real::exp(-std::f64::consts::TAU * VIBRATION_FROM_HZ * dt)) * (acceleration - slow);
+        self.dose += Real::powi(acceleration - slow, 4) * dt;
         self.last = Some((time_s, slow));
     }
 }

@@ -10,6 +10,7 @@ use design::budget::{grade_n_m, mass_n_m};
 use design::compliant::compliant_model;
 use design::rigid_model;
 use design::{ValveErrors, shift_time_constant};
+use drivetrain::Real;
 use nalgebra::DVector;
 use observer::Phase;
 use serde::Serialize;
@@ -203,7 +204,7 @@ const QUANTUM_DEVIATIONS: f64 = 5.0 * std::f64::consts::SQRT_2;
 /// Drift of the shaft torque by integrating noisy readings over a shift at 100 Hz, one standard deviation, N m.
 fn drift_n_m(vehicle: &Vehicle) -> f64 {
     let (sample_s, bounds, line) = (0.01, &vehicle.error_bounds, &vehicle.driveline);
-    let twist_rad_s = (bounds.output_quantum_rad_s / line.final_ratio).hypot(bounds.wheel_quantum_rad_s);
+    let twist_rad_s = Real::hypot(bounds.output_quantum_rad_s / line.final_ratio, bounds.wheel_quantum_rad_s);
     line.shaft_stiffness_n_m_rad * twist_rad_s / QUANTUM_DEVIATIONS * (SHIFT_S * sample_s).sqrt()
 }
 
@@ -226,7 +227,7 @@ fn evaluate(vehicle: &Vehicle, phase: Phase, view: View, pressure: [f64; 2], col
             bound: *bound,
             pressure_pa_per_unit: pressure_pa,
             clutch_n_m_per_unit: pressure_pa * torque_per_pa,
-            angle_deg: (outputs > 1 && column.norm() > 0.0).then(|| cosine.acos().to_degrees()),
+            angle_deg: (outputs > 1 && column.norm() > 0.0).then(|| Real::acos(cosine).to_degrees()),
         }
     });
     PhaseSensitivity { phase: phase.name(), view, influence_rad_s2_mpa: 1e6 * g.norm(), effects: effects.collect() }

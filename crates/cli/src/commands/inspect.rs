@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use drivetrain::Real;
 use fit::drive::{DriveRecord, fit_converter};
 use logs::plausibility::{likely_time_unit, too_fast_a_time};
 use logs::{
@@ -331,7 +332,7 @@ fn notes(readings: &Readings<'_>) -> Vec<String> {
 
 /// Half of an interval of 95 % behind its value, rounded up; that there is none where readings do not show it.
 fn with_half(half: Option<f64>, digits: i32) -> String {
-    let unit = 10.0_f64.powi(digits);
+    let unit = Real::powi(10.0, digits);
     let digits = usize::try_from(digits).unwrap_or(0);
     half.map_or(" (interval not identifiable)".to_owned(), |half| {
         format!(" +- {:.digits$}", (unit * half).ceil() / unit)

@@ -2,6 +2,7 @@
 //! sample, and the longest step over which it shrinks.
 
 use car::{GainMethod, GivenGains, ObserverEntry, ObserverKind, SAMPLE_TIMES_S, Vehicle};
+use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::{Discretisation, Phase};
 
@@ -96,7 +97,7 @@ pub(crate) fn longest_decaying_step_s(
     let norm = Norm::euclidean(gain.nrows());
     longest_step(*SAMPLE_TIMES_S.start(), |step_s| {
         let corners = corners(vehicle, model, phase, step_s, discretisation);
-        let decayed = (-kappa2_per_s * step_s).exp();
+        let decayed = Real::exp(-kappa2_per_s * step_s);
         corners.iter().all(|corner| norm.factor(&corner.error_dynamics(gain)) <= decayed)
     })
 }

@@ -1,5 +1,6 @@
 //! Searches over a parameter of a program: for the best certified gain, with an account of what the solver did.
 
+use drivetrain::Real;
 use serde::Serialize;
 
 use super::Found;
@@ -77,21 +78,21 @@ impl Search {
 /// function with one minimum. It is infinite where there is no value.
 pub(crate) fn least_over([low, high]: [f64; 2], within: f64, mut at: impl FnMut(f64) -> f64) -> f64 {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut low, mut high) = (low.ln(), high.ln());
+    let (mut low, mut high) = (Real::ln(low), Real::ln(high));
     let mut inner = [high - golden * (high - low), low + golden * (high - low)];
-    let mut values = inner.map(|x| at(x.exp()));
+    let mut values = inner.map(|x| at(Real::exp(x)));
     while high - low > within {
         if values[0] <= values[1] {
             high = inner[1];
             inner = [high - golden * (high - low), inner[0]];
-            values = [at(inner[0].exp()), values[0]];
+            values = [at(Real::exp(inner[0])), values[0]];
         } else {
             low = inner[0];
             inner = [inner[1], low + golden * (high - low)];
-            values = [values[1], at(inner[1].exp())];
+            values = [values[1], at(Real::exp(inner[1]))];
         }
     }
-    if values[0] <= values[1] { inner[0].exp() } else { inner[1].exp() }
+    if values[0] <= values[1] { Real::exp(inner[0]) } else { Real::exp(inner[1]) }
 }
 
 #[cfg(test)]

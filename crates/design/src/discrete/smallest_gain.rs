@@ -8,6 +8,7 @@
 //! outputs leave a direction of `L` that `LH` does not contain. In steady state `|x|` of [`super::system`] is at most the sum of
 //! the lengths of all columns over `1 - |Phi - L G Psi|`, at the vertex where that is largest.
 
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use super::search::{Search, SolverRecord};
@@ -30,7 +31,7 @@ pub(crate) fn smallest_gain(
     sample_time_s: f64,
     round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
 ) -> Result<(Found, SolverRecord), DesignError> {
-    let rho = (-kappa2_per_s * sample_time_s).exp();
+    let rho = Real::exp(-kappa2_per_s * sample_time_s);
     let with_margin = |margin: f64| with_margin(system, (rho, margin), kappa2_per_s, &round);
     let is_refused = |found: &Result<_, DesignError>| matches!(found, Err(DesignError::NotCertified));
     let [first, others @ ..] = MARGINS;

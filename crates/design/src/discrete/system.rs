@@ -29,6 +29,7 @@
 //! so that it depends on how much the friction changes from sample to sample, see [`ErrorSystem::friction_step`].
 
 use car::Vehicle;
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 use observer::{Discretisation, Phase};
 
@@ -218,7 +219,7 @@ pub(crate) fn corners(
         valve_extremes(&rigid, &vehicle.settings.uncertainty).into_iter().enumerate()
     {
         let phi = match discretisation {
-            Discretisation::Exact => (a22_per_s * sample_time_s).exp(),
+            Discretisation::Exact => Real::exp(a22_per_s * sample_time_s),
             Discretisation::Euler => 1.0 + a22_per_s * sample_time_s,
         };
         let psi = (phi - 1.0) / a22_per_s;
@@ -353,7 +354,7 @@ fn direct(vehicle: &Vehicle, model: Model, quantity: Quantity, corner: &Corner, 
     };
     let pressure = states - 1;
     let phi = corner.phi[(pressure, pressure)];
-    let acts_s = if phi < 1.0 { (phi - 1.0) / (phi.ln() / sample_time_s) } else { sample_time_s };
+    let acts_s = if phi < 1.0 { (phi - 1.0) / (Real::ln(phi) / sample_time_s) } else { sample_time_s };
     let valve = ValveErrors::of(vehicle);
     let rounding = ROUNDINGS * bounds.float32_rounding;
     let mut causes = vec![

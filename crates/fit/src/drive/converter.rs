@@ -10,6 +10,7 @@
 //! the torque signal is ahead of the torque. Least squares, robust by Huber's weights, `d` by search. The torque ratio of the converter is not
 //! in these equations: it would need a torque on the output side.
 
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use super::record::{DriveRecord, Moment};
@@ -101,7 +102,7 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     let knot = |(i, &speed_ratio): (usize, &f64)| Knot {
         speed_ratio,
         capacity_n_m_s2: solution.unknowns[i],
-        sd_n_m_s2: sd[i].hypot(bends[i]),
+        sd_n_m_s2: Real::hypot(sd[i], bends[i]),
         time_s: per_moment_s * shares(&some, &knots, i),
     };
     let all: Vec<Knot> = knots.iter().enumerate().map(knot).collect();
@@ -114,7 +115,7 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
         inertia_sd_kg_m2: sd[knots.len()],
         delay_s,
         // The delay is searched in steps.
-        delay_sd_s: sd[knots.len() + 1].hypot(DELAY_STEP_S / 12.0_f64.sqrt()),
+        delay_sd_s: Real::hypot(sd[knots.len() + 1], DELAY_STEP_S / 12.0_f64.sqrt()),
         scale_n_m: solution.scale_n_m,
         fitted_s: 0.02 * slipping.len() as f64,
     })
@@ -166,7 +167,7 @@ impl ConverterFit {
     /// The same by the capacity of the converter, N m, with its standard deviation; none where it says nothing.
     pub fn by_converter(&self, moment: &Moment) -> Option<[f64; 2]> {
         let capacity = self.capacity(moment.speed_ratio()).filter(|_| !moment.no_slip)?;
-        (moment.speed_ratio() < COUPLED).then(|| capacity.map(|value| value * moment.engine_rad_s.powi(2)))
+        (moment.speed_ratio() < COUPLED).then(|| capacity.map(|value| value * Real::powi(moment.engine_rad_s, 2)))
     }
 }
 
@@ -177,7 +178,7 @@ fn bends(knots: &[f64], capacities: &[f64]) -> Vec<f64> {
     let bend = |i: usize| {
         let ((x0, y0), (x1, y1), (x2, y2)) = (at(i - 1), at(i), at(i + 1));
         let second = 2.0 * ((y2 - y1) / (x2 - x1) - (y1 - y0) / (x1 - x0)) / (x2 - x0);
-        second.abs() * (0.5 * (x2 - x0)).powi(2) / 12.0
+        second.abs() * Real::powi(0.5 * (x2 - x0), 2) / 12.0
     };
     // The first knot has a line on one side only: the bend of the next.
     (0..knots.len()).map(|i| bend(i.max(1))).collect()
@@ -224,7 +225,7 @@ struct Solution {
 /// How a moment depends on the unknowns.
 fn row(knots: &[f64], moment: &Moment, j: usize) -> f64 {
     if j < knots.len() {
-        share(knots, moment.speed_ratio(), j) * moment.engine_rad_s.powi(2)
+        share(knots, moment.speed_ratio(), j) * Real::powi(moment.engine_rad_s, 2)
     } else {
         moment.engine_rad_s2
     }
@@ -250,7 +251,7 @@ impl Solution {
             let by_weight = weighted(&rows, &weights);
             let mut matrix = rows.tr_mul(&by_weight);
             let mut right = by_weight.tr_mul(&torques);
-            let prior = (scale_n_m / INERTIA[1]).powi(2);
+            let prior = Real::powi(scale_n_m / INERTIA[1], 2);
             matrix[(count - 1, count - 1)] += prior;
             right[count - 1] += prior * INERTIA[0];
             unknowns = matrix.cholesky()?.solve(&right);
@@ -280,8 +281,8 @@ impl Solution {
         let rows = DMatrix::from_fn(moments.len(), count + 1, cell);
         let by_weight = weighted(&rows, &self.weights);
         let mut matrix = rows.tr_mul(&by_weight);
-        matrix[(count - 1, count - 1)] += (self.scale_n_m / INERTIA[1]).powi(2);
-        matrix[(count, count)] += (self.scale_n_m / DELAY_SD_S).powi(2);
+        matrix[(count - 1, count - 1)] += Real::powi(self.scale_n_m / INERTIA[1], 2);
+        matrix[(count, count)] += Real::powi(self.scale_n_m / DELAY_SD_S, 2);
         let inverse = matrix.cholesky()?.inverse();
         let mut scatter = DMatrix::zeros(count + 1, count + 1);
         for first in (0..moments.len()).step_by(BLOCK) {
@@ -290,7 +291,7 @@ impl Solution {
             scatter += &score * score.transpose();
         }
         let clustered = &inverse * scatter * &inverse;
-        let inflation = self.scale_n_m.powi(2) * correlation(&self.residuals);
+        let inflation = Real::powi(self.scale_n_m, 2) * correlation(&self.residuals);
         Some((0..=count).map(|j| (inflation * inverse[(j, j)]).max(clustered[(j, j)]).sqrt()).collect())
     }
 }

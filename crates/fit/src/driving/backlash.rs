@@ -9,6 +9,8 @@
 //! ([`twist`](super::twist)). `b` is the backlash at the wheels. Times soon after a reversal, in which the teeth are on their way and
 //! the shafts oscillate, are left out.
 
+use drivetrain::Real;
+
 use super::twist::{Cell, InputTorque, changes, rests, told};
 use super::{DrivenCar, Driving};
 use crate::Verdict;
@@ -121,5 +123,5 @@ pub(crate) fn fit_backlash<'a>(
     let (count, sum) =
         torques.filter(|torque| *torque < 0.0).fold((0.0, 0.0), |(n, sum), torque| (n + 1.0, sum - torque));
     let by_overrun = OVERRUN_SHARE * sum / f64::max(count, 1.0) / stiffness;
-    Ok(BacklashFit { rad: rad.max(0.0), sd_rad: sd_rad.hypot(by_overrun), reversals })
+    Ok(BacklashFit { rad: rad.max(0.0), sd_rad: Real::hypot(sd_rad, by_overrun), reversals })
 }

@@ -1,5 +1,7 @@
 //! Values that logs tell, and the words for those of a channel.
 
+use drivetrain::Real;
+
 use crate::Verdict;
 use crate::fitted_file::SIDES;
 
@@ -26,7 +28,7 @@ impl Known {
 
     /// With a floor for what the model leaves out, and not less known than before.
     pub(super) fn of(value: f64, sd: f64, floor: f64, before: f64) -> Self {
-        Self { value, sd: sd.hypot(floor).min(before), before }
+        Self { value, sd: Real::hypot(sd, floor).min(before), before }
     }
 
     /// Whether it is told, and more than this and its interval away from zero.

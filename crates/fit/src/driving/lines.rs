@@ -1,5 +1,6 @@
 //! Robust least squares with intervals for a few unknowns.
 
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use crate::intervals::cluster;
@@ -34,7 +35,7 @@ impl<const N: usize> Told<N> {
             rows: DMatrix::from_fn(lines.len(), N, |i, j| lines[i].row[j] / root(i)),
             values: DVector::from_fn(lines.len(), |i, _| lines[i].value / root(i)),
             before: DVector::from_row_slice(&before),
-            precision: DMatrix::from_diagonal(&DVector::from_row_slice(&sd.map(|sd| sd.powi(-2)))),
+            precision: DMatrix::from_diagonal(&DVector::from_row_slice(&sd.map(|sd| Real::powi(sd, -2)))),
         };
         let mut at = problem.before.clone();
         let mut covariance = problem.precision.clone();

@@ -1,5 +1,6 @@
 //! The torque balances of car and engine along stretches of driving.
 
+use drivetrain::Real;
 use drivetrain::road::GRAVITY_M_S2;
 use nalgebra::{DMatrix, DVector};
 
@@ -125,7 +126,7 @@ impl At<'_> {
     }
 
     fn factor(&self, term: Term) -> f64 {
-        self.of(term).exp()
+        Real::exp(self.of(term))
     }
 
     /// Columns of the terms that the fit has.
@@ -143,7 +144,7 @@ impl<'a> DrivingModel<'a> {
         let at_input_n_m = if car.converter.is_some() { of_steps(|half| half.turbine_n_m) } else { reported_n_m };
         // Over a step noise averages out.
         let longer = (FINE_S / STEP_S).sqrt();
-        let noise_n_m = [longer * at_input_n_m, longer * reported_n_m.hypot(of_steps(|half| half.pump_n_m))];
+        let noise_n_m = [longer * at_input_n_m, longer * Real::hypot(reported_n_m, of_steps(|half| half.pump_n_m))];
         let reading_rad_s = reading_rad_s.map(|noise| (longer * noise).max(READING_LEAST_RAD_S));
         Self { driving, car, uses, reading_rad_s, noise_n_m }
     }
@@ -308,7 +309,7 @@ impl<'a> DrivingModel<'a> {
             reading: self.body_speed(stretch, ratio, &torque, [body, wheels].map(|part| part / inertia)),
             sd_rad_s2: [
                 by_step(&|_| GRADE_RAD * weight),
-                by_step(&|k| ratio * DRAG_SD_N_M.hypot(INPUT_SD_SHARE * input[k]) / inertia),
+                by_step(&|k| ratio * Real::hypot(DRAG_SD_N_M, INPUT_SD_SHARE * input[k]) / inertia),
             ],
             white_rad_s2: ratio * self.noise_n_m[0] / inertia,
             rate,
@@ -356,8 +357,9 @@ impl<'a> DrivingModel<'a> {
             [late, late + DELAY_STEP].map(|late| stretch.reported_n_m(&stretch.halves, STEP_S, DELAY_UNIT_S * late));
         let pump = by_step(&|k| capacity * steps[k].pump_n_m);
         let rate = by_step(&|k| (scale * torque[k] - pump[k]) / inertia);
-        let error_n_m =
-            |k: usize| REPORTED_N_M.hypot(REPORTED_SHARE * torque[k]).hypot(INPUT_SD_SHARE * pump[k]) / inertia;
+        let error_n_m = |k: usize| {
+            Real::hypot(Real::hypot(REPORTED_N_M, REPORTED_SHARE * torque[k]), INPUT_SD_SHARE * pump[k]) / inertia
+        };
         Lines {
             reading: means(&stretch.halves, |half| half.engine_rad_s),
             white_rad_s2: self.noise_n_m[1] / inertia,
@@ -418,8 +420,8 @@ impl Evaluated {
 /// Twice the negative logarithm of the likelihood of errors, of which single large ones count little, but for a constant.
 fn unlikely(errors: &[f64], log_variance: f64) -> f64 {
     let (count, scale) = (errors.len() as f64, scale_of(errors).max(f64::MIN_POSITIVE));
-    let squares = errors.iter().map(|error| (error / scale).abs().min(3.0 * HUBER).powi(2)).sum::<f64>();
-    log_variance + count * (scale * scale * squares / count).ln()
+    let squares = errors.iter().map(|error| Real::powi((error / scale).abs().min(3.0 * HUBER), 2)).sum::<f64>();
+    log_variance + count * Real::ln(scale * scale * squares / count)
 }
 
 /// Robust standard deviation.

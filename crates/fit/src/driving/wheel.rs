@@ -3,6 +3,8 @@
 //! The unknowns are those of [`twist`](super::twist), with the backlash as one that is in the way. Changes are half a second long: in a shorter one the noise
 //! of the torque is as large as its change, and the shafts would seem too stiff (errors in variables).
 
+use drivetrain::Real;
+
 use super::known::{Known, LEAST_SCALE, said_of_delay};
 use super::twist::{Cell, DELAY_S, InputTorque, SCALE, changes, told};
 use super::{DrivenCar, Driving};
@@ -46,7 +48,7 @@ impl WheelFit {
 
     /// Factor on the stiffness of the file.
     pub(crate) fn stiffness_factor(&self) -> f64 {
-        self.stiffness.value.exp()
+        Real::exp(self.stiffness.value)
     }
 
     /// What a fit says of it: what belongs into the channel map, and the stiffness.
@@ -128,11 +130,11 @@ pub(crate) fn fit_wheel(
         .ok_or_else(|| format!("the speeds of output and wheels do not fit together; {WHEEL_TOLD_BY}"))?;
     let [scale, late_s, shafts, _] = found.value;
     // The twist tells the compliance per torque.
-    let stiffness_sd_found = (found.sd[2] / shafts).hypot(torque.sd);
+    let stiffness_sd_found = Real::hypot(found.sd[2] / shafts, torque.sd);
     Ok(WheelFit {
         scale: Known::of(scale, found.sd[0], FLOORS[0], SCALE),
         late_s: Known::of(late_s, found.sd[1], FLOORS[1], DELAY_S),
-        stiffness: Known::of((compliance / shafts).ln(), stiffness_sd_found, FLOORS[2], stiffness_sd),
+        stiffness: Known::of(Real::ln(compliance / shafts), stiffness_sd_found, FLOORS[2], stiffness_sd),
         time_s,
     })
 }

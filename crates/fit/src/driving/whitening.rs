@@ -5,6 +5,7 @@
 //! filter of these errors alone turns residuals, and each column of their derivatives, into independent numbers of variance 1: generalised
 //! least squares.
 
+use drivetrain::Real;
 use nalgebra::{Matrix4, RowVector4, Vector4};
 
 /// Deviation of the speed at the begin of a stretch, rad/s: nothing is known of it.
@@ -23,13 +24,13 @@ impl Passing {
 
     /// The transition of speed, grade, its change, and torque, each in its deviation.
     fn transition(self) -> Matrix4<f64> {
-        let (x, stays) = (self.grade, (-self.grade).exp());
+        let (x, stays) = (self.grade, Real::exp(-self.grade));
         let mut transition = Matrix4::identity();
         transition[(1, 1)] = stays * (1.0 + x);
         transition[(1, 2)] = stays * x;
         transition[(2, 1)] = -stays * x;
         transition[(2, 2)] = stays * (1.0 - x);
-        transition[(3, 3)] = (-self.torque).exp();
+        transition[(3, 3)] = Real::exp(-self.torque);
         transition
     }
 }
@@ -85,7 +86,7 @@ impl Whitening {
         motion[(0, 1)] = step.step_s * step.sd_rad_s2[0];
         motion[(0, 3)] = step.step_s * step.sd_rad_s2[1];
         self.covariance = motion * self.covariance * motion.transpose();
-        self.covariance[(0, 0)] += (step.step_s * step.white_rad_s2).powi(2);
+        self.covariance[(0, 0)] += Real::powi(step.step_s * step.white_rad_s2, 2);
         self.states.iter_mut().for_each(|state| *state = motion * *state);
         self.disturb(step.passing);
     }
@@ -104,7 +105,7 @@ impl Whitening {
         let with_speed = self.covariance.column(0).into_owned();
         let variance = with_speed[0] + self.noise;
         let gain = with_speed / variance;
-        self.log_variance += variance.ln();
+        self.log_variance += Real::ln(variance);
         for (state, value) in self.states.iter_mut().zip(row) {
             let error = *value - state[0];
             *state += gain * error;

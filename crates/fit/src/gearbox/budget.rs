@@ -2,6 +2,7 @@
 
 use car::{Car, ShiftClutch};
 use car::{ElementErrors, ErrorBudget};
+use drivetrain::Real;
 
 use super::file::{Written, list};
 use super::fitting::GearboxFit;
@@ -72,7 +73,7 @@ impl GearboxFit {
             false => self.untold_friction_and_gain(place, [given.friction_factor, given.valve_gain_factor]),
         };
         let lag = Quantity::Lag(place);
-        let lag = factors(self.sd(lag), self.unknown(lag).exp(), given.valve_lag_factor);
+        let lag = factors(self.sd(lag), Real::exp(self.unknown(lag)), given.valve_lag_factor);
         let delay_s = self.delay_s(known, place, given.valve_delay_s);
         let table = ["clutch", self.quantities.elements[place].as_str(), "error_bounds"];
         let all = [
@@ -102,7 +103,7 @@ impl GearboxFit {
     /// torque contains that of the file.
     fn untold_friction_and_gain(&self, place: usize, [friction, gain]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
         let torque = Quantity::Torque(place);
-        let value = self.unknown(torque).exp();
+        let value = Real::exp(self.unknown(torque));
         let product = factors(self.sd(torque), value, [friction[0] * gain[0], friction[1] * gain[1]]);
         let both = |least: [f64; 2], greatest: [f64; 2]| {
             [least[0].max(least[1]).min(1.0), greatest[0].min(greatest[1]).max(1.0)]

@@ -5,7 +5,7 @@
 
 use car::Car;
 use design::ShiftTables;
-use drivetrain::Cylinder;
+use drivetrain::{Cylinder, Real};
 use nalgebra::{DMatrix, DVector};
 use observer::any_shift::ShiftRow;
 
@@ -79,7 +79,7 @@ impl ClutchModel {
             Some(cylinder) => {
                 let sd = |quantity| quantities.place(quantity).map_or(0.0, |at| quantities.sd_before(at));
                 let [kiss, offset] = [Quantity::Kiss(shift.element), Quantity::PressureOffset(shift.element)].map(sd);
-                let sd_pa = (KISS_UNIT_PA * kiss).hypot(OFFSET_UNIT_PA * offset);
+                let sd_pa = Real::hypot(KISS_UNIT_PA * kiss, OFFSET_UNIT_PA * offset);
                 filled_part(&measured, kiss_pa + SURELY * sd_pa, cylinder)
             }
             None => measured,
@@ -112,9 +112,9 @@ impl ClutchModel {
     /// By the gain of the file: the true pressures, at which the valve has its lag and the piston its stroke, over the factor of the gain.
     fn pressures_of(&self, hydraulics: &Hydraulics, grid: Grid, at: &AtValve) -> Vec<f64> {
         let mut of = hydraulics.with_valve(at.lag, at.gain);
-        of.set_kiss(self.kiss_at(at) * at.gain.exp());
+        of.set_kiss(self.kiss_at(at) * Real::exp(at.gain));
         let mut pressures = pressures(&of, DELAY_UNIT_S * at.late, &self.commands, grid);
-        pressures.iter_mut().for_each(|pressure| *pressure *= (-at.gain).exp());
+        pressures.iter_mut().for_each(|pressure| *pressure *= Real::exp(-at.gain));
         pressures
     }
 
@@ -166,7 +166,7 @@ impl ClutchModel {
         // The readings are of an ended stroke, whenever the model ends it.
         let filled = self.hydraulics.cylinder.map(|_| self.derived(&self.hydraulics.filled(), grid, unknowns));
         let found = filled.as_ref().unwrap_or(found);
-        let factor = (at[scale] + at[gain]).exp();
+        let factor = Real::exp(at[scale] + at[gain]);
         let predicted = |values: &[f64]| -> DVector<f64> {
             let times = self.measured.time_s.iter();
             DVector::from_iterator(rows, times.map(|time_s| factor * grid.at(values, *time_s)))

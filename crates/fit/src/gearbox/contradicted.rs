@@ -2,6 +2,7 @@
 
 use car::Car;
 use design::ShiftTables;
+use drivetrain::Real;
 
 use super::quantities::Quantities;
 use super::shift::ShiftModel;
@@ -21,8 +22,8 @@ pub(super) fn contradicted(car: &Car, tables: &ShiftTables<f64>, shifts: &[Shift
         for (place, [measured_pa, modelled_pa]) in model.pressures_beside() {
             if let Some([rows, differences, pressures]) = sums.get_mut(place) {
                 *rows += 1.0;
-                *differences += (measured_pa - modelled_pa).powi(2);
-                *pressures += modelled_pa.powi(2);
+                *differences += Real::powi(measured_pa - modelled_pa, 2);
+                *pressures += Real::powi(modelled_pa, 2);
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use config::{CarFile, Source, toml_string};
-use drivetrain::{ClutchValve, Table1};
+use drivetrain::{ClutchValve, Real, Table1};
 use trace::ShownPath as _;
 
 use super::fitting::GearboxFit;
@@ -48,7 +48,7 @@ impl GearboxFit {
             if self.is_seen(Quantity::Inertia(at)) && !self.drawn_off.iter().any(|(pair, _)| *pair == at) {
                 let on_input_kg_m2 = if car.converter.is_some() { 0.0 } else { car.engine.inertia_kg_m2 };
                 let all_kg_m2 = reduced.mass_kg_m2[0][0] + on_input_kg_m2;
-                let value = all_kg_m2 * self.unknown(Quantity::Inertia(at)).exp() - on_input_kg_m2;
+                let value = all_kg_m2 * Real::exp(self.unknown(Quantity::Inertia(at))) - on_input_kg_m2;
                 let comment = self.comment(Quantity::Inertia(at));
                 text.put(&["turbine_inertia_kg_m2"], &self.quantities.pair_names[at], &number(value), &comment)?;
             }
@@ -70,8 +70,8 @@ impl GearboxFit {
 
     fn write_converter(&self, text: &mut Written, car: &CarFile) -> Result<(), FitError> {
         let Some(converter) = &car.converter else { return Ok(()) };
-        let capacity = converter.capacity_n_m_s2.scaled(self.unknown(Quantity::Input).exp());
-        let ratio = self.unknown(Quantity::TorqueRatio).exp();
+        let capacity = converter.capacity_n_m_s2.scaled(Real::exp(self.unknown(Quantity::Input)));
+        let ratio = Real::exp(self.unknown(Quantity::TorqueRatio));
         let ratios: Vec<f64> = converter.torque_ratio.values().iter().map(|t| 1.0 + ratio * (t - 1.0)).collect();
         text.put(&["converter"], "capacity_n_m_s2", &list(capacity.values()), &self.comment(Quantity::Input))?;
         text.put(&["converter"], "torque_ratio", &list(&ratios), &self.comment(Quantity::TorqueRatio))
@@ -101,7 +101,7 @@ impl GearboxFit {
         ];
         for (quantity, table, key, given) in values {
             if self.is_told(quantity) {
-                let value = number(given * self.unknown(quantity).exp());
+                let value = number(given * Real::exp(self.unknown(quantity)));
                 text.put(&[table], key, &value, &self.comment(quantity))?;
             }
         }
@@ -178,7 +178,7 @@ impl GearboxFit {
         known: &car::ShiftClutch,
         place: usize,
     ) -> Result<(), FitError> {
-        let valve = known.valve.changed(self.unknown(Quantity::Lag(place)).exp(), self.gain_factor(place), None);
+        let valve = known.valve.changed(Real::exp(self.unknown(Quantity::Lag(place))), self.gain_factor(place), None);
         let late_s = DELAY_UNIT_S * self.unknown(Quantity::Delay(place));
         let later = |delay: &Table1<f64>| {
             let values: Vec<f64> = delay.values().iter().map(|delay_s| (delay_s + late_s).max(0.0)).collect();
@@ -239,7 +239,7 @@ impl GearboxFit {
                     Quantity::Rolling => "; a mean grade of the drive acts like it",
                     _ => "",
                 };
-                factor_comment(value.exp(), self.sd(quantity), self.verdict(quantity)) + more
+                factor_comment(Real::exp(value), self.sd(quantity), self.verdict(quantity)) + more
             }
         }
     }
@@ -261,7 +261,7 @@ fn written(mut text: Written, car: &CarFile, path: &Path, head: &str) -> Result<
 
 /// What a fitted factor says of itself.
 fn factor_comment(factor: f64, sd: f64, verdict: Verdict) -> String {
-    let [least, most] = [-SIDES * sd, SIDES * sd].map(|half| factor * half.exp());
+    let [least, most] = [-SIDES * sd, SIDES * sd].map(|half| factor * Real::exp(half));
     format!("x {factor:.3}, 95 % {least:.3} to {most:.3}, {}", verdict.name())
 }
 

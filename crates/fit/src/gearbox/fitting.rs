@@ -3,7 +3,7 @@
 use car::Car;
 use car::ErrorBudget;
 use design::ShiftTables;
-use drivetrain::ShiftKind;
+use drivetrain::{Real, ShiftKind};
 use nalgebra::{DMatrix, DVector};
 
 use super::balances::Balances;
@@ -155,7 +155,7 @@ fn fit_with(
         model.elements().iter().for_each(|at| elements_seen[*at] = true);
     }
     let scales = solved.point.driving.scales();
-    let squares = solved.point.shifts.iter().map(|shift| shift.torque_error.powi(2)).sum::<f64>();
+    let squares = solved.point.shifts.iter().map(|shift| Real::powi(shift.torque_error, 2)).sum::<f64>();
     let mut fit = GearboxFit {
         fills: Vec::new(),
         torque_misfit: (squares / models.len() as f64).sqrt(),
@@ -180,8 +180,8 @@ fn fit_with(
         quantities,
     };
     let input = InputTorque {
-        capacity: fit.unknown(Quantity::Input).exp(),
-        ratio: fit.unknown(Quantity::TorqueRatio).exp(),
+        capacity: Real::exp(fit.unknown(Quantity::Input)),
+        ratio: Real::exp(fit.unknown(Quantity::TorqueRatio)),
         sd: fit.input_sd(),
     };
     let stiffness_sd = deviation_of(ErrorBudget::of_car(car).stiffness);
@@ -236,7 +236,7 @@ impl GearboxFit {
         .collect();
         let [lag, gain, kiss, late] = [Quantity::Lag, Quantity::Gain, Quantity::Kiss, Quantity::Delay]
             .map(|quantity: fn(usize) -> Quantity| [self.unknown(quantity(place)), self.sd(quantity(place))]);
-        let kiss_pa = |more: f64| (known.clutch.kiss_pressure() + KISS_UNIT_PA * (kiss[0] + more)) * gain[0].exp();
+        let kiss_pa = |more: f64| (known.clutch.kiss_pressure() + KISS_UNIT_PA * (kiss[0] + more)) * Real::exp(gain[0]);
         let hydraulics = Hydraulics::of(known).with_valve(lag[0], gain[0]);
         let offset = Quantity::PressureOffset(place);
         let offset_sd = self.quantities.place(offset).map_or(0.0, |_| self.sd(offset));
@@ -244,7 +244,7 @@ impl GearboxFit {
             hydraulics,
             kiss_pa: kiss_pa(0.0),
             late_s: DELAY_UNIT_S * late[0],
-            sensor_scale: self.unknown(Quantity::PressureScale).exp(),
+            sensor_scale: Real::exp(self.unknown(Quantity::PressureScale)),
             sensor_offset_pa: OFFSET_UNIT_PA * self.unknown(offset),
             sensor_late_s: 0.0,
         };
@@ -319,12 +319,12 @@ impl GearboxFit {
 
     /// Factor on the gain of an element's valve in the fitted file: that of the given file where no pressure shows another.
     pub(crate) fn gain_factor(&self, place: usize) -> f64 {
-        if self.quantities.measured[place] { self.unknown(Quantity::Gain(place)).exp() } else { 1.0 }
+        if self.quantities.measured[place] { Real::exp(self.unknown(Quantity::Gain(place))) } else { 1.0 }
     }
 
     /// Factor on the friction of an element in the fitted file.
     pub(crate) fn friction_factor(&self, place: usize) -> f64 {
-        self.unknown(Quantity::Torque(place)).exp() / self.gain_factor(place)
+        Real::exp(self.unknown(Quantity::Torque(place))) / self.gain_factor(place)
     }
 
     /// Standard deviation of the logarithm of the friction of an element whose pressure is measured.

@@ -4,6 +4,7 @@
 //! A group is all shifts between the same gears of one kind, or all driving in a gear: what the model leaves out, such as the drag of the
 //! elements that are open there, is alike in them.
 
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use super::shift::ShiftModel;
@@ -25,7 +26,8 @@ pub(crate) fn stated(
     let auto = curvature.inverse();
     let cluster = intervals::cluster(&auto, &scores(models, solved), &problem.precision);
     let mut stated = with_deviations(&auto, |j| {
-        let found = auto[(j, j)].max(cluster[(j, j)]).sqrt().hypot(problem.quantities.floor(problem.quantities.all[j]));
+        let found =
+            Real::hypot(auto[(j, j)].max(cluster[(j, j)]).sqrt(), problem.quantities.floor(problem.quantities.all[j]));
         // No fit knows less than was known before.
         found.min(problem.quantities.sd_before(j))
     });

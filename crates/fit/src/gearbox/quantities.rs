@@ -3,6 +3,7 @@
 use car::Car;
 use car::ErrorBudget;
 use design::{ShiftTables, any_shift_filter, element_uncertainty};
+use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::any_shift::{AnyShiftFilter, ElementUncertainty};
 
@@ -136,7 +137,7 @@ impl Quantities {
         let mass_share = car.error_bounds.mass_share.unwrap_or(MASS);
         let known = Known { filter: &filter, elements: &elements, has_converter, measured: &measured, mass_share };
         let before = DMatrix::from_fn(all.len(), all.len(), |i, j| {
-            if i == j { known.sd(all[i]).powi(2) } else { known.covariance(all[i], all[j]) }
+            if i == j { Real::powi(known.sd(all[i]), 2) } else { known.covariance(all[i], all[j]) }
         });
         let names = car.gearbox.elements.iter().enumerate();
         let mut named: Vec<(usize, String)> =
@@ -258,7 +259,7 @@ impl Known<'_> {
             Quantity::Delay(at) => of(at).valve_delay_s / DELAY_UNIT_S,
             Quantity::Drag(_) => DRAG_N_M / DRAG_UNIT_N_M,
             Quantity::Torque(at) => of(at).torque_share,
-            Quantity::Kiss(at) => (of(at).kiss_point_pa / KISS_UNIT_PA).hypot(self.kiss_by_gain(at)),
+            Quantity::Kiss(at) => Real::hypot(of(at).kiss_point_pa / KISS_UNIT_PA, self.kiss_by_gain(at)),
             Quantity::Gain(at) => of(at).valve_gain,
             Quantity::PressureScale => PRESSURE_SCALE,
             Quantity::PressureOffset(_) => sd_before_pa() / OFFSET_UNIT_PA,

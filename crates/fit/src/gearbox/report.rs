@@ -1,6 +1,6 @@
 //! What a fit has found, in words.
 
-use drivetrain::ShiftKind;
+use drivetrain::{Real, ShiftKind};
 
 use super::command_delay::said_of_commands;
 use super::fitting::GearboxFit;
@@ -63,7 +63,9 @@ impl GearboxFit {
             }
             Quantity::Kiss(_) => plain(1e-3 * KISS_UNIT_PA, "kPa"),
             Quantity::Drag(_) => plain(DRAG_UNIT_N_M, "N m"),
-            _ => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
+            _ => {
+                (format!("x {:.3}", Real::exp(x)), format!("{:.3} to {:.3}", Real::exp(x - half), Real::exp(x + half)))
+            }
         };
         let share = format!("{:.2}", sd / self.quantities.sd_before(place));
         ReportRow { name: self.quantities.name(quantity), value, interval, share, verdict: self.verdict(quantity) }
@@ -232,7 +234,7 @@ impl GearboxFit {
     /// What is said of inertias that stay those of the file.
     fn said_of_kept(&self) -> Option<String> {
         let name = |(pair, x): &(usize, f64)| {
-            format!("{} (x {:.2}, not identifiable)", self.quantities.pair_names[*pair], x.exp())
+            format!("{} (x {:.2}, not identifiable)", self.quantities.pair_names[*pair], Real::exp(*x))
         };
         let kept: Vec<String> = self.drawn_off.iter().map(name).collect();
         (!kept.is_empty()).then(|| {

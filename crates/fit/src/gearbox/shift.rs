@@ -2,8 +2,8 @@
 
 use car::Car;
 use design::ShiftTables;
-use drivetrain::ShiftKind;
 use drivetrain::clutch::drag_torque;
+use drivetrain::{Real, ShiftKind};
 use geartrain::Change;
 use nalgebra::{DMatrix, DVector};
 
@@ -122,7 +122,7 @@ impl ShiftModel {
             drag_of_one_n_m,
             inertia_kg_m2: row.mass_kg_m2[0][0],
             by_output,
-            own_sd: [START_SD_RAD_S, DRAG_SD_N_M.hypot(INPUT_SD_SHARE * mean)],
+            own_sd: [START_SD_RAD_S, Real::hypot(DRAG_SD_N_M, INPUT_SD_SHARE * mean)],
             time_s,
             reading,
         })
@@ -174,7 +174,7 @@ impl ShiftModel {
         }
         let less: Vec<f64> = momentum.iter().map(|momentum| -momentum).collect();
         unknowns.put(Quantity::Inertia(self.pair), &less);
-        let inertia = self.inertia_kg_m2 * unknowns.of(Quantity::Inertia(self.pair)).exp();
+        let inertia = self.inertia_kg_m2 * Real::exp(unknowns.of(Quantity::Inertia(self.pair)));
         let speeds = momentum.iter().zip(&self.by_output).map(|(momentum, output)| momentum / inertia - output);
         let residuals = self.reading.iter().zip(speeds).map(|(reading, speed)| reading - speed);
         let by_own = DMatrix::from_fn(rows, OWN, |row, own| match own {
@@ -191,7 +191,8 @@ impl ShiftModel {
 
     /// Angular momentum of the turbine by the torque at the input and the drag, at the readings.
     fn input_momentum(&self, unknowns: &mut Unknowns<'_>) -> Vec<f64> {
-        let [capacity, ratio] = [Quantity::Input, Quantity::TorqueRatio].map(|quantity| unknowns.of(quantity).exp());
+        let [capacity, ratio] =
+            [Quantity::Input, Quantity::TorqueRatio].map(|quantity| Real::exp(unknowns.of(quantity)));
         let late = unknowns.of(Quantity::InputDelay);
         let late_n_m = self.reported_n_m(late);
         let engine_late = unknowns.of(Quantity::EngineDelay);
@@ -230,7 +231,7 @@ impl ShiftModel {
         let place = clutch.place;
         let found = clutch.with_derivatives(self.grid, unknowns);
         let (pressure, kiss_pa) = (&found.pressure_pa, found.kiss_pa);
-        let factor = unknowns.of(Quantity::Torque(place)).exp();
+        let factor = Real::exp(unknowns.of(Quantity::Torque(place)));
         let slope = |i: usize| if pressure[i] > kiss_pa { -factor * clutch.per_pa[i] } else { 0.0 };
         let scaled = |by: &dyn Fn(usize) -> f64| -> Vec<f64> {
             self.integral(&(0..pressure.len()).map(|i| slope(i) * by(i)).collect::<Vec<_>>())

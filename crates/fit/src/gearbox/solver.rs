@@ -3,6 +3,7 @@
 //! A shift's own unknowns act linearly: for given parameters they are found at once, and the parameters see what is left (variable
 //! projection). The weights are those of the one-shift fit.
 
+use drivetrain::Real;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::quantities::Quantities;
@@ -103,7 +104,7 @@ fn profiled_turbine(shift: &ShiftModel, lines: &Linearised, weights: ChannelWeig
     by_own.column_iter_mut().for_each(|mut column| in_scales(column.as_mut_slice()));
     let mut of_parameters = lines.residuals.clone();
     in_scales(of_parameters.as_mut_slice());
-    let precision = Matrix2::from_diagonal(&Vector2::from(shift.own_sd.map(|sd| sd.powi(-2))));
+    let precision = Matrix2::from_diagonal(&Vector2::from(shift.own_sd.map(|sd| Real::powi(sd, -2))));
     let mut own = Vector2::new(lines.residuals.get(0).copied().unwrap_or(0.0), 0.0);
     let weight = |error: f64| weights.weight(error);
     let own_step = |own: &Vector2<f64>| {

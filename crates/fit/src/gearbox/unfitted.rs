@@ -12,6 +12,7 @@
 use car::Car;
 use car::ErrorBudget;
 use design::ShiftTables;
+use drivetrain::Real;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::quantities::{KISS_UNIT_PA, Quantity};
@@ -84,7 +85,7 @@ impl Unfitted {
 
     fn change(&self, of: &mut Hydraulics) {
         match self.error {
-            Error::Stroke(log_factor) => of.scale_stroke(log_factor.exp()),
+            Error::Stroke(log_factor) => of.scale_stroke(Real::exp(log_factor)),
             Error::Hysteresis(more_pa) => of.hysteresis_pa += more_pa,
         }
     }
@@ -95,6 +96,6 @@ fn deviation_of_width(file_pa: f64, most_pa: f64) -> f64 {
     if most_pa <= 0.0 {
         return 0.0;
     }
-    let square = ((most_pa - file_pa).max(0.0).powi(3) + file_pa.powi(3)) / (3.0 * most_pa.max(file_pa));
+    let square = (Real::powi((most_pa - file_pa).max(0.0), 3) + Real::powi(file_pa, 3)) / (3.0 * most_pa.max(file_pa));
     square.sqrt()
 }

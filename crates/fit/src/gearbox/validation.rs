@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use car::Car;
 use design::ShiftTables;
+use drivetrain::Real;
 
 use super::command_delay::{said_of_commands, with_commands_earlier};
 use super::fitting::GearboxFit;
@@ -40,7 +41,7 @@ impl HeldOut {
         let count = self.shifts as f64 + SHIFTS_BEFORE;
         // The logarithm of the root of a mean of n squares has a deviation of 1/sqrt(2 n).
         let half = 1.96 / (2.0 * count).sqrt();
-        [-half, half].map(|side| (self.valve_error_scale * side.exp()).clamp(LEAST_SCALE, MOST_SCALE))
+        [-half, half].map(|side| (self.valve_error_scale * Real::exp(side)).clamp(LEAST_SCALE, MOST_SCALE))
     }
 
     /// What the scale of the valve errors says of itself in a file.
@@ -124,7 +125,7 @@ fn linearised((car, tables): (&Car, &ShiftTables<f64>), quantities: &Quantities,
 
 fn variance(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64
+    values.iter().map(|value| Real::powi(value - mean, 2)).sum::<f64>() / values.len() as f64
 }
 
 /// Variance that the turbine speed has by what the bounds leave open of friction and valves of both clutches.

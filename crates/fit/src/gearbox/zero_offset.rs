@@ -5,6 +5,7 @@
 
 use car::Car;
 use design::ShiftTables;
+use drivetrain::Real;
 
 use super::quantities::deviation_of;
 use super::shift_log::ShiftLog;
@@ -72,7 +73,7 @@ fn at_rest(hydraulics: &Hydraulics, commands: &Series, pressure: &Series) -> Vec
     let points = ((last_s - known_s) / STEP_S).clamp(0.0, 1e5) as usize + 2;
     let grid = Grid { begin_s: *known_s, step_s: STEP_S, points };
     let early = pressures(hydraulics, -LATER_S, commands, grid);
-    let late = pressures(&hydraulics.with_valve(SLOWER.ln(), 0.0), LATER_S, commands, grid);
+    let late = pressures(&hydraulics.with_valve(Real::ln(SLOWER), 0.0), LATER_S, commands, grid);
     let is_pressed = |i: usize| early[i].max(late[i]) > REST_PA;
     let mut pressed_s = *known_s;
     let mut at_rest = Vec::new();
@@ -104,14 +105,14 @@ fn zero_offset(shifts: &[Vec<f64>]) -> Option<Known> {
     };
     let value = median(std::mem::take(&mut middles));
     let before = sd_before_pa();
-    let sd = (FACTOR * variance.sqrt()).hypot(OFFSET_FLOOR_PA).min(before);
+    let sd = Real::hypot(FACTOR * variance.sqrt(), OFFSET_FLOOR_PA).min(before);
     // A sensor that reads more at rest is none of this pressure, or in another unit.
     (value.abs() < POSSIBLE * before).then_some(Known { value, sd, before })
 }
 
 /// Variance about a middle.
 fn spread(values: &[f64], middle: f64) -> f64 {
-    let squares: f64 = values.iter().map(|value| (value - middle).powi(2)).sum();
+    let squares: f64 = values.iter().map(|value| Real::powi(value - middle, 2)).sum();
     squares / values.len().saturating_sub(1).max(1) as f64
 }
 

@@ -1,5 +1,7 @@
 //! Whether a drive is in the gears of one shift.
 
+use drivetrain::Real;
+
 use crate::{Gearbox, Reading, Role};
 
 /// Below this output speed a ratio says nothing, rad/s.
@@ -40,8 +42,8 @@ impl GearsOfShift {
         }
         let ends = |part: f64| {
             [
-                below.map_or(0.0, |next| low * (next / low).powf(part)),
-                above.map_or(f64::INFINITY, |next| high * (next / high).powf(part)),
+                below.map_or(0.0, |next| low * Real::powf(next / low, part)),
+                above.map_or(f64::INFINITY, |next| high * Real::powf(next / high, part)),
             ]
         };
         Some(Self {

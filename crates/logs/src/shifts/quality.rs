@@ -1,5 +1,6 @@
 //! Load and quality of a shift.
 
+use drivetrain::Real;
 use drivetrain::jerk::{PeakJerk, WINDOW_S};
 
 use super::ratio::RatioWatch;
@@ -70,14 +71,14 @@ fn halves(shift: &Shift, points: &RatioWatch) -> [Option<f64>; 2] {
     let (mut variance, mut logs, mut output, mut step_s) = (f64::INFINITY, [0.0; 2], 0.0_f64, 0.0_f64);
     for ([from_s, to_s], log) in spans.into_iter().zip(&mut logs) {
         let found: Vec<(f64, f64)> =
-            points.between(from_s, to_s).map(|point| (point.time_s, point.ratio.ln())).collect();
+            points.between(from_s, to_s).map(|point| (point.time_s, Real::ln(point.ratio))).collect();
         if found.len() < POINTS {
             return [None; 2];
         }
         let number = found.len() as f64;
         let mean = found.iter().map(|(_, log)| log).sum::<f64>() / number;
         // A flare on one side is no scatter.
-        let squares = found.iter().map(|(_, log)| (log - mean).powi(2)).sum::<f64>();
+        let squares = found.iter().map(|(_, log)| Real::powi(log - mean, 2)).sum::<f64>();
         variance = variance.min(squares / (number - 1.0));
         *log = mean;
         output = points.between(from_s, to_s).map(|point| point.output_rad_s).fold(output, f64::max);
@@ -85,8 +86,8 @@ fn halves(shift: &Shift, points: &RatioWatch) -> [Option<f64>; 2] {
     }
     let scatter = variance.sqrt();
     let rate = WAY * (logs[1] - logs[0]).abs() / (end_s - begin_s);
-    let time_s = SIDES * (scatter / rate).hypot(step_s / 12.0_f64.sqrt());
-    let flare = SIDES * scatter * logs[0].max(logs[1]).exp() * output;
+    let time_s = SIDES * Real::hypot(scatter / rate, step_s / 12.0_f64.sqrt());
+    let flare = SIDES * scatter * Real::exp(logs[0].max(logs[1])) * output;
     [time_s, flare].map(|half| Some(half).filter(|half| half.is_finite()))
 }
 

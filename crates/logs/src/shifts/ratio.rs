@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use drivetrain::Real;
+
 use super::held::Held;
 use super::track::Track;
 use super::unfit::Unfit;
@@ -87,13 +89,15 @@ pub(super) struct RatioWatch {
 
 impl RatioWatch {
     pub(super) fn new(ratios: &[f64], held_s: f64) -> Self {
-        let logs: Vec<f64> = ratios.iter().map(|ratio| ratio.ln()).collect();
+        let logs: Vec<f64> = ratios.iter().map(|ratio| Real::ln(*ratio)).collect();
         let band = |i: usize| {
             let step = |j: usize| logs.get(j).map_or(f64::INFINITY, |other| (other - logs[i]).abs());
             (BAND * step(i.wrapping_sub(1)).min(step(i + 1))).min(BAND_MAX)
         };
         Self {
-            gears: (0..logs.len()).map(|i| (logs[i], [(logs[i] - band(i)).exp(), (logs[i] + band(i)).exp()])).collect(),
+            gears: (0..logs.len())
+                .map(|i| (logs[i], [Real::exp(logs[i] - band(i)), Real::exp(logs[i] + band(i))]))
+                .collect(),
             turbine: Track::new(held_s),
             outputs: VecDeque::new(),
             raw: [Point { time_s: f64::NAN, ratio: f64::NAN, output_rad_s: f64::NAN }; MEDIAN],
@@ -246,10 +250,10 @@ impl RatioWatch {
     /// Between which times the ratio went from 5 to 95 % of its way, by lines between the points.
     fn inertia(&self, before: &InGear, now: &InGear) -> [f64; 2] {
         let (from, to) = (self.gears[before.gear].0, self.gears[now.gear].0);
-        let way = |point: &Point| (point.ratio.ln() - from) / (to - from);
+        let way = |point: &Point| (Real::ln(point.ratio) - from) / (to - from);
         // Whether a ratio is further on its way than this part of it.
         let beyond = |level: f64| {
-            let ratio = (from + level * (to - from)).exp();
+            let ratio = Real::exp(from + level * (to - from));
             move |point: &Point| if to > from { point.ratio > ratio } else { point.ratio < ratio }
         };
         let points: Vec<&Point> = self.between(before.last_s - 1.0, now.last_s).collect();

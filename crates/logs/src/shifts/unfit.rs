@@ -1,5 +1,7 @@
 //! Speeds that are in none of the given gears: a unit, a ratio or a channel is wrong.
 
+use drivetrain::Real;
+
 /// Ratios that are needed to say that most of them are in no gear \[chosen\], as for those that contradict a gear signal.
 const ENOUGH: u64 = 100;
 /// Width of the classes in which ratios are counted, of their natural logarithm: 1 %.
@@ -28,7 +30,7 @@ impl Unfit {
             self.others.resize(2 * CLASSES.unsigned_abs() as usize + 1, 0);
         }
         #[expect(clippy::cast_possible_truncation, reason = "limited to the classes")]
-        let class = ((ratio.ln() / CLASS).round() as i32).clamp(-CLASSES, CLASSES) + CLASSES;
+        let class = ((Real::ln(ratio) / CLASS).round() as i32).clamp(-CLASSES, CLASSES) + CLASSES;
         self.others[class.unsigned_abs() as usize] += 1;
     }
 
@@ -40,7 +42,7 @@ impl Unfit {
             below += **count;
             2 * below > all
         });
-        (class.map_or(f64::NAN, |(class, _)| (f64::from(class) * CLASS).exp()), all)
+        (class.map_or(f64::NAN, |(class, _)| Real::exp(f64::from(class) * CLASS)), all)
     }
 
     /// Why the speeds cannot show the shifts between these gears, in a sentence with a hint.

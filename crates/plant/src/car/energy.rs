@@ -1,6 +1,6 @@
 //! Energy audit of the car.
 
-use drivetrain::Driveline;
+use drivetrain::{Driveline, Real};
 
 use super::contacts::Contacts;
 use super::model::{CarInputs, CarModel, CarState};
@@ -22,7 +22,7 @@ impl CarPowers {
         let rim = car.road.wheel_radius_m * x.wheel_rad_s;
         let spring_n_m = car.driveline.shaft_stiffness_n_m_rad * spring_twist(model, x);
         let elements = (0..=model.lock_up()).map(|element| t.elements_n_m[element] * model.slip(x, element));
-        let grade_n = car.road.mass_kg * drivetrain::road::GRAVITY_M_S2 * u.grade_rad.sin();
+        let grade_n = car.road.mass_kg * drivetrain::road::GRAVITY_M_S2 * Real::sin(u.grade_rad);
         Self {
             engine_w: t.engine_n_m * t.engine_rad_s,
             sinks: [

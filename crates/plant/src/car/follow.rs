@@ -2,6 +2,7 @@
 //! throttle or the brake.
 
 use car::SpeedTrace;
+use drivetrain::Real;
 
 use super::model::{CarModel, CarState};
 use super::run::{BRAKE_OVER_TYRES, Driver};
@@ -117,7 +118,7 @@ fn pedals(model: &CarModel, state: &CarState, gear: usize, m_s2: f64, grade_rad:
     let [engine_rad_s, turbine_rad_s, _] = model.speeds(state);
     let per_turbine = car.gearbox.gears[gear].ratio * car.driveline.final_ratio;
     let wheels_kg = car.driveline.wheel_inertia_kg_m2 / (road.wheel_radius_m * road.wheel_radius_m);
-    let climbing_n = road.mass_kg * drivetrain::road::GRAVITY_M_S2 * grade_rad.sin();
+    let climbing_n = road.mass_kg * drivetrain::road::GRAVITY_M_S2 * Real::sin(grade_rad);
     let force_n = (road.mass_kg + wheels_kg) * m_s2 + road.drag_force(state.vehicle_m_s) + climbing_n;
     let wheel_n_m = force_n * road.wheel_radius_m + road.rolling_moment(state.wheel_rad_s);
     let turbine_n_m = wheel_n_m / per_turbine;

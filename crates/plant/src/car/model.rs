@@ -2,7 +2,7 @@
 
 use car::{Car, ShiftClutch};
 use drivetrain::clutch::drag_torque;
-use drivetrain::{ColumnPlace, Driveline};
+use drivetrain::{ColumnPlace, Driveline, Real};
 use geartrain::ElementKind;
 
 use super::contacts::Contacts;
@@ -550,11 +550,11 @@ impl CarModel {
 }
 
 fn grade_m_s2(grade_rad: f64) -> f64 {
-    drivetrain::road::GRAVITY_M_S2 * grade_rad.sin()
+    drivetrain::road::GRAVITY_M_S2 * Real::sin(grade_rad)
 }
 
 fn brake(torque_n_m: f64, wheel_rad_s: f64) -> f64 {
-    if torque_n_m == 0.0 { 0.0 } else { torque_n_m * (wheel_rad_s / BRAKE_TURN_RAD_S).tanh() }
+    if torque_n_m == 0.0 { 0.0 } else { torque_n_m * Real::tanh(wheel_rad_s / BRAKE_TURN_RAD_S) }
 }
 
 /// Derivative of the brake's torque by the wheel speed, N m s/rad.
@@ -562,7 +562,7 @@ fn brake_slope(torque_n_m: f64, wheel_rad_s: f64) -> f64 {
     if torque_n_m == 0.0 {
         return 0.0;
     }
-    let share = (wheel_rad_s / BRAKE_TURN_RAD_S).tanh();
+    let share = Real::tanh(wheel_rad_s / BRAKE_TURN_RAD_S);
     torque_n_m / BRAKE_TURN_RAD_S * (1.0 - share * share)
 }
 

@@ -6,6 +6,7 @@
 use car::ErrorBudget;
 use car::{Car, Drive, Sensors};
 use design::{ShiftTables, any_shift_filter};
+use drivetrain::Real;
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
@@ -116,7 +117,7 @@ impl Coverage {
         (!of.is_empty()).then(|| Self {
             count: of.len(),
             mean: mean(|error| error.error),
-            rms: mean(|error| error.error.powi(2)).sqrt(),
+            rms: mean(|error| Real::powi(error.error, 2)).sqrt(),
             standard_deviation: mean(|error| error.standard_deviation),
             inside: mean(|error| f64::from(u8::from(error.is_inside()))),
         })
@@ -299,7 +300,7 @@ pub fn learn(
         {
             let phase = usize::from(phase == TruePhase::Inertia);
             for clutch in row.clutches.iter().filter(|clutch| !clutch.sticks) {
-                torques.squares[phase] += (clutch.torque_n_m[1] - clutch.torque_n_m[0]).powi(2);
+                torques.squares[phase] += Real::powi(clutch.torque_n_m[1] - clutch.torque_n_m[0], 2);
                 torques.rows[phase] += 1.0;
             }
         }

@@ -5,6 +5,7 @@
 
 use car::{Car, Sensors, ShiftClutch};
 use car::{ElementErrors, ErrorBudget};
+use drivetrain::Real;
 use serde::Serialize;
 
 use super::matrix::{MatrixShift, controlling_of};
@@ -138,7 +139,7 @@ impl PhaseOfShift {
     }
 
     fn deviation(&self, of: fn(&EffectInShift) -> [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|at| (self.effects.iter().map(|effect| of(effect)[at].powi(2)).sum::<f64>() / 3.0).sqrt())
+        [0, 1].map(|at| (self.effects.iter().map(|effect| Real::powi(of(effect)[at], 2)).sum::<f64>() / 3.0).sqrt())
     }
 
     /// Deviation of the torque by the filter over that by the valve model alone.
@@ -308,6 +309,6 @@ fn changed(as_it_is: &[ShiftScoreRow], rows: &[ShiftScoreRow], phase: TruePhase,
 
 /// Adds the squares of what differs, by the filter and by the valve model alone.
 fn add_squares(sums: &mut [f64; 2], [_, filter, alone]: [f64; 3], [_, other_filter, other_alone]: [f64; 3]) {
-    sums[0] += (other_filter - filter).powi(2);
-    sums[1] += (other_alone - alone).powi(2);
+    sums[0] += Real::powi(other_filter - filter, 2);
+    sums[1] += Real::powi(other_alone - alone, 2);
 }

@@ -1,6 +1,6 @@
 //! Which shifts of a drive without true values are worth a look: the first of each kind, and those with the most to see.
 
-use drivetrain::ShiftKind;
+use drivetrain::{Real, ShiftKind};
 use observer::Health;
 
 use super::drive::ScoredShift;
@@ -39,7 +39,8 @@ pub(super) fn measures(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Measu
         |ClutchRow { torque_range_n_m, .. }: ClutchRow| torque_range_n_m.map_or(f64::NAN, |[low, high]| high - low);
     let in_inertia = rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia));
     let widths = &mut in_inertia.filter(slips).map(clutch).map(width);
-    let squares = &mut rows.iter().filter(slips).map(clutch).map(|of| (of.torque_n_m[1] - of.torque_n_m[2]).powi(2));
+    let squares =
+        &mut rows.iter().filter(slips).map(clutch).map(|of| Real::powi(of.torque_n_m[1] - of.torque_n_m[2], 2));
     [remarked, mean(widths), mean(squares).sqrt()]
 }
 

@@ -3,7 +3,7 @@
 //! Every plan is a function of the run's number alone: runs can be made in any order, on any thread or machine.
 
 use config::{Plan, Sometimes, Study, Values};
-use statrs::distribution::{ContinuousCDF, Normal};
+use drivetrain::Real;
 
 /// Values of the factors in a run, in the order of the factors.
 pub fn factor_values(study: &Study, run: u64) -> Vec<f64> {
@@ -95,18 +95,34 @@ pub(crate) fn value_at(values: &Values, place: f64) -> f64 {
             list[at.min(list.len() - 1)]
         }
         Values::Uniform(low, high, _) => low + place * (high - low),
-        Values::LogUniform(low, high, _) => low * (high / low).powf(place),
+        Values::LogUniform(low, high, _) => low * Real::powf(high / low, place),
         Values::Normal(mean, deviation, _) => {
             // Cut off at three deviations.
-            let unit = Normal::standard();
-            let (low, high) = (unit.cdf(-3.0), unit.cdf(3.0));
-            mean + deviation * unit.inverse_cdf(low + place * (high - low)).clamp(-3.0, 3.0)
+            let [low, high] = [-3.0, 3.0].map(normal_cdf);
+            mean + deviation * normal_quantile(low + place * (high - low)).clamp(-3.0, 3.0)
         }
         Values::Sometimes(Sometimes { chance, otherwise, ref values }) => {
             let rest = 1.0 - chance;
             if place < rest { otherwise } else { value_at(values, ((place - rest) / chance).min(1.0)) }
         }
     }
+}
+
+/// Probability that a standard normal variable is below this.
+fn normal_cdf(x: f64) -> f64 {
+    0.5 * Real::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+/// The value that a standard normal variable is below with this probability, which is that of a value within five standard deviations:
+/// Halley's iteration from the middle, whose steps approach the value from one side.
+fn normal_quantile(probability: f64) -> f64 {
+    let mut x = 0.0;
+    for _ in 0..16 {
+        let density = Real::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
+        let step = (normal_cdf(x) - probability) / density;
+        x -= step / (1.0 + 0.5 * x * step);
+    }
+    x
 }
 
 /// Position of a value in its factor's values, from 0 to 1.
@@ -117,8 +133,8 @@ pub(crate) fn place_of(values: &Values, value: f64) -> f64 {
             (at as f64 + 0.5) / list.len() as f64
         }
         Values::Uniform(low, high, _) => (value - low) / (high - low),
-        Values::LogUniform(low, high, _) => (value / low).ln() / (high / low).ln(),
-        Values::Normal(mean, deviation, _) => Normal::standard().cdf((value - mean) / deviation),
+        Values::LogUniform(low, high, _) => Real::ln(value / low) / Real::ln(high / low),
+        Values::Normal(mean, deviation, _) => normal_cdf((value - mean) / deviation),
         Values::Sometimes(sometimes) if value.total_cmp(&sometimes.otherwise).is_eq() => 0.5 * (1.0 - sometimes.chance),
         Values::Sometimes(sometimes) => sometimes.place_within(place_of(&sometimes.values, value)),
     }
@@ -190,6 +206,22 @@ mod tests {
         }
         // Five standard errors.
         assert!((mean - 0.5).abs() < 5.0 * 0.289 / 100.0 && cross.abs() < 5.0 / 12.0 / 100.0, "{mean} {cross}");
+    }
+
+    #[test]
+    fn quantiles_of_the_normal_distribution_are_those_of_its_tables() {
+        // Abramowitz and Stegun, table 26.5.
+        for (probability, x) in [(0.5, 0.0), (0.975, 1.959_963_984_540_054), (0.999, 3.090_232_306_167_813_5)] {
+            assert!(
+                (normal_quantile(probability) - x).abs() < 1e-13,
+                "{probability}: {}",
+                normal_quantile(probability)
+            );
+        }
+        for step in -50..=50 {
+            let x = f64::from(step) / 10.0;
+            assert!((normal_quantile(normal_cdf(x)) - x).abs() < 1e-9, "{x}: {}", normal_quantile(normal_cdf(x)));
+        }
     }
 
     #[test]

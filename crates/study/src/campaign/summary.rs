@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use config::{Plan, Study};
+use drivetrain::Real;
 
 use super::layout::{Layout, Metric, PHASES};
 use super::plan::{place_of, saltelli_place};
@@ -38,7 +39,7 @@ impl Distribution {
             return;
         }
         #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-        let bin = (value.max(1e-12).log2() * BINS_PER_OCTAVE).floor().clamp(-1e6, 1e6) as i32;
+        let bin = (Real::log2(value.max(1e-12)) * BINS_PER_OCTAVE).floor().clamp(-1e6, 1e6) as i32;
         *self.bins.entry(bin).or_default() += 1;
     }
 
@@ -64,7 +65,7 @@ impl Distribution {
         for (&bin, &count) in &self.bins {
             below += count;
             if as_f64(below) >= wanted {
-                return ((f64::from(bin) + 0.5) / BINS_PER_OCTAVE).exp2().min(self.largest);
+                return Real::exp2((f64::from(bin) + 0.5) / BINS_PER_OCTAVE).min(self.largest);
             }
         }
         if self.count > 0 { f64::INFINITY } else { f64::NAN }
@@ -83,7 +84,7 @@ pub(crate) fn over(error: f64, other: f64) -> f64 {
 }
 
 fn upper_edge(bin: i32) -> f64 {
-    ((f64::from(bin) + 1.0) / BINS_PER_OCTAVE).exp2()
+    Real::exp2((f64::from(bin) + 1.0) / BINS_PER_OCTAVE)
 }
 
 /// Sums from which a mean and a variance follow.
@@ -331,8 +332,8 @@ impl Summary {
                 effects.samples.push(f[0]);
                 effects.samples.push(f[1]);
                 for i in 0..factors {
-                    effects.first[i] += 0.5 * (f[1] - f[2 + i]).powi(2);
-                    effects.total[i] += 0.5 * (f[0] - f[2 + i]).powi(2);
+                    effects.first[i] += 0.5 * Real::powi(f[1] - f[2 + i], 2);
+                    effects.total[i] += 0.5 * Real::powi(f[0] - f[2 + i], 2);
                 }
             }
         }
@@ -374,7 +375,7 @@ impl Effects {
         if self.all.count <= count || self.all.squares <= 0.0 {
             return f64::NAN;
         }
-        let between: f64 = bins.clone().map(|bin| bin.count * (bin.mean - self.all.mean).powi(2)).sum();
+        let between: f64 = bins.clone().map(|bin| bin.count * Real::powi(bin.mean - self.all.mean, 2)).sum();
         let within = bins.map(|bin| bin.squares).sum::<f64>() / (self.all.count - count);
         (between - (count - 1.0) * within) / self.all.squares
     }

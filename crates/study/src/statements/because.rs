@@ -2,7 +2,7 @@
 
 use car::{Experiment, Vehicle};
 use config::ExperimentFile;
-use drivetrain::{ClutchValve, Table1, Valve, ValveMaps};
+use drivetrain::{ClutchValve, Real, Table1, Valve, ValveMaps};
 use trace::units::mpa;
 
 use super::Statement;
@@ -124,7 +124,7 @@ fn visibility(vehicle: &Vehicle) -> f64 {
     let model = design::rigid_model(vehicle);
     let size = |phase| {
         let [turbine, slip] = model.influence(phase, vehicle.settings.uncertainty.friction.0);
-        turbine.hypot(slip)
+        Real::hypot(turbine, slip)
     };
     size(I) / size(T)
 }

@@ -8,6 +8,7 @@
 use car::Vehicle;
 use design::compliant::{PRESSURE_UNIT_PA, SHAFT_UNIT_N_M, compliant_requirement, design_compliant_phase};
 use design::{Certificate, CompliantCertificate, error_bound};
+use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::Phase;
 use serde::Serialize;
@@ -86,7 +87,7 @@ impl Errors {
             let pressure_pa = (run.truth_pa[i] - estimate.pressure_pa).abs();
             let started_s = *start_s.get_or_insert_with(|| {
                 let shaft_n_m = estimate.shaft_torque_n_m.map_or(0.0, |torque| shaft[at] - torque);
-                errors.initial_pa = pressure_pa.hypot(shaft_n_m * PRESSURE_UNIT_PA / SHAFT_UNIT_N_M);
+                errors.initial_pa = Real::hypot(pressure_pa, shaft_n_m * PRESSURE_UNIT_PA / SHAFT_UNIT_N_M);
                 time_s
             });
             errors.since_s.push(time_s - started_s);

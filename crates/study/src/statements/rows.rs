@@ -2,6 +2,7 @@
 
 use car::Vehicle;
 use design::RigidDesign;
+use drivetrain::Real;
 use observer::Phase;
 use trace::signal;
 
@@ -238,7 +239,7 @@ pub(super) fn least_multipliers(rigid: &RigidDesign, period_s: f64) -> (f64, f64
         certificate.vertices.iter().map(|margin| (margin.vertex.a22_per_s, margin.decay_per_s))
     });
     vertices.fold((f64::INFINITY, f64::INFINITY), |(euler, exact), (a22, decay)| {
-        let phi = (a22 * period_s).exp();
+        let phi = Real::exp(a22 * period_s);
         let psi = (phi - 1.0) / a22;
         // The decay is that of A22 - L G, so L G = decay + A22.
         (euler.min(1.0 - period_s * decay), exact.min(phi - (decay + a22) * psi))

@@ -2,6 +2,7 @@
 //!
 //! The defaults are those of `vehicles/eight_speed.toml`. A file with `engine.max_torque_n_m` has them scaled to its numbers.
 
+use drivetrain::Real;
 use std::ops::Range;
 
 use ::car::CarSize;
@@ -142,7 +143,7 @@ pub(in super::super) fn car_defaults_taken(
 /// The file is no TOML.
 pub fn sized_gearbox(gearbox: &Source, engine_torque_n_m: f64) -> Result<String, ConfigError> {
     let torque = engine_torque_n_m / ENGINE_TORQUE_N_M;
-    let length = torque.cbrt();
+    let length = Real::cbrt(torque);
     let text = scaled(gearbox, |key| match key.rsplit_once('.') {
         Some((table, "turbine_max_n_m")) if table.starts_with("gear.") => Some(torque),
         Some((table, "inertia_kg_m2")) if table.starts_with("shaft.") => Some(torque),

@@ -15,6 +15,7 @@ use ::car::one_shift::{
     PLATE_RADII_M, RATIO_BEFORE, SHAFT_TORQUE_N_M, TORQUE_SHARES,
 };
 use ::car::template::{MASS_KG, WHEEL_RADIUS_M};
+use drivetrain::Real;
 use drivetrain::cylinder::{CAPACITY_M3_PA, FLOW_MAX_M3_S, LEAK_M3_S_PA, PASSAGE};
 use toml::de::DeValue;
 
@@ -191,11 +192,11 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
 /// Plates, piston, spring and fill of both clutches, which carry torques over those of the car that is scaled.
 fn clutch_fields(carried: [f64; 2]) -> [(&'static str, String); 8] {
     // A clutch that is larger in all directions has a torque by the third power of its length.
-    let length = carried.map(f64::cbrt);
+    let length = carried.map(Real::cbrt);
     let plates = |i: usize| toml_number(length[i] * PLATE_RADII_M[i]);
-    let area = |i: usize| length[i].powi(2) * PISTON_AREAS_M2[i];
+    let area = |i: usize| Real::powi(length[i], 2) * PISTON_AREAS_M2[i];
     let spring = |i: usize| toml_number(KISS_PA * area(i));
-    let fill = |i: usize| fill_text(length[i].powi(2));
+    let fill = |i: usize| fill_text(Real::powi(length[i], 2));
     [
         ("plates_a", plates(0)),
         ("plates_b", plates(1)),

@@ -1,5 +1,7 @@
 //! A gear train with two given ratios: one planetary set for each clutch.
 
+use drivetrain::Real;
+
 /// A clutch of the train, and what it needs.
 pub(super) struct Element {
     /// Its set and the shaft that it brakes; nothing for a ratio of 1.
@@ -40,7 +42,7 @@ fn element(ratio: f64, shaft: &str, torque: f64) -> Result<Element, String> {
     };
     let (sun_teeth, ring_teeth) =
         numbers_of_teeth(teeth).ok_or_else(|| format!("no planetary set has the ratio {ratio}"))?;
-    let inertia = (torque * BRAKED_KG_M2 * (ratio - 1.0).powi(2)).max(INERTIA_MIN_KG_M2);
+    let inertia = (torque * BRAKED_KG_M2 * Real::powi(ratio - 1.0, 2)).max(INERTIA_MIN_KG_M2);
     let text = format!(
         "[[gear_train.shaft]]\nname = \"{shaft}\"\ninertia_kg_m2 = {inertia:.5}\n\n\
          [[gear_train.planetary_set]]\nsun = \"{sun}\"\nring = \"{ring}\"\ncarrier = \"{carrier}\"\n\
@@ -56,7 +58,7 @@ fn numbers_of_teeth(quotient: f64) -> Option<(u32, u32)> {
         let exact = f64::from(sun) / quotient;
         let ring = exact.round().max(f64::from(sun) + 1.0);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to 500")]
-        (ring <= RING_MAX).then(|| (sun, ring as u32, (ring / exact).ln().abs()))
+        (ring <= RING_MAX).then(|| (sun, ring as u32, Real::ln(ring / exact).abs()))
     };
     let best = SUNS.filter_map(ring).min_by(|one, other| one.2.total_cmp(&other.2))?;
     (best.2 < 5e-3).then_some((best.0, best.1))

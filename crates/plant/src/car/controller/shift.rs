@@ -1,6 +1,6 @@
 //! One shift: its stages and the pressures of both clutches.
 
-use drivetrain::PhaseOrder;
+use drivetrain::{PhaseOrder, Real};
 
 use super::pressure::Controlled;
 use super::track::Track;
@@ -348,7 +348,7 @@ impl ActiveShift {
             return [offgoing_pa, self.waiting_pa(c, now)];
         }
         // Gently: a command that falls arrives later than the one that rises before it.
-        let filled = (std::f64::consts::FRAC_PI_2 * (share / FILLED_AT).min(1.0)).sin();
+        let filled = Real::sin(std::f64::consts::FRAC_PI_2 * (share / FILLED_AT).min(1.0));
         [offgoing_pa, filled * self.waiting_pa(c, now)]
     }
 
@@ -473,5 +473,5 @@ fn half_cosine(from: f64, to: f64, elapsed_s: f64, duration_s: f64) -> (f64, f64
     let angle = std::f64::consts::PI * share;
     let running = if share < 1.0 { 1.0 } else { 0.0 };
     let half = 0.5 * (from - to);
-    (to + half * (1.0 + angle.cos()), -half * std::f64::consts::PI / duration_s * angle.sin() * running)
+    (to + half * (1.0 + Real::cos(angle)), -half * std::f64::consts::PI / duration_s * Real::sin(angle) * running)
 }

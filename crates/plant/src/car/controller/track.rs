@@ -1,5 +1,7 @@
 //! A speed and its rate from readings.
 
+use drivetrain::Real;
+
 /// A filter of second order that follows a speed without a lag behind its rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Track {
@@ -27,7 +29,7 @@ impl Track {
             return;
         };
         // Both poles at exp(-period/time constant).
-        let pole = (-period_s / self.time_constant_s).exp();
+        let pole = Real::exp(-period_s / self.time_constant_s);
         let predicted = speed + self.rate_rad_s2 * period_s;
         let error = reading_rad_s - predicted;
         self.speed_rad_s = Some(predicted + (1.0 - pole * pole) * error);
