@@ -31,6 +31,7 @@ mod measured_pressures;
 mod other_cars;
 mod own_car;
 mod pressure_commands;
+mod same_bits;
 mod studies;
 mod support;
 mod tables;
