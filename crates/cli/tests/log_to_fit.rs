@@ -48,9 +48,9 @@ fn run_page(folder: &Folder, page: &str, heading: &str, mut after: impl FnMut(&s
 }
 
 #[test]
-fn the_commands_for_a_car_with_a_gearbox_do_what_the_guide_says() {
+fn the_commands_for_a_car_with_a_gearbox_do_what_the_tutorial_says() {
     let folder = Folder::new("gearbox-to-fit");
-    run_page(&folder, "guide.md", "## From a log to a fitted file", |command, _| {
+    run_page(&folder, "tutorial/3-your-own-log.md", "## From a log to an estimate", |command, _| {
         if command.starts_with("wetclutch init") {
             // Three minutes of town.
             let drive = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
@@ -70,7 +70,7 @@ fn the_commands_for_a_car_with_a_gearbox_do_what_the_guide_says() {
 #[test]
 fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
     let folder = Folder::new("log-to-fit");
-    run_page(&folder, "fit.md", "# Fitting a vehicle file to logs", |command, said| {
+    run_page(&folder, "how-to/fit.md", "## One shift", |command, said| {
         if command.starts_with("wetclutch init") {
             let mut car = TestCar::of(VehicleFile::read(Path::new(&folder.path("car.toml"))).unwrap(), 4);
             write_log(Path::new(&folder.path("drive.mf4")), &mut car);

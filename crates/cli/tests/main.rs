@@ -22,6 +22,7 @@ mod hostile_files;
 mod late_commands;
 mod layshaft;
 mod learnt;
+mod links;
 #[cfg(unix)]
 mod log_to_fit;
 mod logs;
