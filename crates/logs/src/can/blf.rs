@@ -38,7 +38,7 @@ pub(crate) struct Blf {
 
 /// The first bytes of an object.
 const OBJECT: &[u8] = b"LOBJ";
-/// The most bytes of padding between two objects.
+/// Maximum number of bytes of padding between two objects.
 const PADDING_MAX: usize = 8;
 
 /// The head of an object.

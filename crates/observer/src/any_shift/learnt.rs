@@ -50,8 +50,7 @@ use super::tables::MAX_ELEMENTS;
 
 /// Most pairs of gears whose inertia is learnt.
 pub const MAX_PAIRS: usize = 16;
-/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed,
-/// reported engine torque, lags, delays.
+/// Places of the quantities, in the order of the table above.
 pub(super) const KISS_AT: usize = MAX_ELEMENTS;
 pub(super) const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
 pub(super) const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;

@@ -18,8 +18,8 @@
 //! clutch that slips has the torque of its valve model, corrected by `f` and `x`; one that holds has the torque that this
 //! takes. A one-way clutch holds any torque in one direction, and none in the other. Which of them hold, the measured slip decides ([`ShiftPhase`]). The shift command may change at any time: what
 //! is known of an element that takes part in both shifts is kept, and nothing begins anew. The valve models of all
-//! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; when that is, five
-//! pistons of each element say, with the probability of it.
+//! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; the
+//! time is estimated by nine piston models for each element, each with its probability.
 //!
 //! Torque is estimated, and pressure follows: it is the valve model's, with the gain of the valve that `f` and `k` speak for.
 //!
