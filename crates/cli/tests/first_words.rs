@@ -48,12 +48,17 @@ fn an_option_without_effect_is_said() {
     for arguments in [
         &["check", &gearbox(), "--all"][..],
         &["inspect", &log, "--dbc", &dbc],
+        &["inspect", &log, "--dbc", &dbc, "--suggest"],
         &["estimate", &log, "--vehicle", VEHICLE, "--dbc", &dbc, "-o", &estimate],
     ] {
         let output = wetclutch(arguments);
         let said = stderr(&output);
         assert!(output.status.success(), "{said}");
-        assert!(said.contains("has no effect: ") && said.contains("hint: leave it out"), "{arguments:?}: {said}");
+        assert!(
+            said.matches("has no effect: ").count() == 1 && said.contains("hint: leave it out"),
+            "{arguments:?}: {said}"
+        );
+        assert!(!stdout(&output).contains("bus.dbc"), "a map without frames names no DBC");
     }
     let quiet = wetclutch(&["inspect", &log]);
     assert!(!stderr(&quiet).contains("no effect"), "{}", stderr(&quiet));

@@ -66,7 +66,7 @@ enum Source {
 }
 
 /// The warning of a DBC that is given for a log without frames.
-pub const NO_FRAMES: &str = "the DBC has no effect: there are no frames of a CAN bus in this log";
+pub const NO_FRAMES: &str = "the DBC has no effect: there are no frames of a CAN bus in this log\nhint: leave it out";
 
 /// Bytes that tell the format of a file, and the lines that tell the form of a table.
 const HEAD: usize = 64 << 10;

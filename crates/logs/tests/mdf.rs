@@ -58,7 +58,7 @@ fn frames_of_a_bus_without_a_dbc_and_a_dbc_without_frames_are_reported() {
         error.ends_with("hint: the signals of its CAN frames are known only with a DBC: give it with --dbc"),
         "{error}"
     );
-    let without_effect = "the DBC has no effect: there are no frames of a CAN bus in this log";
+    let without_effect = logs::log::NO_FRAMES;
     let has_effect = |file: &str| !read(&data(file), &dbc).unwrap().2.iter().any(|note| note == without_effect);
     assert!(has_effect("bus.mf4") && has_effect("bus.log"));
     assert!(!has_effect("plain_410.mf4") && !has_effect("zstd.parquet"));

@@ -14,7 +14,7 @@ use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
 use crate::commands::written::{is_page, replaces_only};
-use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, warn_of_mapping, write_text};
+use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -22,7 +22,6 @@ use crate::output;
 const LONGEST_NAME: usize = 40;
 
 pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
-    warn_of_mapping(&options.mapping, std::slice::from_ref(&options.log));
     let mut map = channel_map(&options.mapping)?;
     if !options.ratios.is_empty() {
         map.gearbox.ratios.clone_from(&options.ratios);
@@ -32,8 +31,12 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         return Err(nothing_in(&options.log, "channels"));
     }
     if options.suggest {
+        let has_frames = !["CSV", "Parquet"].iter().any(|format| log.format().starts_with(format));
+        if options.mapping.dbc.is_some() && !has_frames {
+            output::note(&format!("warning: {}", logs::log::NO_FRAMES));
+        }
         // The map may be put into any folder.
-        let dbc = options.mapping.dbc.as_ref();
+        let dbc = options.mapping.dbc.as_ref().filter(|_| has_frames);
         let dbc =
             dbc.map(|dbc| std::path::absolute(dbc).unwrap_or_else(|_| dbc.clone()).to_string_lossy().into_owned());
         return Ok(output::toml(logs::suggest(log.channels(), dbc.as_deref()).trim_end())?);

@@ -45,7 +45,7 @@ use std::path::{Path, PathBuf};
 
 use config::{Kind, Source};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use logs::{ChannelMap, Log, OpenOptions};
+use logs::ChannelMap;
 use serde::{Serialize, Serializer};
 use trace::{Cell, CsvWriter, ShownPath as _, Trace, WholeFile};
 
@@ -66,18 +66,6 @@ fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
 /// Warns of an option that changes nothing here, and says why.
 fn warn_without_effect(option: &str, why: &str) {
     output::note(&format!("warning: {option} has no effect: {why}\nhint: leave it out"));
-}
-
-/// Warns of files of a channel map that change nothing for these logs.
-fn warn_of_mapping(mapping: &Mapping, logs: &[PathBuf]) {
-    // A log that cannot be opened says so where it is read.
-    let has_no_frames = |log: &PathBuf| match Log::open(log, &OpenOptions::default()) {
-        Ok(log) => ["CSV", "Parquet"].iter().any(|format| log.format().starts_with(format)),
-        Err(_) => false,
-    };
-    if mapping.dbc.is_some() && !logs.is_empty() && logs.iter().all(|log| log.is_file() && has_no_frames(log)) {
-        warn_without_effect("--dbc", "a log in CSV or Parquet has no frames of a CAN bus");
-    }
 }
 
 /// `--sensors` where nothing is read by sensors.

@@ -25,7 +25,7 @@ use trace::ShownPath as _;
 
 use self::earlier::replaces_only_estimates;
 use crate::args::{Estimate, FormatChoice};
-use crate::commands::{channel_map_of_car, check_output, not_an_input, warn_of_mapping};
+use crate::commands::{channel_map_of_car, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
 use crate::signals::stop_then_end;
@@ -97,7 +97,6 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
             format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.shown());
         return Err(Failure::Input(message));
     }
-    warn_of_mapping(&options.mapping, &options.logs);
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
         any_car::check_options(options)?;
         let prepare = || any_car::CarSetup::new(options);

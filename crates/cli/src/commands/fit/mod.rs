@@ -13,7 +13,7 @@ use trace::ShownPath as _;
 use crate::args::Fit;
 use crate::commands::estimate::observer::sensors;
 use crate::commands::written::replaces_only;
-use crate::commands::{channel_map_of_car, check_output, not_an_input, shell_quoted, warn_of_mapping, write_text};
+use crate::commands::{channel_map_of_car, check_output, not_an_input, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -29,7 +29,6 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     let inputs = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]).chain(options.mapping.files());
     not_an_input(Some(&options.output), inputs)?;
     replaces_only("vehicle file", &options.output, is_vehicle_file)?;
-    warn_of_mapping(&options.mapping, &options.logs);
     let source = Source::read(&options.vehicle)?;
     if source.kind()? == Kind::Car {
         return gearbox::fit(options);
