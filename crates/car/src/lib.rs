@@ -14,6 +14,8 @@ mod capacity;
 mod car;
 #[cfg(feature = "std")]
 mod clutch;
+#[cfg(feature = "std")]
+pub mod columns;
 mod discretisation;
 #[cfg(feature = "std")]
 mod drive;

@@ -3,28 +3,18 @@
 use car::{Sensors, SpeedSensor, Vehicle};
 use drivetrain::{Real, ReducedShift};
 use observer::{
-    EngineNoise, ExtendedFilter, FilterNoise, KalmanFilter, OffgoingClutch, Readings, ReportedTorque, SpeedReading,
-    Uncertainty, UnscentedFilter, ValveModel,
+    ExtendedFilter, FilterNoise, KalmanFilter, OffgoingClutch, Readings, ReportedTorque, Uncertainty, UnscentedFilter,
+    ValveModel,
+};
+
+use observer::of_sensors::{
+    ENGINE_KG_M2, SCALE_LEAST, deviation_of, deviation_rad_s, engine_noise, lag_rad, speed_reading,
 };
 
 use crate::budget::{ValveErrors, shift_pressure, shift_time_constant};
 use crate::compliant::compliant_model;
 use crate::rigid::{input_limits, supervisor, tracker};
 
-/// Least standard deviation of a speed reading, rad/s \[chosen\].
-const READING_RAD_S: f64 = 0.02;
-/// A quantum of the error budget over the standard deviation of one reading: five deviations of the difference of two.
-const QUANTUM: f64 = 5.0 * std::f64::consts::SQRT_2;
-
-/// Inertia of the engine that the three torques below are of, kg m^2: a 2.0 L engine with 190 N m. Inertia and torque of an
-/// engine grow together, so that another engine has the same accelerations, and torques in proportion to its inertia.
-const ENGINE_KG_M2: f64 = 0.17;
-/// Torque by which the engine's may change within [`ENGINE_CHANGE_S`], N m \[chosen\].
-const ENGINE_CHANGE_N_M: f64 = 50.0;
-/// Time of a fast change of the engine's torque, s \[chosen\].
-const ENGINE_CHANGE_S: f64 = 0.05;
-/// Largest torque that accelerates the engine, N m: twice what an engine of this size gives \[chosen\].
-const ENGINE_MOST_N_M: f64 = 400.0;
 /// Error of a reported engine torque beside its share, N m \[chosen\]: accessories, and friction that the temperature changes.
 const ENGINE_BESIDE_N_M: f64 = 5.0;
 
@@ -37,16 +27,8 @@ const LOAD_IN_GEAR_S: f64 = 0.05;
 /// Time after which friction and valve gain may be others, s \[chosen\]: a few shifts of city driving.
 const CLUTCH_S: f64 = 20.0;
 
-/// The scale is known no better than this \[chosen\]: scale and delay of the wheel trade with each other while the
-/// acceleration stands. A test of the combined study holds the errors after a launch against it.
-pub(crate) const SCALE_LEAST: f64 = 3e-4;
-/// The same of a delay, s.
+/// A delay is known no better than this, s \[chosen\].
 const DELAY_LEAST_S: f64 = 1.3e-3;
-
-/// Standard deviation of an error whose bound is the edge of a uniform distribution.
-pub(crate) fn deviation_of(bound: f64) -> f64 {
-    bound / 3.0_f64.sqrt()
-}
 
 /// Half the width of a range, as the edge of a uniform distribution.
 fn deviation_within(range: [f64; 2]) -> f64 {
@@ -56,34 +38,6 @@ fn deviation_within(range: [f64; 2]) -> f64 {
 /// An error for each unit of what it is weighed at; weighed at nothing there is none.
 fn share(error: f64, weighed_at: f64) -> f64 {
     if weighed_at > 0.0 { error / weighed_at } else { 0.0 }
-}
-
-/// Angle by which a reading of a toothed wheel lags, rad: half of the teeth that it spans, and half a pitch.
-fn lag_rad(sensor: &SpeedSensor) -> f64 {
-    0.5 * (sensor.periods + 1.0) * std::f64::consts::TAU / sensor.teeth
-}
-
-/// Standard deviation of a speed reading, rad/s: that of its sensor, or of the quantum of the error budget.
-fn deviation_rad_s(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> f64 {
-    sensor.map_or(quantum_rad_s / QUANTUM, |sensor| sensor.noise_rad_s).max(READING_RAD_S)
-}
-
-pub(crate) fn speed_reading(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> SpeedReading<f64> {
-    SpeedReading {
-        deviation_rad_s: deviation_rad_s(sensor, quantum_rad_s),
-        lag_rad: sensor.map_or(0.0, lag_rad),
-        pitch_rad: sensor.map_or(0.0, |sensor| std::f64::consts::TAU / sensor.teeth),
-        delay_s: sensor.map_or(0.0, |sensor| sensor.delay_s),
-    }
-}
-
-/// How the speed of an engine changes, and is read.
-pub(crate) fn engine_noise(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> EngineNoise<f64> {
-    EngineNoise {
-        reading_rad_s: deviation_rad_s(sensor, quantum_rad_s),
-        acceleration_walk: ENGINE_CHANGE_N_M / ENGINE_KG_M2 / ENGINE_CHANGE_S.sqrt(),
-        acceleration_max_rad_s2: ENGINE_MOST_N_M / ENGINE_KG_M2,
-    }
 }
 
 /// The Kalman filter of this vehicle, for signals from these sensors; without them the readings are taken to be of the

@@ -28,7 +28,6 @@
 
 use lapack_nalgebra as _;
 
-pub mod any_shift;
 pub mod budget;
 pub mod certificate;
 pub mod compliant;
@@ -43,7 +42,6 @@ pub mod rigid;
 pub mod rivals;
 pub mod sliding;
 
-pub use any_shift::{ShiftTables, any_shift_filter, element_uncertainty};
 pub use budget::{ValveErrors, shift_time_constant};
 pub use certificate::{Certificate, VertexMargin, error_bound};
 pub use compliant::{CompliantCertificate, CompliantDesign, best_compliant, compliant_observer, design_compliant};

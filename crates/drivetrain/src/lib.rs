@@ -15,6 +15,7 @@ pub mod cylinder;
 pub mod driveline;
 pub mod engine;
 pub mod jerk;
+pub mod jerk_of_readings;
 pub mod oil;
 pub mod real;
 pub mod road;

@@ -8,6 +8,11 @@
 //! values.
 #![no_std]
 
+#[cfg(feature = "std")]
+extern crate alloc;
+#[cfg(feature = "std")]
+extern crate std;
+
 pub mod alignment;
 pub mod any_shift;
 pub mod bound;
@@ -18,6 +23,10 @@ pub mod extended;
 pub mod fill_range;
 pub mod inversion;
 pub mod kalman;
+#[cfg(feature = "std")]
+pub mod of_car;
+#[cfg(feature = "std")]
+pub mod of_sensors;
 pub mod pressure_range;
 pub mod rigid;
 pub mod rigid_model;
@@ -41,6 +50,8 @@ pub use inversion::{Inversion, InversionState};
 pub use kalman::{
     EngineNoise, KalmanFilter, KalmanState, OffgoingClutch, ReportedTorque, SpeedReading, Uncertainty, ValveModel,
 };
+#[cfg(feature = "std")]
+pub use of_car::{ShiftTables, any_shift_filter, element_uncertainty};
 pub use pressure_range::PressureRange;
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};

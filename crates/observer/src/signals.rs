@@ -289,6 +289,11 @@ pub enum ChannelHealth {
 }
 
 impl ChannelHealth {
+    /// Whether readings of the channel are not used: refused, or lost for long.
+    pub fn is_refused(self) -> bool {
+        matches!(self, Self::Refused | Self::Lost)
+    }
+
     /// A word for logs and tables.
     pub fn name(self) -> &'static str {
         match self {

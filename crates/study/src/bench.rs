@@ -9,13 +9,13 @@ use observer::{Estimate, KalmanFilter, Phase};
 use serde::Serialize;
 use trace::Trace;
 
-use crate::campaign::plan::mixed;
 use crate::campaign::summary::over;
 use crate::comparison::{measured, observers, run_observers};
 use crate::consistency::Consistency;
 use crate::observers::AnyObserver;
 use crate::sampling::sampled;
 use crate::{ObserverRun, PhaseScore, RangeScore, RunColumns, ShiftQuality, StudyError, simulate_drive};
+use evaluate::mixed;
 
 /// How one observer did in one scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -7,7 +7,6 @@
 
 pub mod any_shift;
 pub mod bench;
-pub mod came_speed;
 pub mod campaign;
 pub mod comparison;
 pub mod consistency;
@@ -20,7 +19,6 @@ pub mod log;
 pub mod observers;
 pub mod overview;
 pub mod passages;
-pub mod ratio_histogram;
 mod row_clock;
 mod row_samples;
 pub mod run;
@@ -30,11 +28,9 @@ pub mod sensitivity;
 pub mod shift_estimates;
 pub mod shift_learning;
 pub mod statements;
-pub mod swapped_speeds;
 pub mod worst_case;
 
 pub use bench::{Bench, bench};
-pub use came_speed::CameSpeed;
 pub use campaign::{Campaign, Row, Status, Summary, execute};
 pub use comparison::{Comparison, ObserverRun, StudyError, compare};
 pub use consistency::Consistency;

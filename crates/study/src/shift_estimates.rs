@@ -34,7 +34,7 @@ impl LogSample {
     pub fn new(time_s: f64, input: &Input<f64>, estimate: Estimate<f64>) -> Self {
         let Channels { engine, turbine, output, command, .. } = estimate.channels;
         let value = |reading: Option<Reading<f64>>, channel: ChannelHealth| match reading {
-            Some(reading) if !is_refused(channel) => reading.value,
+            Some(reading) if !channel.is_refused() => reading.value,
             _ => f64::NAN,
         };
         let speeds_rad_s =
@@ -53,11 +53,6 @@ impl LogSample {
     pub fn is_estimated(&self) -> bool {
         !self.estimate.pressure_pa.is_nan()
     }
-}
-
-/// Whether an observer did not use a reading that came with this.
-pub fn is_refused(channel: ChannelHealth) -> bool {
-    matches!(channel, ChannelHealth::Refused | ChannelHealth::Lost)
 }
 
 /// Stands where there is no estimate.

@@ -5,9 +5,9 @@
 
 use car::ErrorBudget;
 use car::{Car, Sensors};
-use design::{ShiftTables, any_shift_filter};
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarSample, CarShift};
 
 use crate::any_shift::recording::reported_engine_n_m;

@@ -9,7 +9,7 @@ use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
 use report::matrix_page::kind_rows;
 use study::any_shift::drive::{ScoredDrive, score_drive};
-use study::any_shift::matrix::Random;
+use study::any_shift::matrix::{Matrix, Random};
 use study::any_shift::measured::MeasuredRow;
 use study::any_shift::recording::Recording;
 use study::any_shift::tour::{LeftOut, drive_tour};
@@ -111,7 +111,7 @@ fn print(drive: &ScoredDrive, car: &Car, page: &Path) -> Result<(), Failure> {
         "RMS error of the clutch torque, relative to the open loop, and both errors in N m: filter / open loop. Of the clutch that\n\
          controls the inertia phase; in brackets where the open loop errs by less than 2 N m\n",
     )?;
-    for (left, (titles, rows)) in [(3, shift_rows(drive, car)), (2, kind_rows(&drive.matrix(car)))] {
+    for (left, (titles, rows)) in [(3, shift_rows(drive, car)), (2, kind_rows(&Matrix::of_drive(drive, car)))] {
         let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
         output::titled_lines(left, &head, &rows).iter().try_for_each(|line| output::line(line))?;
         output::line("")?;

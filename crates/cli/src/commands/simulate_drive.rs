@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use car::columns::{command_age, element_commands};
 use car::{Car, Drive, Sensors};
 use config::DriveFile;
 use drivetrain::CommandKind;
 use plant::car::{
     CarCalibration, CarError, CarModel, CarSample, ElementSample, OverSpeed, ShiftStage, simulate_car_drive,
 };
-use study::any_shift::car_log::{command_age, element_commands};
 use study::any_shift::measured::{MeasuredRow, SensedDrive, has_ages};
 use study::any_shift::recording::{input_clutch_n_m, lock_up_is_applied, reported_engine_n_m};
 use trace::units::{km_h, rpm};

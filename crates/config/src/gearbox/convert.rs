@@ -9,7 +9,6 @@ use geartrain::{
 };
 use toml::Spanned;
 
-use super::element_column;
 use super::raw::{
     RawEngagedGear, RawGearPair, RawKind, RawPack, RawPlanetarySet, RawPlanets, RawRatios, RawShares, RawShiftMass,
     RawStickDiagram,
@@ -17,6 +16,7 @@ use super::raw::{
 use crate::ConfigError;
 use crate::check::{Check, Number, Word};
 use crate::vehicle::{FRICTION_FACES, PISTON_AREAS_M2, PLATE_RADII_M, RETURN_SPRINGS_N};
+use car::columns::element_column;
 
 /// Slips of a friction element.
 const SLIPS_RAD_S: [f64; 2] = [0.0, 2e3];

@@ -26,12 +26,6 @@ pub const SHIPPED: [(&str, &str); 5] = [
     ("ravigneaux_4", include_str!("../../../../gearboxes/ravigneaux_4.toml")),
 ];
 
-/// How the names of an element's columns begin.
-pub fn element_column(element: &str) -> String {
-    let plain = |c: char| if c.is_alphanumeric() { c } else { '_' };
-    format!("element_{}", element.to_lowercase().chars().map(plain).collect::<String>())
-}
-
 /// A checked gearbox file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GearboxFile {

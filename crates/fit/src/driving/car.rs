@@ -1,8 +1,8 @@
 //! What driving in a gear needs of a car.
 
 use car::Vehicle;
-use design::ShiftTables;
 use drivetrain::{Converter, Driveline, RoadLoad, Tyre};
+use observer::ShiftTables;
 use observer::any_shift::MAX_ELEMENTS;
 
 use super::Term;

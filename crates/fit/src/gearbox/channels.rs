@@ -1,7 +1,7 @@
 //! The channels of output and engine speed against that of the turbine speed, and shifts with their readings at the right times.
 
 use car::Car;
-use design::ShiftTables;
+use observer::ShiftTables;
 
 use super::shift_log::ShiftLog;
 use crate::driving::{Driving, SkewFit};

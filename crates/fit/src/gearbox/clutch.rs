@@ -4,9 +4,9 @@
 //! oil left, and kisses earlier.
 
 use car::Car;
-use design::ShiftTables;
 use drivetrain::{Cylinder, Real};
 use nalgebra::{DMatrix, DVector};
+use observer::ShiftTables;
 use observer::any_shift::ShiftRow;
 
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};

@@ -1,8 +1,8 @@
 //! Measured pressures that contradict the commands of their valves: no valve of the file's bounds makes them.
 
 use car::Car;
-use design::ShiftTables;
 use drivetrain::Real;
+use observer::ShiftTables;
 
 use super::quantities::Quantities;
 use super::shift::ShiftModel;

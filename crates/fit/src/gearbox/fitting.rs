@@ -2,9 +2,9 @@
 
 use car::Car;
 use car::ErrorBudget;
-use design::ShiftTables;
 use drivetrain::{Real, ShiftKind};
 use nalgebra::{DMatrix, DVector};
+use observer::ShiftTables;
 
 use super::balances::Balances;
 use super::channels::ChannelFits;

@@ -2,10 +2,10 @@
 
 use car::Car;
 use car::ErrorBudget;
-use design::{ShiftTables, any_shift_filter, element_uncertainty};
 use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::any_shift::{AnyShiftFilter, ElementUncertainty};
+use observer::{ShiftTables, any_shift_filter, element_uncertainty};
 
 use super::shift_log::{ShiftLog, named_pair};
 use super::zero_offset::{sd_before_pa, zero_offsets};

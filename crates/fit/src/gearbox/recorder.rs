@@ -1,8 +1,8 @@
 //! From the steps of a log to its shifts.
 
 use car::Car;
-use design::ShiftTables;
 use observer::Reading;
+use observer::ShiftTables;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftClutch, ShiftInput};
 
 use super::shift_log::{ShiftLog, named_pair};

@@ -1,11 +1,11 @@
 //! The model of one shift while both of its clutches slip.
 
 use car::Car;
-use design::ShiftTables;
 use drivetrain::clutch::drag_torque;
 use drivetrain::{Real, ShiftKind};
 use geartrain::Change;
 use nalgebra::{DMatrix, DVector};
+use observer::ShiftTables;
 
 use super::clutch::{AtValve, ClutchModel};
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};

@@ -11,9 +11,9 @@
 
 use car::Car;
 use car::ErrorBudget;
-use design::ShiftTables;
 use drivetrain::Real;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use observer::ShiftTables;
 
 use super::quantities::{KISS_UNIT_PA, Quantity};
 use super::shift::ShiftModel;

@@ -3,8 +3,8 @@
 use std::cmp::Ordering;
 
 use car::Car;
-use design::ShiftTables;
 use drivetrain::Real;
+use observer::ShiftTables;
 
 use super::command_delay::{said_of_commands, with_commands_earlier};
 use super::fitting::GearboxFit;

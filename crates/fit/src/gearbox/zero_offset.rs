@@ -4,8 +4,8 @@
 //! readings, the offset is a quantity of the fit ([`Quantity::PressureOffset`](super::Quantity)).
 
 use car::Car;
-use design::ShiftTables;
 use drivetrain::Real;
+use observer::ShiftTables;
 
 use super::quantities::deviation_of;
 use super::shift_log::ShiftLog;

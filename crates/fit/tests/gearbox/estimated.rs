@@ -2,7 +2,7 @@
 
 use car::ErrorBudget;
 use car::{Car, Drive};
-use design::any_shift_filter;
+use observer::any_shift_filter;
 use plant::car::CarModel;
 use study::any_shift::drive::{DriveScorer, ScoredDrive};
 

@@ -10,12 +10,12 @@ use std::path::Path;
 use car::ErrorBudget;
 use car::{Car, CarErrorBounds};
 use config::{CarFile, Source};
-use design::element_uncertainty;
 use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
 use observer::any_shift::ShiftInput;
+use observer::element_uncertainty;
 
 fn fitted(drawn: &Drawn, shifts: &[ShiftLog]) -> GearboxFit {
     fit(&drawn.file, &drawn.tables(), shifts, &Driving::default(), &mut |_| ()).unwrap()

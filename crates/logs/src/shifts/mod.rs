@@ -23,7 +23,6 @@ use contradiction::SeenRatios;
 use gears::{Change, Steady};
 pub use held::Held;
 pub use inside::GearsOfShift;
-pub use quality::peak_jerk_m_s3;
 use ratio::RatioWatch;
 use track::Track;
 

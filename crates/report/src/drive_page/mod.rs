@@ -8,6 +8,7 @@ use config::Source;
 use minijinja::{Value, context};
 use observer::Health;
 use study::any_shift::drive::{ScoredDrive, ScoredShift};
+use study::any_shift::matrix::Matrix;
 use study::any_shift::worth_a_look::BY_EACH;
 use study::any_shift::{ShiftDraw, TruePhase};
 
@@ -53,7 +54,7 @@ impl DrivePage<'_> {
         let (columns, (_, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
         let rows = rows.into_iter().zip(&drive.shifts);
         let rows: Vec<Value> = rows.map(|(cells, shift)| context! { cells, linked => is_drawn(shift) }).collect();
-        let (kind_titles, kinds) = kind_rows(&drive.matrix(car));
+        let (kind_titles, kinds) = kind_rows(&Matrix::of_drive(drive, car));
         let figures = drawn.iter().map(|shift| {
             context! {
                 number => shift.number,

@@ -7,8 +7,8 @@ use std::fmt::Write;
 use car::{Car, Drive, Sensors};
 use car::{ElementErrors, ErrorBudget};
 use config::{CarStudy, CarStudyRuns, SampledErrors};
-use design::{ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_drive};
 
 use super::drive::DriveScorer;
@@ -19,7 +19,7 @@ use super::matrix::{
 use super::measured::SensedDrive;
 use super::{AnyShiftError, SAMPLE_S, ShiftDraw, SquaredErrors, score_shift};
 use crate::StudyError;
-use crate::campaign::plan::mixed;
+use evaluate::mixed;
 
 /// Names of the phases and clutches in the order of the errors.
 const PHASES: [&str; 2] = ["torque_phase", "inertia_phase"];

@@ -6,48 +6,23 @@
 //! pressures are compared where the log has them.
 
 use car::Car;
-use config::gearbox::element_column;
-use design::ShiftTables;
-use drivetrain::CommandKind;
+use car::columns::{command_age, element_commands, element_pressures, pressure_command_column};
 use observer::Reading;
-use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::ShiftTables;
+use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
 use trace::{CsvRows, TraceError, signal};
 
+pub use evaluate::LogStep;
+
 use super::gear_signal::Gears;
-use super::pressure_command::{command_for, pressure_command_column};
+use super::pressure_command::command_for;
 use crate::frozen_rows::FrozenRows;
 use crate::row_clock::{RowClock, RowTime};
 use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
 /// Names for neither a forward gear nor reverse.
 const NEUTRAL: [&str; 2] = ["N", "P"];
-
-/// The columns with the commands of the valves: element of the gearbox, and name.
-pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
-    let elements = car.gearbox.elements.iter().zip(&car.clutches).enumerate();
-    let columns = elements.filter_map(|(at, (element, clutch))| {
-        let unit = match clutch.as_ref()?.valve.command_kind() {
-            CommandKind::Current => "current_a",
-            CommandKind::DutyCycle => "duty_percent",
-        };
-        Some((at, format!("{}_{unit}", element_column(&element.name))))
-    });
-    columns.collect()
-}
-
-/// The columns with the measured pressures of the elements: element of the gearbox, and name.
-pub fn element_pressures(car: &Car) -> impl Iterator<Item = (usize, String)> + '_ {
-    let elements = car.gearbox.elements.iter().zip(&car.clutches).enumerate();
-    let pressed = elements.filter(|(_, (_, clutch))| clutch.is_some());
-    pressed.map(|(at, (element, _))| (at, format!("{}_pressure_pa", element_column(&element.name))))
-}
-
-/// The column with the age of a command or a pressure: how long before its row it was read, s.
-pub fn command_age(command: &str) -> String {
-    let name = command.rsplit_once('_').map_or(command, |(name, _)| name);
-    format!("{name}_age_s")
-}
 
 /// Places of a speed or a command in the log, and of the age of its readings.
 #[derive(Debug, Clone, Copy)]
@@ -134,59 +109,6 @@ impl Columns {
             oil: rows.find(signal::OIL_TEMPERATURE),
             pressures: pressures.collect(),
             truth: [offgoing, oncoming],
-        })
-    }
-}
-
-/// A row of a log.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LogStep {
-    /// Time, s.
-    pub time_s: f64,
-    /// What the filter is shown.
-    pub input: ShiftInput<f64>,
-    /// Throttle and brake, 0 to 1; not a number where the log has none.
-    pub pedals: [f64; 2],
-    /// Vehicle speed, m/s; by the wheels where the log has none.
-    pub vehicle_m_s: f64,
-    /// Temperature of the oil in the gearbox, degC, where there is a reading of it.
-    pub oil_degc: Option<f64>,
-    /// Engine torque as the engine's controller reports it, N m, also where the filter is not shown it.
-    pub reported_n_m: Option<Reading<f64>>,
-    /// Speed of the car, m/s, where this row has a reading of it.
-    pub speed_m_s: Option<Reading<f64>>,
-    /// Measured pressures of elements, Pa, by their places in the filter's tables.
-    pub pressures: [Option<Reading<f64>>; MAX_ELEMENTS],
-    /// Pressure, Pa, torque, N m, and slip, rad/s, of offgoing and oncoming clutch; not a number where the log has none.
-    pub truth: [[f64; 3]; 2],
-}
-
-impl LogStep {
-    /// A row with nothing beside what the filter is shown.
-    pub fn of(time_s: f64, input: ShiftInput<f64>) -> Self {
-        Self {
-            time_s,
-            input,
-            pedals: [f64::NAN; 2],
-            vehicle_m_s: f64::NAN,
-            oil_degc: None,
-            reported_n_m: None,
-            speed_m_s: None,
-            pressures: [None; MAX_ELEMENTS],
-            truth: [[f64::NAN; 3]; 2],
-        }
-    }
-
-    /// Measured pressures of the offgoing and the oncoming clutch of the shift that is under way, Pa, where this row has readings of them.
-    pub fn shift_pressures(&self, tables: &ShiftTables<f64>) -> [Option<Reading<f64>>; 2] {
-        let GearCommand { from, to } = self.input.gear;
-        let clutches = tables.tables().shift(from, to).map(|row| row.clutches);
-        [0, 1].map(|c| {
-            let of_shift = self.truth[c][0];
-            if of_shift.is_finite() {
-                return Some(Reading { value: of_shift, age_s: 0.0 });
-            }
-            *self.pressures.get(clutches?[c].element)?
         })
     }
 }

@@ -4,17 +4,17 @@
 //! too. With one the estimate is the open loop where there is no engine speed. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
 
 use car::Car;
-use config::gearbox::element_column;
-use design::ShiftTables;
+use car::columns::{element_column, element_commands, element_pressures, pressure_command_column};
 use drivetrain::CommandKind;
 use logs::{ChannelMap, Log, LogError, Mapped, OnChange, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
+use observer::ShiftTables;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
 
-use super::car_log::{LogStep, element_commands, element_pressures};
+use super::car_log::LogStep;
 use super::gear_signal::Gears;
-use super::pressure_command::{command_for, pressure_command_column};
+use super::pressure_command::command_for;
 
 /// The newest reading of each entry of a map since the step before.
 #[derive(Debug, Clone)]

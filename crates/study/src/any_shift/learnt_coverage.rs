@@ -5,15 +5,17 @@
 
 use car::ErrorBudget;
 use car::{Car, Drive, Sensors};
-use design::{ShiftTables, any_shift_filter};
 use drivetrain::Real;
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 
 use super::matrix::Random;
 use super::recording::{Recording, reported_engine_n_m};
-use super::{AnyShiftError, RECORD_S, ShiftDraw, TruePhase, row};
+use evaluate::score::row;
+
+use super::{AnyShiftError, RECORD_S, ShiftDraw, TruePhase};
 
 /// Standard deviations of a normal distribution within which 95 % lie.
 const OF_95_PERCENT: f64 = 1.96;

@@ -2,8 +2,8 @@
 
 use car::ErrorBudget;
 use car::{Car, Sensors};
-use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::ShiftInput;
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarSample, CarShift};
 
 use super::matrix::{MatrixShift, neighbouring_shifts};

@@ -4,17 +4,11 @@
 //! this pressure. Where the map of the controller is another one, the difference is an error of the valve's gain.
 
 use car::Car;
-use config::gearbox::element_column;
 use drivetrain::ClutchValve;
 
 /// Line pressures up to which a command means the line pressure: a clutch that holds is often commanded more. Beyond it is no pressure of
 /// this car.
 const MOST_LINE_PRESSURES: f64 = 3.0;
-
-/// The column with the commanded pressure of an element, Pa.
-pub fn pressure_command_column(element: &str) -> String {
-    format!("{}_pressure_command_pa", element_column(element))
-}
 
 /// Share of the line pressure below zero down to which a commanded pressure is none; below it is a wrong sign or offset.
 const LEAST_LINE_PRESSURES: f64 = -0.05;

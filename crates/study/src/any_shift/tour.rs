@@ -2,7 +2,7 @@
 
 use car::Car;
 use car::ErrorBudget;
-use design::ShiftTables;
+use observer::ShiftTables;
 use plant::car::{CarCalibration, CarError, CarModel, CarRun, CarSample, CarShift, Driver, idle_throttle};
 
 use super::{AnyShiftError, RECORD_S};

@@ -4,6 +4,7 @@
 
 use config::{Plan, Sometimes, Study, Values};
 use drivetrain::Real;
+use evaluate::mixed;
 
 /// Values of the factors in a run, in the order of the factors.
 pub fn factor_values(study: &Study, run: u64) -> Vec<f64> {
@@ -143,15 +144,6 @@ pub(crate) fn place_of(values: &Values, value: f64) -> f64 {
 /// A number from 0 to 1 that belongs to a run and a factor.
 fn unit(seed: u64, run: u64, factor: u64) -> f64 {
     as_f64(mixed(mixed(seed, factor + 1), run) >> 11) / as_f64(1 << 53)
-}
-
-/// A number that belongs to two others: the mixing function of G. Steele, D. Lea, C. Flood, Fast splittable
-/// pseudorandom number generators, OOPSLA 2014.
-pub(crate) fn mixed(seed: u64, of: u64) -> u64 {
-    let z = seed.wrapping_add(of.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// Where `at` goes in a permutation of `count` numbers that belongs to the seed: a Feistel network over the next

@@ -3,10 +3,10 @@
 
 use car::Car;
 use car::ErrorBudget;
-use design::{ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use observer::{ChannelHealth, Health, Reading};
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 use study::any_shift::{
     RECORD_S, ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase, inputs, score_samples, simulated,

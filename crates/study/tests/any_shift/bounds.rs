@@ -2,9 +2,9 @@
 
 use car::ErrorBudget;
 use car::{Car, CarErrorBounds, CurrentSensor, ElementErrorBounds, Sensors};
-use design::{ShiftTables, any_shift_filter};
 use drivetrain::{ClutchValve, Table1, ValveMaps};
 use observer::Health;
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 use study::any_shift::{RECORD_S, ShiftDraw, ShiftScoreRow, inputs, score_samples, simulated};
 

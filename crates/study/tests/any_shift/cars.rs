@@ -3,7 +3,7 @@
 use car::ErrorBudget;
 use car::{Car, Sensors};
 use config::{CarFile, Source};
-use design::ShiftTables;
+use observer::ShiftTables;
 use std::path::Path;
 use study::any_shift::matrix::neighbouring_shifts;
 

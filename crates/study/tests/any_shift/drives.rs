@@ -3,11 +3,11 @@
 use car::Car;
 use car::ErrorBudget;
 use config::CarFile;
-use design::{ShiftTables, any_shift_filter};
 use observer::Health;
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::CarModel;
 use study::any_shift::drive::{ScoredDrive, score_drive};
-use study::any_shift::matrix::{Pooled, drawn_car};
+use study::any_shift::matrix::{Matrix, Pooled, drawn_car};
 use study::any_shift::recording::Recording;
 use study::any_shift::tour::{drive_tour, legs};
 use study::any_shift::{SAMPLE_S, TruePhase};
@@ -48,7 +48,7 @@ fn every_car_drives_through_all_its_gears_and_every_shift_is_estimated() {
         // After the first readings the filter has a gear.
         let restarts = drive.states.iter().skip(100).filter(|state| state.health == Health::Restarted).count();
         assert_eq!(restarts, 0, "{name}");
-        rows.extend(drive.matrix(&car).rows);
+        rows.extend(Matrix::of_drive(&drive, &car).rows);
     }
     let [_, [inertia, _]] = Pooled::of(&rows, |_| true).torque;
     println!("controlling clutch, inertia phase, all shifts: {:.2}", inertia.ratio().unwrap());
@@ -149,7 +149,7 @@ fn a_gear_without_a_shift_between_two_clutches_is_passed_over() {
     let gear = |name: &str| car.gearbox.gear(name).unwrap();
     let (two, three, four) = (gear("2"), gear("3"), gear("4"));
     car.gearbox.shifts.retain(|shift| ![[two, three], [three, two]].contains(&[shift.from, shift.to]));
-    let tables = design::ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
+    let tables = observer::ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
     let legs = legs(&car, &tables);
     let has = |from: usize, to: usize| legs.iter().any(|leg| (leg.from, leg.to) == (from, to));
     assert!(!has(two, three) && has(two, four), "{legs:?}");

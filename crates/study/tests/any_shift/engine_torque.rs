@@ -3,14 +3,14 @@
 use car::ErrorBudget;
 use car::{Car, Drive};
 use config::DriveFile;
-use design::{ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::Reading;
 use observer::any_shift::ShiftInput;
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 use std::path::Path;
 use study::any_shift::drive::DriveScorer;
-use study::any_shift::matrix::{MatrixRow, Pooled};
+use study::any_shift::matrix::{Matrix, MatrixRow, Pooled};
 use study::any_shift::recording::{Recording, lock_up_is_applied, reported_engine_n_m};
 use study::any_shift::{RECORD_S, SAMPLE_S, ShiftDraw};
 
@@ -65,7 +65,7 @@ fn drive(known: &Car, seed: u64) -> [Vec<MatrixRow>; ALL.len()] {
             };
             scorer.push(&recording.samples[at], &ShiftInput { engine_n_m, ..input });
         }
-        scorer.finish().matrix(&car).rows
+        Matrix::of_drive(&scorer.finish(), &car).rows
     })
 }
 

@@ -3,8 +3,8 @@
 use car::ErrorBudget;
 use car::{Car, Drive};
 use config::DriveFile;
-use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::ShiftInput;
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use std::path::Path;
 use study::any_shift::drive::DriveScorer;

@@ -3,8 +3,8 @@
 use car::ErrorBudget;
 use car::{Car, LockUp};
 use config::{DriveFile, Source};
-use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::{ShiftEstimate, ShiftInput};
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use study::any_shift::RECORD_S;
 use study::any_shift::recording::{Recording, input_clutch_n_m, reported_engine_n_m};

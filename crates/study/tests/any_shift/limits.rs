@@ -3,10 +3,10 @@
 
 use car::{Car, Sensors};
 use car::{ElementErrors, ErrorBudget};
-use design::{ShiftTables, any_shift_filter};
 use drivetrain::{ClutchValve, ShiftKind, Table1};
 use observer::Reading;
 use observer::any_shift::ShiftInput;
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarSample, CarShift};
 use study::any_shift::matrix::{
     CLASSES, ErrorsByPhase, MatrixCounts, MatrixRow, MatrixShift, Pooled, class, counts, drawn_car, errors_by_phase,

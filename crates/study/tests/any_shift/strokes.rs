@@ -2,8 +2,8 @@
 
 use car::ErrorBudget;
 use car::{Car, ShiftClutch};
-use design::ShiftTables;
 use drivetrain::ShiftKind;
+use observer::ShiftTables;
 use observer::any_shift::{AnyShiftFilter, FrictionElement, GearboxTables, Learnt};
 use plant::car::CarShift;
 use study::any_shift::matrix::{MatrixShift, drawn_car, neighbouring_shifts};

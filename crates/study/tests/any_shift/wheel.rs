@@ -2,13 +2,13 @@
 
 use car::ErrorBudget;
 use car::{Car, Sensors};
-use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
 use observer::{ChannelHealth, Reading};
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarModel, CarShift};
 use study::any_shift::drive::DriveScorer;
 use study::any_shift::matrix::{
-    ErrorsByPhase, MatrixCounts, MatrixRow, Pooled, counts, drawn_car, errors_by_phase, neighbouring_shifts,
+    ErrorsByPhase, Matrix, MatrixCounts, MatrixRow, Pooled, counts, drawn_car, errors_by_phase, neighbouring_shifts,
 };
 use study::any_shift::recording::Recording;
 use study::any_shift::tour::drive_tour;
@@ -113,7 +113,7 @@ fn driven(known: &Car, seed: u64) -> Vec<Vec<MatrixRow>> {
             wheel.tell(&mut input);
             scorer.push(sample, &input);
         }
-        scorer.finish().matrix(known).rows
+        Matrix::of_drive(&scorer.finish(), known).rows
     };
     ALL.into_iter().map(drive).collect()
 }

@@ -16,7 +16,6 @@ use logs::{
 use observer::{ChannelHealth, Input, Reading as Measurement};
 use study::any_shift::pressure_command::command_of_valve;
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
-use study::shift_estimates::is_refused;
 use trace::{CsvRows, Following, ShownPath as _, signal};
 
 use super::Messages;
@@ -353,7 +352,7 @@ impl<'a> Measured<'a> {
             (Role::TurbineSpeed, turbine_rad_s, channels.turbine),
             (Role::OutputSpeed, output_rad_s, channels.output),
         ] {
-            if let Some(Measurement { age_s, .. }) = reading.filter(|_| is_refused(health)) {
+            if let Some(Measurement { age_s, .. }) = reading.filter(|_| health.is_refused()) {
                 self.finder.take_back(role, self.step.time_s - age_s);
             }
         }

@@ -1,10 +1,10 @@
 //! Whether the speeds of a log are those of the vehicle file's car: ratios that a wrong scale changes.
 
 use car::Vehicle;
+use evaluate::checks::CameSpeed;
+use evaluate::checks::ratio_histogram::RatioHistogram;
+use evaluate::checks::swapped_speeds::SwappedSpeeds;
 use observer::{Input, Reading};
-use study::CameSpeed;
-use study::ratio_histogram::RatioHistogram;
-use study::swapped_speeds::SwappedSpeeds;
 
 use crate::failure::Failure;
 

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use car::Car;
 use config::CarFile;
-use design::ShiftTables;
 use fit::gearbox::{HeldOut, Recorded, Recorder, ShiftLog};
 use fit::{FitError, ReadingAges};
 use indicatif::ProgressBar;
 use logs::ChannelMap;
+use observer::ShiftTables;
 use study::any_shift::logged::LoggedDrive;
 use trace::ShownPath as _;
 

@@ -3,16 +3,17 @@
 use std::path::Path;
 
 use car::Car;
-use design::ShiftTables;
+use car::columns::{element_commands, element_pressures, pressure_command_column};
 use drivetrain::{ClutchValve, CommandKind};
+use evaluate::checks::Unusable;
 use logs::Role;
 use logs::plausibility::Seen;
+use observer::ShiftTables;
 use observer::any_shift::GearCommand;
 use observer::{Health, Reading};
 use report::tables::health_meaning;
-use study::any_shift::car_log::{CarLog, LogStep, element_commands, element_pressures};
-use study::any_shift::logged::Unusable;
-use study::any_shift::pressure_command::pressure_command_column;
+use study::any_shift::car_log::{CarLog, LogStep};
+
 use study::log::FIRST_LOOK;
 use trace::{ShownPath as _, signal};
 

@@ -1,7 +1,7 @@
 //! The columns of an estimate of a car with any gearbox.
 
 use car::Car;
-use config::gearbox::element_column;
+use car::columns::element_column;
 use observer::any_shift::{MAX_ELEMENTS, ONE_WAY, ShiftEstimate};
 use observer::{ChannelHealth, Channels};
 use study::any_shift::channels::gear_number;

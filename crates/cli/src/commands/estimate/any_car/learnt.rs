@@ -5,7 +5,7 @@ use std::path::Path;
 
 use car::Car;
 use config::{ConfigError, Source, read_learnt, write_learnt};
-use design::ShiftTables;
+use observer::ShiftTables;
 use observer::any_shift::{Learnt, LearntElement};
 use study::any_shift::logged::LoggedDrive;
 use trace::{ShownPath as _, WholeFile};

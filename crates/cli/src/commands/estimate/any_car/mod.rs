@@ -12,8 +12,8 @@ use std::sync::atomic::AtomicBool;
 
 use car::{Car, Sensors};
 use config::CarFile;
-use design::ShiftTables;
 use logs::ChannelMap;
+use observer::ShiftTables;
 use report::drive_page::{DrivePage, MOST_DRAWN, findings, shift_cells, shift_rows, shift_words};
 use study::any_shift::drive::ScoredDrive;
 use study::any_shift::logged::LoggedDrive;

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use car::Car;
-use design::ShiftTables;
 use logs::{ChannelMap, Log, LogError, OnChange, Role};
+use observer::ShiftTables;
 use observer::any_shift::MAX_ELEMENTS;
 use study::any_shift::car_log::{CarLog, LogStep};
 use study::any_shift::channels::{CarChannels, own_map};

@@ -1,14 +1,14 @@
 //! A simulated drive as the filter sees it: speeds through toothed wheels, the commands of the valves, the gear.
 
 use car::{Car, Sensors};
-use design::ShiftTables;
 use drivetrain::Real;
 use observer::Reading;
+use observer::ShiftTables;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::{CarSample, NO_GEAR};
 use plant::sensors::{Channel, Readings, Rows, read_speed};
 
-use super::{RECORD_S, SAMPLE_S};
+use crate::{RECORD_S, SAMPLE_S};
 
 /// Cars and the filter have the same place for neutral.
 const _: () = assert!(NO_GEAR == GearCommand::NEUTRAL);
@@ -27,7 +27,7 @@ pub struct Recording {
 }
 
 /// Records between two samples of the filter.
-pub(super) fn records_in_a_sample() -> usize {
+pub(crate) fn records_in_a_sample() -> usize {
     (SAMPLE_S / RECORD_S).round().max(1.0).whole()
 }
 
@@ -80,7 +80,7 @@ impl Recording {
 
 /// What the filter is shown of a sample: the readings of engine, turbine, output and wheel speed, the commands of the elements, and what
 /// the controller and the engine say.
-pub(super) fn input(
+pub(crate) fn input(
     car: &Car,
     tables: &ShiftTables<f64>,
     sample: &CarSample,

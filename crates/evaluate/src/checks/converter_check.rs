@@ -6,8 +6,8 @@
 use car::Car;
 use car::ErrorBudget;
 
-use super::car_log::LogStep;
-use crate::ratio_histogram::RatioHistogram;
+use crate::LogStep;
+use crate::checks::ratio_histogram::RatioHistogram;
 
 /// Engine speed counts as steady if it has changed by no more than so much, rad/s, in so long, s \[chosen\]: the engine's inertia takes some 3 N m.
 const STEADY_RAD_S: f64 = 10.0;
@@ -22,7 +22,7 @@ const MORE: f64 = 0.05;
 
 /// Reported over pump torque, so far.
 #[derive(Default)]
-pub(super) struct ConverterCheck {
+pub(crate) struct ConverterCheck {
     ratio: RatioHistogram<100>,
     rows: (u64, f64),
     /// An engine speed, rad/s, and when it was read, s.
@@ -33,7 +33,7 @@ pub(super) struct ConverterCheck {
 
 impl ConverterCheck {
     /// Takes a row with the newest speeds of engine and turbine, rad/s.
-    pub(super) fn push(&mut self, car: &Car, step: &LogStep, [engine, turbine]: [f64; 2]) {
+    pub(crate) fn push(&mut self, car: &Car, step: &LogStep, [engine, turbine]: [f64; 2]) {
         if let Some(reported) = step.reported_n_m {
             self.reported_n_m = Some(reported.value);
         }
@@ -57,7 +57,7 @@ impl ConverterCheck {
     }
 
     /// What contradicts the vehicle file, in a sentence.
-    pub(super) fn warning(&self, car: &Car) -> Option<String> {
+    pub(crate) fn warning(&self, car: &Car) -> Option<String> {
         let (rows, time_s) = self.rows;
         let errors = ErrorBudget::of_logged_car(car);
         let ratio = self.ratio.middle();
@@ -76,7 +76,7 @@ impl ConverterCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::any_shift::{SAMPLE_S, car_log::LogStep};
+    use crate::{LogStep, SAMPLE_S};
     use config::CarFile;
     use observer::Reading;
     use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};

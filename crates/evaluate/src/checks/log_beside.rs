@@ -3,14 +3,15 @@
 use std::collections::VecDeque;
 
 use car::Car;
-use design::ShiftTables;
 use drivetrain::ShiftKind;
+use observer::ShiftTables;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS};
 use plant::car::CarShiftQuality;
 
-use super::car_log::LogStep;
-use super::drive::{NO_ELEMENT, ScoredShift};
-use super::{ROUNDING_PA, ShiftScoreRow, within};
+use crate::LogStep;
+use crate::drive::{NO_ELEMENT, ScoredShift};
+use crate::score::within;
+use crate::{ROUNDING_PA, ShiftScoreRow};
 
 /// Measured pressures are compared up to this age, s.
 const OLDEST_S: f64 = 0.25;
@@ -24,14 +25,14 @@ const DOUBTED: f64 = 0.1;
 
 /// Measured pressures at the time of a row: a reading is older, and is carried on by what the models of the valves change since.
 #[derive(Debug, Clone, Default)]
-pub(super) struct CarriedPressures {
+pub(crate) struct CarriedPressures {
     /// Times and pressures by the models of the valves, s and Pa, as far back as a reading may be.
     models: VecDeque<(f64, [f64; MAX_ELEMENTS])>,
 }
 
 impl CarriedPressures {
     /// Takes the pressures by the models of the valves after a row, Pa.
-    pub(super) fn push(&mut self, time_s: f64, valve_pa: &[f64; MAX_ELEMENTS]) {
+    pub(crate) fn push(&mut self, time_s: f64, valve_pa: &[f64; MAX_ELEMENTS]) {
         if self.models.back().is_some_and(|(last_s, _)| *last_s >= time_s) {
             self.models.clear();
         }
@@ -43,7 +44,7 @@ impl CarriedPressures {
     }
 
     /// Pressures of the offgoing and the oncoming clutch of the shift that is under way, Pa; not a number where the row brings none.
-    pub(super) fn pressures_pa(&self, step: &LogStep, tables: &ShiftTables<f64>) -> [f64; 2] {
+    pub(crate) fn pressures_pa(&self, step: &LogStep, tables: &ShiftTables<f64>) -> [f64; 2] {
         let GearCommand { from, to } = step.input.gear;
         let row = tables.tables().shift(from, to).copied();
         let readings = step.shift_pressures(tables);
@@ -73,14 +74,14 @@ impl CarriedPressures {
 
 /// How often the measured pressures of each element lie outside of their guaranteed ranges.
 #[derive(Debug, Default)]
-pub(super) struct DoubtedPressures {
+pub(crate) struct DoubtedPressures {
     /// Rows with a measured pressure, and those of them that are outside, by the place of the element among those of the gearbox.
     rows: Vec<[u64; 2]>,
 }
 
 impl DoubtedPressures {
     /// Takes a row of a shift between these elements.
-    pub(super) fn push(&mut self, elements: [usize; 2], row: &ShiftScoreRow) {
+    pub(crate) fn push(&mut self, elements: [usize; 2], row: &ShiftScoreRow) {
         for (element, clutch) in elements.into_iter().zip(row.clutches) {
             let [measured_pa, ..] = clutch.pressure_pa;
             if !measured_pa.is_finite() || clutch.torque_n_m[0].is_finite() || element == NO_ELEMENT {
@@ -95,7 +96,7 @@ impl DoubtedPressures {
 
     /// A warning that names the elements whose pressures contradict their commands.
     #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
-    pub(super) fn warning(&self, car: &Car) -> Option<String> {
+    pub(crate) fn warning(&self, car: &Car) -> Option<String> {
         let doubted = self.rows.iter().enumerate().filter_map(|(element, [all, outside])| {
             let share = *outside as f64 / *all as f64;
             let name = &car.gearbox.elements.get(element)?.name;
@@ -115,7 +116,7 @@ impl DoubtedPressures {
 
 /// The jerk of the shifts: speeds around the shift that is under way, or was the last one.
 #[derive(Debug, Default)]
-pub(super) struct ShiftJerk {
+pub(crate) struct ShiftJerk {
     /// Times, s, and speeds, m/s: of the last tenths of a second, from the request of a shift on all of them.
     speeds: VecDeque<(f64, f64)>,
     /// Whether a shift is under way or has just ended, and until when its speeds count, s.
@@ -124,7 +125,7 @@ pub(super) struct ShiftJerk {
 
 impl ShiftJerk {
     /// Takes a row.
-    pub(super) fn push(&mut self, step: &LogStep) {
+    pub(crate) fn push(&mut self, step: &LogStep) {
         if let Some(speed) = step.speed_m_s.filter(|speed| speed.value.is_finite()) {
             let time_s = step.time_s - speed.age_s;
             match self.speeds.back() {
@@ -143,7 +144,7 @@ impl ShiftJerk {
     }
 
     /// Begins a shift; the jerk of the one before, if it was still under way.
-    pub(super) fn begin(&mut self, time_s: f64) -> Option<f64> {
+    pub(crate) fn begin(&mut self, time_s: f64) -> Option<f64> {
         let before = self.until_s.filter(|until_s| until_s.is_finite()).and_then(|_| self.jerk_m_s3());
         self.speeds.retain(|(speed_s, _)| *speed_s >= time_s - AROUND_S);
         self.until_s = Some(f64::INFINITY);
@@ -151,12 +152,12 @@ impl ShiftJerk {
     }
 
     /// The shift ends at this time, s; not a number where the rest of it is not seen.
-    pub(super) fn end(&mut self, time_s: f64) {
+    pub(crate) fn end(&mut self, time_s: f64) {
         self.until_s = Some(time_s + AROUND_S).filter(|until_s| until_s.is_finite());
     }
 
     /// The jerk of the shift that has ended, m/s^3, once its speeds are all there, or at the end of the log.
-    pub(super) fn ended(&mut self, time_s: f64) -> Option<f64> {
+    pub(crate) fn ended(&mut self, time_s: f64) -> Option<f64> {
         self.until_s.filter(|until_s| until_s.is_finite() && time_s >= *until_s)?;
         self.until_s = None;
         self.jerk_m_s3()
@@ -166,7 +167,7 @@ impl ShiftJerk {
         // A car that moves has no speed that stays to the last digit.
         let first = self.speeds.front()?.1;
         let stands = self.speeds.iter().all(|(_, speed)| *speed == first);
-        if stands { None } else { logs::shifts::peak_jerk_m_s3(self.speeds.iter().copied()) }
+        if stands { None } else { drivetrain::jerk_of_readings::peak_jerk_m_s3(self.speeds.iter().copied()) }
     }
 }
 
@@ -176,7 +177,7 @@ const OTHER_SHIFT_RAD_S: f64 = 30.0;
 const LONGEST_S: f64 = 10.0;
 
 /// Whether the gear signals can be those of a shift by its length, s, and the speeds of the turbine.
-pub(super) fn is_of_its_gears(kind: Option<ShiftKind>, quality: &CarShiftQuality, length_s: f64) -> bool {
+pub(crate) fn is_of_its_gears(kind: Option<ShiftKind>, quality: &CarShiftQuality, length_s: f64) -> bool {
     let below_rad_s = match kind {
         Some(ShiftKind::PowerOnUp | ShiftKind::PowerOffUp) => quality.past_synchronous_rad_s,
         Some(ShiftKind::PowerOnDown | ShiftKind::CoastDown) => quality.flare_rad_s,
@@ -186,7 +187,7 @@ pub(super) fn is_of_its_gears(kind: Option<ShiftKind>, quality: &CarShiftQuality
 }
 
 /// A warning of shifts whose gear signals are not theirs.
-pub(super) fn not_of_their_gears(shifts: &[ScoredShift]) -> Option<String> {
+pub(crate) fn not_of_their_gears(shifts: &[ScoredShift]) -> Option<String> {
     /// Shifts that are named.
     const NAMED: usize = 10;
     let is_other = |shift: &&ScoredShift| {

@@ -1,15 +1,17 @@
 //! The filter for every shift of a gearbox: its tables from the gear train, and what it does not know from budgets.
 
-use car::{Car, ElementErrors, ErrorBudget, Sensors};
-use drivetrain::{Cylinder, Real};
-use geartrain::{Change, ElementKind, Gear, Gearbox};
-use observer::any_shift::{
+use alloc::vec::Vec;
+
+use crate::any_shift::{
     AnyShiftFilter, ElementUncertainty, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY,
     Piston, ShiftRow, ShiftUncertainty, TurbineTorque, ValveLimits,
 };
-use observer::{Budget, FillBudget, InputLimits, ValveModel};
+use crate::{Budget, FillBudget, InputLimits, ValveModel};
+use car::{Car, ElementErrors, ErrorBudget, Sensors};
+use drivetrain::{Cylinder, Real};
+use geartrain::{Change, ElementKind, Gear, Gearbox};
 
-use crate::kalman::{SCALE_LEAST, deviation_of, engine_noise, speed_reading};
+use crate::of_sensors::{SCALE_LEAST, deviation_of, engine_noise, speed_reading};
 
 /// Quantum of the speeds of engine, turbine and output where no sensor is described, rad/s: that of the built-in car's budget.
 const SPEED_QUANTUM_RAD_S: f64 = 0.7;

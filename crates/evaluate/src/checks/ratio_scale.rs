@@ -2,7 +2,7 @@
 
 use car::Car;
 
-use crate::ratio_histogram::RatioHistogram;
+use crate::checks::ratio_histogram::RatioHistogram;
 
 /// Rows that are needed to judge, and those of a gear that counts \[chosen\].
 const ENOUGH: u64 = 200;
@@ -18,7 +18,7 @@ const OFF: f64 = 0.03;
 const TURBINE_OVER_ENGINE: std::ops::Range<f64> = 0.6..1.06;
 
 /// Ratios in the gears, so far.
-pub(super) struct RatioScale {
+pub(crate) struct RatioScale {
     /// By gear, turbine speed over output speed times the ratio of the gear, and rows.
     gears: Vec<(RatioHistogram<300>, u64)>,
     /// Turbine speed over engine speed.
@@ -34,13 +34,13 @@ struct Factor {
 }
 
 impl RatioScale {
-    pub(super) fn new(car: &Car) -> Self {
+    pub(crate) fn new(car: &Car) -> Self {
         let gears = car.gearbox.gears.iter().map(|_| (RatioHistogram::default(), 0));
         Self { gears: gears.collect(), engine: RatioHistogram::default() }
     }
 
     /// Takes speeds of engine, turbine and output, rad/s, in a gear of this ratio.
-    pub(super) fn push(&mut self, gear: usize, ratio: f64, [engine, turbine, output]: [f64; 3]) {
+    pub(crate) fn push(&mut self, gear: usize, ratio: f64, [engine, turbine, output]: [f64; 3]) {
         let Some((of_gear, rows)) = self.gears.get_mut(gear) else { return };
         of_gear.push(turbine / (ratio * output));
         *rows += 1;
@@ -66,7 +66,7 @@ impl RatioScale {
 
     /// The speed whose scale is wrong, in a sentence; `over_final` is output over wheel speed over the final ratio, not a number without
     /// wheels.
-    pub(super) fn sentence(&self, car: &Car, over_final: f64) -> Option<WrongScale> {
+    pub(crate) fn sentence(&self, car: &Car, over_final: f64) -> Option<WrongScale> {
         let Factor { factor, rows, gears } = self.factor()?;
         let is_output = is_same(over_final * factor, 1.0, SAME);
         // What is seen in one gear may be another gear.

@@ -2,30 +2,30 @@
 
 use car::ErrorBudget;
 use car::{Car, Sensors};
-use design::{ShiftTables, any_shift_filter};
 use observer::any_shift::{
     AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate,
     ShiftPhase,
 };
 use observer::{Health, Reading};
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{BeyondGears, CarShiftQuality, NO_GEAR};
 
-use super::car_log::LogStep;
-use super::command_delay::CommandDelay;
-use super::contradictions::CommandCheck;
-use super::converter_check::ConverterCheck;
-use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
-use super::held_commands::HeldCommands;
-pub use super::in_gear::Unusable;
-use super::in_gear::{InGear, InGearRow};
-use super::learning_count::LearningCount;
-use super::lock_up_check::LockUpCheck;
-use super::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk, not_of_their_gears};
-pub use super::ratio_scale::WrongScale;
-use super::still_commands::StillCommands;
-use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
-use crate::CameSpeed;
-use crate::shift_estimates::is_refused;
+use crate::LogStep;
+use crate::checks::CameSpeed;
+use crate::checks::Unusable;
+use crate::checks::WrongScale;
+use crate::checks::command_delay::CommandDelay;
+use crate::checks::contradictions::CommandCheck;
+use crate::checks::converter_check::ConverterCheck;
+use crate::checks::held_commands::HeldCommands;
+use crate::checks::in_gear::{InGear, InGearRow};
+use crate::checks::lock_up_check::LockUpCheck;
+use crate::checks::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk, not_of_their_gears};
+use crate::checks::still_commands::StillCommands;
+use crate::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
+use crate::learning_count::LearningCount;
+use crate::score::within;
+use crate::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow};
 
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
@@ -163,7 +163,7 @@ impl<'c> LoggedDrive<'c> {
         for (at, (reading, health)) in readings.into_iter().zip(channels).enumerate() {
             let Some(Reading { value, .. }) = reading.filter(|reading| reading.value.is_finite()) else { continue };
             self.came[at].push(step.time_s, value);
-            if !is_refused(health) {
+            if !health.is_refused() {
                 self.speeds_rad_s[at] = value;
             }
         }

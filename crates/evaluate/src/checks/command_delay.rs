@@ -10,10 +10,10 @@
 use std::collections::VecDeque;
 
 use car::{ElementErrors, ErrorBudget};
-use design::ShiftTables;
+use observer::ShiftTables;
 use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
 
-use super::car_log::LogStep;
+use crate::LogStep;
 
 /// Time between two points of a shift, and between two moves, s.
 const GRID_S: f64 = 0.02;
@@ -94,7 +94,7 @@ struct Waiting {
 }
 
 /// The delays of a log's shifts, so far.
-pub(super) struct CommandDelay<'c> {
+pub(crate) struct CommandDelay<'c> {
     tables: &'c ShiftTables<f64>,
     /// Gains and offsets, Pa, of the pressures by the valve models that are tried.
     pressures: [(f64, f64); PRESSURES],
@@ -113,7 +113,7 @@ pub(super) struct CommandDelay<'c> {
 }
 
 impl<'c> CommandDelay<'c> {
-    pub(super) fn new(tables: &'c ShiftTables<f64>, budget: &ErrorBudget) -> Self {
+    pub(crate) fn new(tables: &'c ShiftTables<f64>, budget: &ErrorBudget) -> Self {
         let gain = budget.widest(ElementErrors::valve_gain);
         let offsets = budget.elements.iter().enumerate().filter_map(|(at, errors)| {
             let (errors, element) = (errors.as_ref()?, tables.tables().elements.get(tables.place(at)?)?);
@@ -141,12 +141,12 @@ impl<'c> CommandDelay<'c> {
     }
 
     /// Whether the shifts so far show a delay.
-    pub(super) fn is_found(&self) -> bool {
+    pub(crate) fn is_found(&self) -> bool {
         self.found.is_some()
     }
 
     /// Takes a row with the newest speeds of turbine and output, rad/s.
-    pub(super) fn push(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>, [turbine, output]: [f64; 2]) {
+    pub(crate) fn push(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>, [turbine, output]: [f64; 2]) {
         let time_s = step.time_s;
         if self.rows.back().is_some_and(|row| time_s - row.time_s < 0.9 * GRID_S) {
             return;
@@ -172,7 +172,7 @@ impl<'c> CommandDelay<'c> {
     }
 
     /// A shift between these gears is completed.
-    pub(super) fn end(&mut self, [from, to]: [usize; 2], [begin_s, end_s]: [f64; 2]) {
+    pub(crate) fn end(&mut self, [from, to]: [usize; 2], [begin_s, end_s]: [f64; 2]) {
         if end_s - begin_s <= LONGEST_S {
             self.waiting.push_back(Waiting { from, to, begin_s, end_s });
         }
@@ -266,7 +266,7 @@ impl<'c> CommandDelay<'c> {
     }
 
     /// The delay of the log, in a sentence.
-    pub(super) fn warning(&self) -> Option<String> {
+    pub(crate) fn warning(&self) -> Option<String> {
         let (delay_s, is_at_end) = self.found?;
         // It is not known to the millisecond.
         let delay_s = 0.01 * (delay_s / 0.01).round();

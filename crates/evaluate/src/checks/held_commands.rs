@@ -3,8 +3,8 @@
 //! A command then may have changed up to one message before the row that shows it first, and the guaranteed range allows for one row alone.
 
 use car::Car;
-use design::ShiftTables;
 use observer::Reading;
+use observer::ShiftTables;
 use observer::any_shift::MAX_ELEMENTS;
 
 /// Longest time between two changes that is one message, s \[chosen\]: what stands longer is a command that rests.
@@ -34,7 +34,7 @@ struct Changes {
 }
 
 /// The changes of all commands of a log.
-pub(super) struct HeldCommands {
+pub(crate) struct HeldCommands {
     of_elements: [Changes; MAX_ELEMENTS],
 }
 
@@ -54,7 +54,7 @@ impl Default for HeldCommands {
 
 impl HeldCommands {
     /// Takes the commands of a row.
-    pub(super) fn push(&mut self, time_s: f64, commands: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
+    pub(crate) fn push(&mut self, time_s: f64, commands: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
         for (changes, command) in self.of_elements.iter_mut().zip(commands) {
             if let Some(reading) = command {
                 changes.push(time_s - reading.age_s, reading.value);
@@ -63,7 +63,7 @@ impl HeldCommands {
     }
 
     /// The elements whose command is repeated, in a sentence.
-    pub(super) fn warning(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<String> {
+    pub(crate) fn warning(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<String> {
         let elements = car.gearbox.elements.iter().enumerate();
         let held = elements.filter_map(|(element, described)| {
             let period_s = self.of_elements[tables.place(element)?].period_s()?;

@@ -5,7 +5,7 @@
 
 use car::Car;
 
-use super::car_log::LogStep;
+use crate::LogStep;
 
 /// Speed ratio from which on the lock-up clutch may be closed or slip \[chosen\]: a slip-controlled one slips by some rad/s.
 const LEAST_SPEED_RATIO: f64 = 0.9;
@@ -23,7 +23,7 @@ const ENOUGH_S: f64 = 3.0;
 
 /// The time in which it was closed, so far.
 #[derive(Default)]
-pub(super) struct LockUpCheck {
+pub(crate) struct LockUpCheck {
     is_named: bool,
     reported_n_m: Option<f64>,
     /// By the reported torque, s; by the speeds alone, and since the last break.
@@ -37,7 +37,7 @@ pub(super) struct LockUpCheck {
 
 impl LockUpCheck {
     /// Takes a row with the newest speeds of engine and turbine, rad/s.
-    pub(super) fn push(&mut self, car: &Car, step: &LogStep, [engine, turbine]: [f64; 2]) {
+    pub(crate) fn push(&mut self, car: &Car, step: &LogStep, [engine, turbine]: [f64; 2]) {
         const RATE_S: f64 = 0.2;
         let Some(converter) = car.converter.as_ref() else { return };
         self.is_named |= step.input.lock_up_applied;
@@ -68,7 +68,7 @@ impl LockUpCheck {
     }
 
     /// What the log leaves out, in a sentence.
-    pub(super) fn warning(&self) -> Option<String> {
+    pub(crate) fn warning(&self) -> Option<String> {
         let closed_s = if self.reported_n_m.is_some() { self.by_torque_s } else { self.alike_s };
         let why = match self.reported_n_m {
             Some(_) => "the engine reports far more torque than the converter takes at these speeds",
@@ -87,7 +87,7 @@ impl LockUpCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::any_shift::SAMPLE_S;
+    use crate::SAMPLE_S;
     use config::CarFile;
     use observer::Reading;
     use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};

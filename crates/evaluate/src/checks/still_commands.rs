@@ -4,8 +4,8 @@
 //! commands have to move between the last reading before it and its end.
 
 use car::Car;
-use design::ShiftTables;
 use observer::Reading;
+use observer::ShiftTables;
 use observer::any_shift::MAX_ELEMENTS;
 
 /// Readings of a command in a shift that are needed to judge \[chosen\].
@@ -13,7 +13,7 @@ const ENOUGH: u32 = 3;
 
 /// Counts the shifts in which a command stands still.
 #[derive(Default)]
-pub(super) struct StillCommands {
+pub(crate) struct StillCommands {
     /// The newest command of each place in the filter's tables.
     newest: [Option<f64>; MAX_ELEMENTS],
     /// Of the shift that goes on, by place: readings, and whether one of them differs from the one before.
@@ -26,12 +26,12 @@ pub(super) struct StillCommands {
 
 impl StillCommands {
     /// A shift begins with the next row.
-    pub(super) fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         (self.readings, self.has_moved) = ([0; MAX_ELEMENTS], [false; MAX_ELEMENTS]);
     }
 
     /// Takes the commands of a row.
-    pub(super) fn push(&mut self, commands: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
+    pub(crate) fn push(&mut self, commands: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
         for (place, command) in commands.iter().enumerate() {
             let Some(Reading { value, .. }) = *command else { continue };
             self.readings[place] += 1;
@@ -42,7 +42,7 @@ impl StillCommands {
     }
 
     /// The shift between these elements, by place, is completed.
-    pub(super) fn end(&mut self, places: [usize; 2]) {
+    pub(crate) fn end(&mut self, places: [usize; 2]) {
         for place in places {
             if self.readings.get(place).is_some_and(|readings| *readings >= ENOUGH) {
                 self.shifts[place] += 1;
@@ -52,7 +52,7 @@ impl StillCommands {
     }
 
     /// The elements whose command stood still in a shift that moves them, each in a sentence.
-    pub(super) fn warnings(&self, car: &Car, tables: &ShiftTables<f64>) -> Vec<String> {
+    pub(crate) fn warnings(&self, car: &Car, tables: &ShiftTables<f64>) -> Vec<String> {
         let elements = car.gearbox.elements.iter().enumerate();
         elements
             .filter_map(|(element, described)| {

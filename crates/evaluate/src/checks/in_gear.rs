@@ -3,10 +3,10 @@
 use car::Car;
 use observer::{Health, Reading};
 
-use super::ratio_scale::{RatioScale, WrongScale};
-use crate::CameSpeed;
-use crate::ratio_histogram::RatioHistogram;
-use crate::swapped_speeds::SwappedSpeeds;
+use crate::checks::CameSpeed;
+use crate::checks::ratio_histogram::RatioHistogram;
+use crate::checks::ratio_scale::{RatioScale, WrongScale};
+use crate::checks::swapped_speeds::SwappedSpeeds;
 
 /// Speed of the output by any of the speeds from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they
 /// may differ.
@@ -27,7 +27,7 @@ pub struct Unusable {
 }
 
 /// The rows in a gear at speed.
-pub(super) struct InGear<'c> {
+pub(crate) struct InGear<'c> {
     car: &'c Car,
     /// All, and those whose speeds do not fit the ratio of the gear.
     rows: [u64; 2],
@@ -43,25 +43,25 @@ pub(super) struct InGear<'c> {
 }
 
 /// A row in a gear.
-pub(super) struct InGearRow {
+pub(crate) struct InGearRow {
     /// The gear, by its place in the gearbox.
-    pub(super) gear: usize,
+    pub(crate) gear: usize,
     /// Its time, and that since the row before, s.
-    pub(super) time_s: f64,
-    pub(super) dt_s: f64,
+    pub(crate) time_s: f64,
+    pub(crate) dt_s: f64,
     /// Newest speeds of engine, turbine and output as they came, rad/s.
-    pub(super) came_rad_s: [f64; 3],
+    pub(crate) came_rad_s: [f64; 3],
     /// Whether one of these came before, and comes no more.
-    pub(super) has_ended: bool,
+    pub(crate) has_ended: bool,
     /// Output and wheel speed of this row.
-    pub(super) output: Option<Reading<f64>>,
-    pub(super) wheel: Option<Reading<f64>>,
+    pub(crate) output: Option<Reading<f64>>,
+    pub(crate) wheel: Option<Reading<f64>>,
     /// What the filter says of the row.
-    pub(super) health: Health,
+    pub(crate) health: Health,
 }
 
 impl<'c> InGear<'c> {
-    pub(super) fn new(car: &'c Car) -> Self {
+    pub(crate) fn new(car: &'c Car) -> Self {
         Self {
             car,
             rows: [0; 2],
@@ -75,7 +75,7 @@ impl<'c> InGear<'c> {
         }
     }
 
-    pub(super) fn push(&mut self, row: &InGearRow) {
+    pub(crate) fn push(&mut self, row: &InGearRow) {
         let [engine, turbine, output] = row.came_rad_s;
         let wheel = row.wheel.filter(|reading| reading.value.is_finite());
         if let Some(Reading { value, .. }) = wheel {
@@ -116,12 +116,12 @@ impl<'c> InGear<'c> {
     }
 
     /// Rows, and those whose turbine and output speed do not fit the ratio of the gear.
-    pub(super) fn rows(&self) -> [u64; 2] {
+    pub(crate) fn rows(&self) -> [u64; 2] {
         self.rows
     }
 
     /// The rows while the car moves, if there are enough of them and the filter could use the readings of none.
-    pub(super) fn unusable(&self) -> Option<Unusable> {
+    pub(crate) fn unusable(&self) -> Option<Unusable> {
         let of = |health: &Health| self.health[*health as usize];
         let rows = self.health.iter().sum();
         let is_used = Health::ALL.iter().any(|health| is_usable(*health) && of(health) > 0);
@@ -131,12 +131,12 @@ impl<'c> InGear<'c> {
     }
 
     /// Rows while the car moves in which engine, turbine or output speed have ended.
-    pub(super) fn ended(&self) -> u64 {
+    pub(crate) fn ended(&self) -> u64 {
         self.ended
     }
 
     /// Output over wheel speed in the middle; not a number where too few rows have both.
-    pub(super) fn output_over_wheel(&self) -> f64 {
+    pub(crate) fn output_over_wheel(&self) -> f64 {
         /// Rows that are needed to judge, and their time, s \[chosen\].
         const ENOUGH: (u64, f64) = (200, 3.0);
         let (rows, time_s) = self.wheel_rows;
@@ -144,12 +144,12 @@ impl<'c> InGear<'c> {
     }
 
     /// A speed whose scale is wrong.
-    pub(super) fn wrong_scale(&self) -> Option<WrongScale> {
+    pub(crate) fn wrong_scale(&self) -> Option<WrongScale> {
         self.scale.sentence(self.car, self.output_over_wheel() / self.car.driveline.final_ratio)
     }
 
     /// What contradicts the channels of engine and turbine speed, in a sentence.
-    pub(super) fn swapped_speeds(&self) -> Option<String> {
+    pub(crate) fn swapped_speeds(&self) -> Option<String> {
         self.swapped.contradiction()
     }
 }

@@ -6,17 +6,17 @@
 use std::collections::VecDeque;
 use std::convert::Infallible;
 
+use car::columns::element_commands;
 use car::{Car, Sensors};
-use design::ShiftTables;
 use drivetrain::CommandKind;
 use observer::Reading;
+use observer::ShiftTables;
 use observer::any_shift::ShiftInput;
 use plant::car::CarSample;
 use plant::sensors::{Channel, Readings, Rows, dealt, read_current, read_speed};
 
-use super::car_log::element_commands;
-use super::recording::input;
-use crate::campaign::plan::mixed;
+use crate::mixed;
+use crate::recording::input;
 
 /// Length of a block, s.
 const BLOCK_S: f64 = 60.0;
@@ -89,7 +89,7 @@ pub struct SensedDrive<'s> {
 impl<'s> SensedDrive<'s> {
     /// For a row every `row_s` seconds.
     pub fn new(car: &Car, sensors: &'s Sensors, row_s: f64) -> Self {
-        let every = (row_s / super::RECORD_S - 1e-9).ceil().max(1.0);
+        let every = (row_s / crate::RECORD_S - 1e-9).ceil().max(1.0);
         let record_s = row_s / every;
         let recorded = |name: &str| Recorded { name: name.to_owned(), values: Vec::new() };
         let is_current = |element: usize| {
@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     fn car() -> Car {
-        let gearbox = include_str!("../../../../gearboxes/ravigneaux_4.toml");
+        let gearbox = include_str!("../../../gearboxes/ravigneaux_4.toml");
         let source = Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
         CarFile::from_sources(source, Source::built_in("g.toml", gearbox)).unwrap().car
     }

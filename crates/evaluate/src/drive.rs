@@ -2,22 +2,23 @@
 
 use car::ErrorBudget;
 use car::{Car, Sensors};
-use design::{ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
+use observer::{ShiftTables, any_shift_filter};
 use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR};
 
-use super::log_beside::is_of_its_gears;
-use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift};
-use super::recording::Recording;
-use super::shift_summary::{ShiftSummary, spans_s};
-use super::thinned::thinned;
-use super::worth_a_look::chosen;
-use super::{AnyShiftError, ShiftScoreRow, TruePhase, row};
+use crate::checks::log_beside::is_of_its_gears;
+use crate::errors::ErrorsByPhase;
+use crate::recording::Recording;
+use crate::score::row;
+use crate::shift_summary::{ShiftSummary, spans_s};
+use crate::thinned::thinned;
+use crate::worth_a_look::chosen;
+use crate::{AnyShiftError, ShiftScoreRow, TruePhase};
 
 /// The place of no element among those of the gearbox.
-pub(super) const NO_ELEMENT: usize = usize::MAX;
+pub(crate) const NO_ELEMENT: usize = usize::MAX;
 
 /// The drive at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,13 +139,13 @@ impl ScoredShift {
     }
 }
 
-/// States that a drive keeps, unless more than half of them lie around its shifts: more than an hour every [`super::SAMPLE_S`].
+/// States that a drive keeps, unless more than half of them lie around its shifts: more than an hour every [`crate::SAMPLE_S`].
 pub const MOST_STATES: u32 = 400_000;
 
 /// A drive with its shifts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScoredDrive {
-    /// Every [`super::SAMPLE_S`]; of a drive of more than [`MOST_STATES`] those that are kept: fewer where nothing happens.
+    /// Every [`crate::SAMPLE_S`]; of a drive of more than [`MOST_STATES`] those that are kept: fewer where nothing happens.
     pub states: Vec<DriveState>,
     /// Its shifts.
     pub shifts: Vec<ScoredShift>,
@@ -167,28 +168,13 @@ impl ScoredDrive {
         }
         self
     }
-
-    /// The shifts as rows of a matrix; those without a kind are left out.
-    pub fn matrix(&self, car: &Car) -> Matrix {
-        let row = |shift: &ScoredShift| {
-            let (from, to, kind) = (shift.from, shift.to, shift.kind?);
-            let [i_off, i_on] = [from, to].map(|gear| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
-            Some(MatrixRow {
-                shift: MatrixShift { from, to, kind, gain: (i_off - i_on).abs().recip() },
-                counts: shift.summary.counts,
-                errors: shift.errors()?,
-                failure: None,
-            })
-        };
-        Matrix { rows: self.shifts.iter().filter_map(row).collect(), without_tables: Vec::new(), draws: 1 }
-    }
 }
 
 /// Shifts that begin and end while a drive goes by.
 #[derive(Debug, Default)]
-pub(super) struct PassingShifts {
-    pub(super) drive: ScoredDrive,
-    pub(super) open: Option<ScoredShift>,
+pub(crate) struct PassingShifts {
+    pub(crate) drive: ScoredDrive,
+    pub(crate) open: Option<ScoredShift>,
     /// States that were left when some were left out the last time.
     left: usize,
     /// Shifts that are drawn, by their places, as far as it is decided; and how many shifts it is decided of.
@@ -201,7 +187,7 @@ pub(super) struct PassingShifts {
 
 impl PassingShifts {
     /// Takes the next state of the drive.
-    pub(super) fn state(&mut self, state: DriveState) {
+    pub(crate) fn state(&mut self, state: DriveState) {
         let states = &mut self.drive.states;
         states.push(state);
         if states.len() >= (MOST_STATES as usize).max(2 * self.left) {
@@ -214,18 +200,18 @@ impl PassingShifts {
     }
 
     /// Whether a shift ends with the first row that is in a gear or in this other shift. A change of mind begins another shift.
-    pub(super) fn ends(&self, gears: Option<[usize; 2]>) -> bool {
+    pub(crate) fn ends(&self, gears: Option<[usize; 2]>) -> bool {
         self.open.as_ref().is_some_and(|open| gears != Some([open.from, open.to]))
     }
 
     /// Gives its jerk to the shift that ended last, m/s^3, where it is known.
-    pub(super) fn take_jerk(&mut self, jerk_m_s3: Option<f64>) {
+    pub(crate) fn take_jerk(&mut self, jerk_m_s3: Option<f64>) {
         if let Some((jerk_m_s3, shift)) = jerk_m_s3.zip(self.drive.shifts.last_mut()) {
             shift.quality.jerk_m_s3 = jerk_m_s3;
         }
     }
 
-    pub(super) fn end(&mut self, mut quality: CarShiftQuality) {
+    pub(crate) fn end(&mut self, mut quality: CarShiftQuality) {
         if self.open.as_ref().is_some_and(|open| open.is_garage) {
             (quality.flare_rad_s, quality.past_synchronous_rad_s) = (f64::NAN, f64::NAN);
         }
@@ -239,8 +225,8 @@ impl PassingShifts {
     }
 
     /// Keeps what figures need of at most so many of the shifts that are wanted: those with the largest errors, of equal ones the first; where
-    /// the truth is not known, those that are worth a look ([`super::worth_a_look`]). In the end they are the same ones however often it is called.
-    pub(super) fn draw_at_most(&mut self, most: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
+    /// the truth is not known, those that are worth a look ([`crate::worth_a_look`]). In the end they are the same ones however often it is called.
+    pub(crate) fn draw_at_most(&mut self, most: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
         let shifts = &mut self.drive.shifts;
         for at in self.decided..shifts.len() {
             if is_wanted(&shifts[at]) {
@@ -269,7 +255,7 @@ impl PassingShifts {
     }
 
     /// Begins a shift. The turbine torque tells its kind.
-    pub(super) fn begin(
+    pub(crate) fn begin(
         &mut self,
         car: &Car,
         [from, to]: [usize; 2],
@@ -405,8 +391,8 @@ fn state_of(sample: &CarSample, health: Health) -> DriveState {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ClutchRow;
     use super::*;
+    use crate::ClutchRow;
 
     /// Ten rows of an inertia phase, then ten in which one clutch holds; the torque is wrong by this.
     fn rows(error_n_m: f64) -> Vec<ShiftScoreRow> {

@@ -6,7 +6,7 @@
 
 use car::Car;
 use car::ErrorBudget;
-use design::ShiftTables;
+use observer::ShiftTables;
 use observer::any_shift::MAX_ELEMENTS;
 
 /// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.
@@ -19,7 +19,7 @@ const OUTPUT_LEAST_RAD_S: f64 = 20.0;
 const ENOUGH: u64 = 100;
 
 /// What the commands of a log say of each gear.
-pub(super) struct CommandCheck<'c> {
+pub(crate) struct CommandCheck<'c> {
     car: &'c Car,
     /// Element of the gearbox and place in the filter's tables.
     places: Vec<(usize, usize)>,
@@ -40,7 +40,7 @@ struct OfGear {
 }
 
 impl<'c> CommandCheck<'c> {
-    pub(super) fn new(car: &'c Car, tables: &ShiftTables<f64>, budget: &ErrorBudget) -> Self {
+    pub(crate) fn new(car: &'c Car, tables: &ShiftTables<f64>, budget: &ErrorBudget) -> Self {
         let places = (0..car.gearbox.elements.len()).filter_map(|element| Some((element, tables.place(element)?)));
         let places: Vec<(usize, usize)> = places.collect();
         let mut limits_pa = vec![[f64::NEG_INFINITY, f64::INFINITY]; places.len()];
@@ -60,7 +60,7 @@ impl<'c> CommandCheck<'c> {
     }
 
     /// Takes a row: the gear, none while the gearbox shifts, turbine and output speed, and the pressures by the valve models.
-    pub(super) fn push(
+    pub(crate) fn push(
         &mut self,
         time_s: f64,
         gear: Option<usize>,
@@ -85,7 +85,7 @@ impl<'c> CommandCheck<'c> {
     }
 
     /// What the log shows against the channels of the commands: a sentence for each element.
-    pub(super) fn warnings(&self) -> Vec<String> {
+    pub(crate) fn warnings(&self) -> Vec<String> {
         self.places.iter().filter_map(|&(element, place)| self.warning(element, place)).collect()
     }
 

@@ -3,9 +3,9 @@
 use drivetrain::{Real, ShiftKind};
 use observer::Health;
 
-use super::drive::ScoredShift;
-use super::matrix::controlling_of;
-use super::{ClutchRow, ShiftScoreRow, TruePhase};
+use crate::drive::ScoredShift;
+use crate::errors::controlling_of;
+use crate::{ClutchRow, ShiftScoreRow, TruePhase};
 
 /// Shifts that are chosen by each of the measures: with the first of each kind they are at most 60.
 pub const BY_EACH: usize = 18;
@@ -13,11 +13,11 @@ pub const BY_EACH: usize = 18;
 /// Measures of how much there is to see in a shift: share of the samples whose health is not good, width of the torque's guaranteed range in
 /// the mean of the inertia phase, N m, and distance of the estimated torque from the valve model's in both phases, N m (RMS). The torques are
 /// those of the controlling clutch where it slips.
-pub(super) type Measures = [f64; 3];
+pub(crate) type Measures = [f64; 3];
 
 /// The measures of a shift of this kind with these rows.
 #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
-pub(super) fn measures(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Measures {
+pub(crate) fn measures(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Measures {
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, count) =
             values.filter(|value| value.is_finite()).fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
@@ -45,7 +45,7 @@ pub(super) fn measures(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Measu
 }
 
 /// Those of these shifts, by their places and in their order, that are worth a look.
-pub(super) fn chosen(shifts: &[ScoredShift], places: &[usize]) -> Vec<usize> {
+pub(crate) fn chosen(shifts: &[ScoredShift], places: &[usize]) -> Vec<usize> {
     let mut chosen: Vec<usize> = Vec::new();
     for &place in places {
         let kind = |place: usize| (shifts[place].is_garage, shifts[place].kind);

@@ -3,9 +3,9 @@
 use drivetrain::ShiftKind;
 use observer::Health;
 
-use super::matrix::{ErrorsByPhase, MatrixCounts, controlling_of, counts, errors_by_phase};
-use super::worth_a_look::{Measures, measures};
-use super::{ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase};
+use crate::errors::{ErrorsByPhase, MatrixCounts, controlling_of, counts, errors_by_phase};
+use crate::worth_a_look::{Measures, measures};
+use crate::{ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase};
 
 /// Sums and means over the rows of a shift.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -36,12 +36,12 @@ pub struct ShiftSummary {
     /// Of a gearbox by its ratios alone: mean torque of the clutches together at the turbine in the inertia phase, and of its deviation, N m.
     pub mean_at_turbine_n_m: Option<[f64; 2]>,
     /// How much there is to see in it.
-    pub(super) measures: Measures,
+    pub(crate) measures: Measures,
 }
 
 impl ShiftSummary {
     /// That of a shift of this kind with these rows.
-    pub(super) fn of(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Self {
+    pub(crate) fn of(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Self {
         let errors = kind.map(|kind| errors_by_phase(rows, kind));
         let length_s = |phase: TruePhase| {
             spans_s(rows, phase).iter().fold(0.0, |length_s, [from_s, to_s]| length_s + (to_s - from_s))
@@ -80,11 +80,12 @@ impl ShiftSummary {
 }
 
 /// Begin and end of every piece of a phase, s.
-pub(super) fn spans_s(rows: &[ShiftScoreRow], phase: TruePhase) -> Vec<[f64; 2]> {
+pub(crate) fn spans_s(rows: &[ShiftScoreRow], phase: TruePhase) -> Vec<[f64; 2]> {
     // A row lasts until the next one; the last one, and one behind which rows are missing, as long as is usual.
     const MISSING: f64 = 2.5;
-    let steps_s = rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
-    let usual_s = Some(trace::median_step_s(steps_s)).filter(|step_s| step_s.is_finite()).unwrap_or(SAMPLE_S);
+    let mut steps_s: Vec<f64> = rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
+    steps_s.sort_by(f64::total_cmp);
+    let usual_s = steps_s.get(steps_s.len() / 2).copied().filter(|step_s| step_s.is_finite()).unwrap_or(SAMPLE_S);
     let end_s = |at: usize| {
         let next = rows.get(at + 1).map(|next| next.time_s);
         next.filter(|next| *next <= rows[at].time_s + MISSING * usual_s).unwrap_or(rows[at].time_s + usual_s)
