@@ -30,6 +30,24 @@ pub enum ObserverKind {
     Inversion,
 }
 
+impl ObserverKind {
+    /// Its name on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OpenLoop => "open-loop",
+            Self::OpenLoopMaps => "open-loop-maps",
+            Self::Rigid => "rigid",
+            Self::Compliant => "compliant",
+            Self::Sliding => "sliding",
+            Self::Kalman => "kalman",
+            Self::Extended => "extended",
+            Self::Unscented => "unscented",
+            Self::SuperTwisting => "super-twisting",
+            Self::Inversion => "inversion",
+        }
+    }
+}
+
 /// How the gains of a reduced-order observer are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "kebab-case"))]
@@ -51,6 +69,17 @@ pub enum GainMethod {
 impl GainMethod {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Iss, Self::IssDiscrete, Self::PeakToPeak, Self::Scheduled, Self::Interval];
+
+    /// Its name on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Iss => "iss",
+            Self::IssDiscrete => "iss-discrete",
+            Self::PeakToPeak => "peak-to-peak",
+            Self::Scheduled => "scheduled",
+            Self::Interval => "interval",
+        }
+    }
 }
 
 /// Gains given in the file in place of designed ones.

@@ -42,7 +42,7 @@ fn main() -> ExitCode {
         Err(Failure::BrokenPipe) => ExitCode::SUCCESS,
         Err(failure) => {
             output::error(&failure.to_string());
-            failure.exit_code()
+            failure::exit_code(&failure)
         }
     }
 }

@@ -1,12 +1,11 @@
 //! Options of the commands that read measured logs, and of those that make a vehicle file.
 
-use std::fmt;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::{ArgGroup, Args, ValueEnum};
 use config::vehicle::short::ValveKind;
 use trace::TableFormat;
+use wetclutch::estimate::{GearPair, ShiftChoice};
 
 use super::{MethodChoice, ObserverChoice, Threads, within};
 
@@ -109,6 +108,15 @@ pub(crate) enum FormatChoice {
 }
 
 impl Estimate {
+    /// The shifts that are wanted.
+    pub(crate) fn shift_choice(&self) -> ShiftChoice {
+        match self.shift {
+            Some(number) => ShiftChoice::Number(number as usize),
+            None if self.shifts.is_empty() => ShiftChoice::All,
+            None => ShiftChoice::Between(self.shifts.clone()),
+        }
+    }
+
     /// How many logs are estimated at a time: with `--learnt` one begins with what the one before has left.
     pub(crate) fn logs_at_a_time(&self) -> usize {
         if self.learnt.is_some() { 1 } else { self.threads.count().min(self.logs.len()).max(1) }
@@ -138,36 +146,6 @@ impl FormatChoice {
             Self::Parquet => "parquet",
             Self::Mf4 => "mf4",
         }
-    }
-}
-
-/// The gears of a shift by their names.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct GearPair {
-    /// The gear before.
-    from: String,
-    /// The gear after.
-    to: String,
-}
-
-impl FromStr for GearPair {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        // A number is the gear with this number, also with zeros in front of it.
-        let name = |text: &str| text.parse().map_or_else(|_| text.to_owned(), |number: u32| number.to_string());
-        match text.trim().split_once('-').map(|(from, to)| [name(from), name(to)]) {
-            Some([from, to]) if from != to && [&from, &to].iter().all(|name| !["", "0"].contains(&name.as_str())) => {
-                Ok(Self { from, to })
-            }
-            _ => Err("expected two gears by their names, such as 1-2".to_owned()),
-        }
-    }
-}
-
-impl fmt::Display for GearPair {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}-{}", self.from, self.to)
     }
 }
 

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice, SAMPLE_TIME_S};
-pub(crate) use logs::{Estimate, Fit, FormatChoice, GearPair, Init, Inspect, LaunchChoice, Mapping};
+pub(crate) use logs::{Estimate, Fit, FormatChoice, Init, Inspect, LaunchChoice, Mapping};
 pub(crate) use studies::{
     Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,
     WorstCaseOptions, available_threads,

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use car::ObserverKind;
 use clap::{Args, ValueEnum};
 
 use super::PhaseChoice;
@@ -35,6 +36,25 @@ pub(crate) enum ObserverChoice {
     OpenLoop,
     /// The valve's maps alone, with the middle of the delay budget
     OpenLoopMaps,
+}
+
+impl ObserverChoice {
+    /// The kind; none for the best.
+    pub(crate) fn kind(self) -> Option<ObserverKind> {
+        Some(match self {
+            Self::Best => return None,
+            Self::Rigid => ObserverKind::Rigid,
+            Self::Compliant => ObserverKind::Compliant,
+            Self::Sliding => ObserverKind::Sliding,
+            Self::Kalman => ObserverKind::Kalman,
+            Self::Extended => ObserverKind::Extended,
+            Self::Unscented => ObserverKind::Unscented,
+            Self::SuperTwisting => ObserverKind::SuperTwisting,
+            Self::Inversion => ObserverKind::Inversion,
+            Self::OpenLoop => ObserverKind::OpenLoop,
+            Self::OpenLoopMaps => ObserverKind::OpenLoopMaps,
+        })
+    }
 }
 
 #[derive(Debug, Args)]

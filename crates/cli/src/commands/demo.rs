@@ -9,9 +9,9 @@ use report::page::findings;
 use report::tables::phase_name;
 use study::{AnyObserver, Comparison, RunColumns, compare, estimates_trace};
 use trace::{ShownPath as _, Trace, signal, units};
+use wetclutch::estimate::one_shift::observer::best;
 
 use crate::args::Demo;
-use crate::commands::estimate::{best, kind};
 use crate::commands::{writable, write_text, write_trace};
 use crate::failure::Failure;
 use crate::output;
@@ -47,8 +47,8 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
 
 /// The default output of `estimate` for measured signals with a wheel speed.
 fn default_estimate(vehicle: &Vehicle, measured: &Trace) -> Result<Trace, Failure> {
-    let (choice, method) = best(true);
-    let observer = AnyObserver::designed(vehicle, kind(choice), method.into(), measured.median_step_s(), None)?;
+    let (kind, method) = best(true);
+    let observer = AnyObserver::designed(vehicle, kind, method, measured.median_step_s(), None)?;
     let estimates = observer.run(vehicle, &RunColumns::of(measured, vehicle)?);
     Ok(estimates_trace(&measured.time_s, &estimates))
 }

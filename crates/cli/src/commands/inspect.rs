@@ -194,7 +194,7 @@ fn channels(log: &Log, inspection: &Inspection) -> Result<(), Failure> {
         let numbers = [
             cut(&channel.name),
             cut(&channel.unit),
-            output::grouped(summary.counts.total()),
+            wetclutch::grouped(summary.counts.total()),
             summary.period_s.map_or(String::new(), |period_s| short((1.0 / period_s * 100.0).round() / 100.0)),
             span(0),
             span(1),
@@ -325,7 +325,7 @@ fn notes(readings: &Readings<'_>) -> Vec<String> {
     let of = |summary: RoleSummary| {
         format!(
             "of {} samples of {} some are not used: {}",
-            output::grouped(summary.counts.total()),
+            wetclutch::grouped(summary.counts.total()),
             summary.name,
             summary.counts.faults()
         )

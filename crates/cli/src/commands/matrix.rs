@@ -53,7 +53,7 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
 
 /// The sensors of a file, or those of the built-in bench.
 pub(super) fn sensors_or_bench(path: Option<&Path>) -> Result<Sensors, Failure> {
-    path.map_or_else(bench_sensors, super::estimate::sensors)
+    path.map_or_else(bench_sensors, wetclutch::read_sensors)
 }
 
 /// The toothed wheels of the built-in bench.
@@ -81,10 +81,10 @@ fn print(result: &Matrix, car: &Car) -> Result<(), Failure> {
         counts.compared_runs,
         counts.above,
         counts.compared,
-        output::grouped(counts.outside),
-        output::grouped(counts.values),
-        output::grouped(counts.slips_said),
-        output::grouped(counts.rows),
+        wetclutch::grouped(counts.outside),
+        wetclutch::grouped(counts.values),
+        wetclutch::grouped(counts.slips_said),
+        wetclutch::grouped(counts.rows),
     ))?;
     for sentence in without_tables(result, car).into_iter().chain(failures(result, car)) {
         output::note(&format!("warning: {sentence}"));

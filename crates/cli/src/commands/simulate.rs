@@ -155,7 +155,7 @@ pub(super) fn size_note(duration_s: f64, step_s: f64, row_bytes: f64) -> Option<
         let giga = (1e-9 * bytes).round();
         format!(
             "{duration_s} s with a sample time of {step_s} s are {} rows, about {giga} GB in two files",
-            output::grouped(rows as u64)
+            wetclutch::grouped(rows as u64)
         )
     })
 }

@@ -6,9 +6,7 @@ use car::columns::{command_age, element_commands};
 use car::{Car, Drive, Sensors};
 use config::DriveFile;
 use drivetrain::CommandKind;
-use plant::car::{
-    CarCalibration, CarError, CarModel, CarSample, ElementSample, OverSpeed, ShiftStage, simulate_car_drive,
-};
+use plant::car::{CarCalibration, CarModel, CarSample, ElementSample, OverSpeed, ShiftStage, simulate_car_drive};
 use study::any_shift::measured::{MeasuredRow, SensedDrive, has_ages};
 use study::any_shift::recording::{input_clutch_n_m, lock_up_is_applied, reported_engine_n_m};
 use trace::units::{km_h, rpm};
@@ -360,15 +358,6 @@ pub(super) fn describe_drive(drive: &DriveFile, path: &Path) -> Result<(), Failu
         None => {
             output::line(&format!("use: wetclutch simulate {} --vehicle VEHICLE -o DIR", path.shown()))?;
             Ok(())
-        }
-    }
-}
-
-impl From<CarError> for Failure {
-    fn from(error: CarError) -> Self {
-        match error {
-            CarError::Request(message) => Self::Input(message),
-            other => Self::Work(other.to_string()),
         }
     }
 }

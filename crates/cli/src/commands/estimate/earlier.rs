@@ -5,8 +5,8 @@ use std::path::Path;
 use logs::{Log, OpenOptions};
 use study::EstimateColumns;
 use trace::{ShownPath as _, signal};
+use wetclutch::estimate::gearbox::is_car_column;
 
-use super::any_car::is_car_column;
 use super::outputs::beside;
 use crate::commands::written::{head, holds_something, replaces_only};
 use crate::failure::Failure;

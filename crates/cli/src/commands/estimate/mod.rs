@@ -1,17 +1,10 @@
 //! `wetclutch estimate`: one log, or several at a time.
 
-pub(super) mod any_car;
 mod earlier;
-mod findings;
-mod job;
-mod log_checks;
-mod measured;
-pub(super) mod observer;
+mod gearbox;
+mod learnt;
+mod one_shift;
 mod outputs;
-mod ratios;
-mod selection;
-mod shifts;
-mod watched;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -19,26 +12,80 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use config::{Kind, Source, VehicleFile};
+use config::{Kind, Source};
 use logs::ChannelMap;
 use trace::ShownPath as _;
+use wetclutch::estimate::LogInput;
+use wetclutch::{Destination, EstimateOptions, VehicleFile};
 
 use self::earlier::replaces_only_estimates;
+use self::outputs::{beside, remove_old};
 use crate::args::{Estimate, FormatChoice};
-use crate::commands::{channel_map_of_car, check_output, not_an_input};
+use crate::commands::{channel_map_of_car, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
 use crate::signals::stop_then_end;
 
-pub(super) use observer::{best, kind, sensors};
+/// Rows of the table of shifts that a terminal shows.
+const SHOWN: usize = 40;
 
 /// What is common to all logs of a command.
 struct Setup<'a> {
-    options: &'a Estimate,
+    arguments: &'a Estimate,
     vehicle: VehicleFile,
     map: ChannelMap,
-    /// Set when a log that is followed is to end.
-    stop: Arc<AtomicBool>,
+    options: EstimateOptions,
+}
+
+impl Setup<'_> {
+    fn log<'l>(&'l self, path: &'l Path) -> LogInput<'l> {
+        LogInput { path, map: &self.map }
+    }
+
+    /// How a log is estimated whose estimates go there.
+    fn options_for(&self, output: Option<&Path>) -> EstimateOptions {
+        EstimateOptions { with_page: output.and_then(beside).is_some(), ..self.options.clone() }
+    }
+}
+
+/// Estimates a log, and says what was found and where it is.
+fn estimate_log(setup: &Setup<'_>, path: &Path, output: Option<&Path>, say: &mut Messages) -> Result<(), Failure> {
+    match &setup.vehicle {
+        VehicleFile::Gearbox(file) => gearbox::estimate(setup, file, path, output, say),
+        VehicleFile::OneShift(file) => one_shift::estimate(setup, file, path, output, say),
+    }
+}
+
+fn destination(output: Option<&Path>) -> Destination<'_> {
+    output.map_or(Destination::Standard, Destination::File)
+}
+
+/// The table of shifts, its lines with the titles, and how many more there are.
+fn shift_lines(titles: &[String], rows: &[Vec<String>], more: usize) -> Vec<String> {
+    let mut lines = output::titled_lines(3, titles, rows);
+    lines.extend((more > 0).then(|| format!("and {more} more shifts")));
+    lines
+}
+
+/// Writes the page beside the tables of shifts, or removes what an earlier estimate left there, and says where all is.
+fn finish(
+    output: Option<&Path>,
+    places: Option<&[PathBuf; 3]>,
+    page: impl FnOnce() -> Result<Option<String>, Failure>,
+    say: &mut Messages,
+) -> Result<(), Failure> {
+    let Some(output) = output else {
+        say.note("estimate: on standard output");
+        return Ok(());
+    };
+    say.note(&format!("estimate: {}", output.shown()));
+    let Some([csv, json, html]) = places else {
+        return beside(output).map_or(Ok(()), |old| remove_old(&old, |note| say.note(note)));
+    };
+    write_text(html, &page()?.unwrap_or_default())?;
+    say.note(&format!("table of shifts: {}, {}", csv.shown(), json.shown()));
+    say.note(&format!("report: {}", html.shown()));
+    Ok(())
 }
 
 /// Messages of one log: shown as they come, or together when it is done.
@@ -61,7 +108,7 @@ impl Messages {
         Self { held: None }
     }
 
-    fn note(&mut self, message: &str) {
+    pub(super) fn note(&mut self, message: &str) {
         match &mut self.held {
             None => output::note(message),
             Some(held) => held.notes.push(message.to_owned()),
@@ -97,13 +144,10 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
             format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.shown());
         return Err(Failure::Input(message));
     }
-    if Source::read(&options.vehicle)?.kind()? == Kind::Car {
-        any_car::check_options(options)?;
-        let prepare = || any_car::CarSetup::new(options);
-        return each_log(options, prepare, any_car::estimate);
+    if Source::read(&options.vehicle)?.kind()? != Kind::Car && options.learnt.is_some() {
+        return Err(wetclutch::estimate::one_shift::observer::learnt_without_effect());
     }
-    observer::check_options(options)?;
-    each_log(options, || setup(options), job::estimate)
+    each_log(options, || setup(options), estimate_log)
 }
 
 /// Estimates the logs; `prepare` makes what is common to them.
@@ -139,35 +183,35 @@ fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
     options.sensors.iter().chain([&options.vehicle]).chain(&options.learnt).chain(options.mapping.files())
 }
 
-fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
-    let mut vehicle = VehicleFile::read(&options.vehicle)?;
-    if let Some(path) = &options.sensors {
-        vehicle.error_bounds = vehicle.error_bounds.read_by(vehicle.oncoming.valve.command_kind(), &sensors(path)?);
+fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
+    let options = EstimateOptions {
+        observer: arguments.observer.kind(),
+        method: arguments.method.map(Into::into),
+        sensors: arguments.sensors.as_deref().map(wetclutch::read_sensors).transpose()?,
+        columns: arguments.columns.clone(),
+        shifts: arguments.shift_choice(),
+        learnt: None,
+        threads: arguments.threads_of_log(),
+        with_page: false,
+        follow: stop(arguments)?,
+    };
+    let vehicle = VehicleFile::read(&arguments.vehicle)?;
+    match &vehicle {
+        VehicleFile::Gearbox(file) => gearbox::check(arguments, file, &options)?,
+        VehicleFile::OneShift(file) => drop(wetclutch::estimate::one_shift::Setup::new(file, &options)?),
     }
-    let map = channel_map_of_car(&options.mapping, vehicle.road.wheel_radius_m)?;
-    Ok(Setup { options, vehicle, map, stop: stop(options)? })
+    let map = channel_map_of_car(&arguments.mapping, vehicle.wheel_radius_m())?;
+    Ok(Setup { arguments, vehicle, map, options })
 }
 
 /// What is set when a log that is followed is to end.
-fn stop(options: &Estimate) -> Result<Arc<AtomicBool>, Failure> {
+fn stop(options: &Estimate) -> Result<Option<Arc<AtomicBool>>, Failure> {
+    if !options.follow {
+        return Ok(None);
+    }
     let stop = Arc::new(AtomicBool::new(false));
-    if options.follow {
-        stop_then_end(&stop)?;
-    }
-    Ok(stop)
-}
-
-/// Says from where on the times in the terminal and on the page count, if not from zero of the log's clock.
-fn said_of_origin(origin_s: f64) -> Option<String> {
-    (origin_s != 0.0)
-        .then(|| format!("times from {origin_s:.0} s of the log's clock on; the tables in files keep that clock"))
-}
-
-/// Says that a log which is followed has ended by itself, where it is a file that may grow.
-fn say_end_of_followed(options: &Estimate, stop: &AtomicBool, path: &Path, say: &mut Messages) {
-    if options.follow && !stop.load(Ordering::Relaxed) && path.is_file() {
-        say.note("warning: the log became shorter or was replaced by another file: the estimate ends there");
-    }
+    stop_then_end(&stop)?;
+    Ok(Some(stop))
 }
 
 /// Several logs, each into a file of its own. One that fails does not stop the others.

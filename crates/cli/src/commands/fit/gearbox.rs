@@ -11,13 +11,12 @@ use logs::ChannelMap;
 use observer::ShiftTables;
 use study::any_shift::logged::LoggedDrive;
 use trace::ShownPath as _;
+use wetclutch::estimate::gearbox::check_ratios;
+use wetclutch::estimate::gearbox::source::{CarReading, CarSource};
+use wetclutch::read_sensors as sensors;
 
 use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, progress, reasons, said_of_file, table};
 use crate::args::Fit;
-use crate::commands::estimate::Messages;
-use crate::commands::estimate::any_car::check_ratios;
-use crate::commands::estimate::any_car::source::{CarReading, CarSource};
-use crate::commands::estimate::sensors;
 use crate::commands::{channel_map_of_car, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -108,7 +107,10 @@ fn record_one(
     bar: &ProgressBar,
 ) -> Result<Recorded, Failure> {
     let mut opened = None;
-    let mut steps = CarSource::open(CarReading { car, tables, map, stop: None, threads: 1 }, log, &mut opened)?;
+    let mut steps =
+        CarSource::open(CarReading { car, tables, map, stop: None, threads: 1 }, log, &mut opened, &mut |note| {
+            output::note(note)
+        })?;
     let mut count = 0_u64;
     while let Some(step) = steps.next_step()? {
         recorder.push_reported(step.reported_n_m);
@@ -121,7 +123,7 @@ fn record_one(
             bar.tick();
         }
     }
-    bar.suspend(|| steps.finish(&mut Messages::at_once()))?;
+    bar.suspend(|| steps.finish(&mut |note| output::note(note)))?;
     Ok(recorder.finish())
 }
 

@@ -11,11 +11,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use trace::ShownPath as _;
 
 use crate::args::Fit;
-use crate::commands::estimate::observer::sensors;
 use crate::commands::written::replaces_only;
 use crate::commands::{channel_map_of_car, check_output, not_an_input, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
+use wetclutch::read_sensors as sensors;
 
 /// Fewer shifts are all fitted.
 const LEAST_FOR_HELD_OUT: usize = 8;

@@ -120,8 +120,8 @@ fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary) -> Result<(), Fail
         counts.compared_runs,
         counts.above,
         counts.compared,
-        output::grouped(counts.outside),
-        output::grouped(counts.values),
+        wetclutch::grouped(counts.outside),
+        wetclutch::grouped(counts.values),
     ))?;
     output::line(&format!("\ntable: {}", part.table().shown()))?;
     Ok(())

@@ -1,25 +1,63 @@
 //! Which shifts of a log are wanted.
 
-use crate::args::{Estimate, GearPair};
-use crate::failure::Failure;
+use std::fmt;
+use std::str::FromStr;
+
+use crate::Error;
 
 /// Time before and after a shift whose rows belong to it, s.
-pub(super) const BEFORE_S: f64 = 0.6;
-pub(super) const AFTER_S: f64 = 0.9;
+pub(crate) const BEFORE_S: f64 = 0.6;
+pub(crate) const AFTER_S: f64 = 0.9;
 /// Shifts that a message names.
 const NAMED: usize = 20;
 
-enum Wanted {
+/// The shifts that are wanted.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum ShiftChoice {
+    /// All, and every row of the log.
+    #[default]
     All,
+    /// The one with this number, from 1.
     Number(usize),
+    /// Those between these gears.
     Between(Vec<GearPair>),
 }
 
+/// The gears of a shift by their names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GearPair {
+    /// The gear before.
+    from: String,
+    /// The gear after.
+    to: String,
+}
+
+impl FromStr for GearPair {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        // A number is the gear with this number, also with zeros in front of it.
+        let name = |text: &str| text.parse().map_or_else(|_| text.to_owned(), |number: u32| number.to_string());
+        match text.trim().split_once('-').map(|(from, to)| [name(from), name(to)]) {
+            Some([from, to]) if from != to && [&from, &to].iter().all(|name| !["", "0"].contains(&name.as_str())) => {
+                Ok(Self { from, to })
+            }
+            _ => Err("expected two gears by their names, such as 1-2".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for GearPair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.from, self.to)
+    }
+}
+
 /// The wanted shifts, and what was seen of all.
-pub(super) struct Selection {
-    wanted: Wanted,
+pub(crate) struct Selection {
+    wanted: ShiftChoice,
     /// Shifts of the whole log.
-    pub(super) seen: usize,
+    pub(crate) seen: usize,
     /// Gears of the first ones.
     gears: Vec<String>,
     /// Whether the wanted number was seen, or each of the wanted pairs.
@@ -27,34 +65,25 @@ pub(super) struct Selection {
 }
 
 impl Selection {
-    pub(super) fn of(options: &Estimate) -> Self {
-        let wanted = match options.shift {
-            Some(number) => Wanted::Number(number as usize),
-            None if options.shifts.is_empty() => Wanted::All,
-            None => Wanted::Between(options.shifts.clone()),
-        };
-        Self::new(wanted)
-    }
-
-    fn new(wanted: Wanted) -> Self {
-        let count = if let Wanted::Between(pairs) = &wanted { pairs.len() } else { 1 };
-        Self { wanted, seen: 0, gears: Vec::new(), found: vec![false; count] }
+    pub(crate) fn of(wanted: &ShiftChoice) -> Self {
+        let count = if let ShiftChoice::Between(pairs) = wanted { pairs.len() } else { 1 };
+        Self { wanted: wanted.clone(), seen: 0, gears: Vec::new(), found: vec![false; count] }
     }
 
     /// Whether only some shifts are wanted, and only their estimates.
-    pub(super) fn is_selective(&self) -> bool {
-        !matches!(self.wanted, Wanted::All)
+    pub(crate) fn is_selective(&self) -> bool {
+        !matches!(self.wanted, ShiftChoice::All)
     }
 
     /// Takes the next shift of the log, called by its gears, such as 1-2; whether it is wanted.
-    pub(super) fn begins(&mut self, gears: &str) -> bool {
+    pub(crate) fn begins(&mut self, gears: &str) -> bool {
         self.seen += 1;
         if self.gears.len() < NAMED {
             self.gears.push(gears.to_owned());
         }
         let wants = self.wants(self.seen, gears);
         match &self.wanted {
-            Wanted::Between(pairs) => {
+            ShiftChoice::Between(pairs) => {
                 let fits = pairs.iter().map(|pair| pair.to_string() == gears);
                 self.found.iter_mut().zip(fits).for_each(|(found, fits)| *found |= fits);
             }
@@ -64,28 +93,28 @@ impl Selection {
     }
 
     /// Whether the shift with this number and these gears is wanted.
-    pub(super) fn wants(&self, number: usize, gears: &str) -> bool {
+    pub(crate) fn wants(&self, number: usize, gears: &str) -> bool {
         match &self.wanted {
-            Wanted::All => true,
-            Wanted::Number(wanted) => *wanted == number,
-            Wanted::Between(pairs) => pairs.iter().any(|pair| pair.to_string() == gears),
+            ShiftChoice::All => true,
+            ShiftChoice::Number(wanted) => *wanted == number,
+            ShiftChoice::Between(pairs) => pairs.iter().any(|pair| pair.to_string() == gears),
         }
     }
 
     /// Refuses a selection of which a part fits no shift; `hint` says what tells a shift.
-    pub(super) fn check(&self, hint: &str) -> Result<(), Failure> {
+    pub(crate) fn check(&self, hint: &str) -> Result<(), Error> {
         let what = match &self.wanted {
-            Wanted::All => return Ok(()),
+            ShiftChoice::All => return Ok(()),
             _ if self.found.iter().all(|found| *found) => return Ok(()),
-            Wanted::Number(number) => format!("--shift {number}"),
-            Wanted::Between(pairs) => {
+            ShiftChoice::Number(number) => format!("--shift {number}"),
+            ShiftChoice::Between(pairs) => {
                 let missing = pairs.iter().zip(&self.found).filter(|(_, found)| !**found);
                 let pairs: Vec<String> = missing.map(|(pair, _)| pair.to_string()).collect();
                 format!("--shifts {}", pairs.join(","))
             }
         };
         let more = if self.seen > self.gears.len() { ", ..." } else { "" };
-        Err(Failure::Input(match self.seen {
+        Err(Error::Input(match self.seen {
             0 => format!("{what}: no shift was found in the log\nhint: {hint}"),
             seen => format!(
                 "{what}: the log has no such shift\nhint: it has {seen}, in this order: {}{more}",
@@ -97,15 +126,15 @@ impl Selection {
 
 #[cfg(test)]
 mod tests {
-    use super::{Selection, Wanted};
-    use crate::failure::Failure;
+    use super::{Selection, ShiftChoice};
+    use crate::Error;
 
     fn chosen(pairs: &[&str], shifts: &[&str]) -> Result<(), String> {
         let pairs = pairs.iter().map(|pair| pair.parse().unwrap()).collect();
-        let mut selection = Selection::new(Wanted::Between(pairs));
+        let mut selection = Selection::of(&ShiftChoice::Between(pairs));
         shifts.iter().for_each(|gears| _ = selection.begins(gears));
         selection.check("").map_err(|failure| match failure {
-            Failure::Input(message) => message,
+            Error::Input(message) => message,
             _ => String::new(),
         })
     }

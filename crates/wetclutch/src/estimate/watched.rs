@@ -3,14 +3,13 @@
 use logs::plausibility::{Extremes, Finding, Likely, Seen, findings};
 use logs::{QualityCounts, Role, RoleSummary};
 
-use crate::failure::Failure;
-use crate::output;
+use crate::{Error, grouped};
 
 /// Later rows of which one is looked at.
 const EVERY: u64 = 32;
 
 /// Whether a row, from 1, is looked at whether it can be right: all of the first, and later one of [`EVERY`].
-pub(super) fn is_looked_at(row: u64, first: usize) -> bool {
+pub(crate) fn is_looked_at(row: u64, first: usize) -> bool {
     row <= first as u64 || row.is_multiple_of(EVERY)
 }
 
@@ -18,19 +17,19 @@ pub(super) fn is_looked_at(row: u64, first: usize) -> bool {
 const ENDINGS: [(&str, &str); 5] = [("rpm", "rpm"), ("rad/s", "rad_s"), ("mA", "ma"), ("A", "a"), ("%", "percent")];
 
 /// A column that is watched.
-pub(super) struct WatchedColumn {
+pub(crate) struct WatchedColumn {
     /// What it is.
-    pub(super) role: Role,
+    pub(crate) role: Role,
     /// Its name without a unit.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// Whether its name says the SI unit.
-    pub(super) is_in_si: bool,
+    pub(crate) is_in_si: bool,
     /// Whether an estimate without a value of it is refused here.
-    pub(super) is_needed: bool,
+    pub(crate) is_needed: bool,
 }
 
 /// The columns of a table that are watched.
-pub(super) struct WatchedColumns {
+pub(crate) struct WatchedColumns {
     /// Rows at the beginning of which all are looked at.
     first: usize,
     rows: u64,
@@ -41,7 +40,7 @@ pub(super) struct WatchedColumns {
 
 impl WatchedColumns {
     /// Looks at all of the `first` rows, and later at one of [`EVERY`].
-    pub(super) fn new(first: usize, columns: impl IntoIterator<Item = WatchedColumn>) -> Self {
+    pub(crate) fn new(first: usize, columns: impl IntoIterator<Item = WatchedColumn>) -> Self {
         let (mut summaries, mut needs) = (Vec::new(), Vec::new());
         for WatchedColumn { role, name, is_in_si, is_needed } in columns {
             let unit_name = match role {
@@ -58,7 +57,7 @@ impl WatchedColumns {
     }
 
     /// Takes a row; the values are those of the columns, in their order.
-    pub(super) fn push(&mut self, values: impl IntoIterator<Item = Option<f64>>) {
+    pub(crate) fn push(&mut self, values: impl IntoIterator<Item = Option<f64>>) {
         self.rows += 1;
         let is_looked_at = is_looked_at(self.rows, self.first);
         for ((entry, (_, count)), value) in self.summaries.iter_mut().zip(&mut self.needs).zip(values) {
@@ -72,18 +71,18 @@ impl WatchedColumns {
     }
 
     /// Rows so far.
-    pub(super) fn rows(&self) -> u64 {
+    pub(crate) fn rows(&self) -> u64 {
         self.rows
     }
 
     /// Refuses a table in which a column that is needed has no value, or whose values cannot be right.
-    pub(super) fn check(&self, seen: Seen) -> Result<(), Failure> {
+    pub(crate) fn check(&self, seen: Seen) -> Result<(), Error> {
         let mut with_needs = self.summaries.iter().zip(&self.needs);
         if let Some((entry, _)) = with_needs.find(|(_, need)| **need == (true, 0)).filter(|_| self.rows > 0) {
-            return Err(Failure::Input(format!(
+            return Err(Error::Input(format!(
                 "{} has no value in any of {} rows\nhint: an estimate of this car needs it; look at the log with `wetclutch inspect`",
                 entry.name,
-                output::grouped(self.rows)
+                grouped(self.rows)
             )));
         }
         let Some(Finding { name, message, likely, .. }) = findings(&self.summaries, seen).into_iter().next() else {
@@ -99,6 +98,6 @@ impl WatchedColumns {
                 "`wetclutch inspect --suggest` writes a channel map, in which the channel gets `scale = -1`".to_owned()
             }
         };
-        Err(Failure::Input(format!("{message}\nhint: {hint}")))
+        Err(Error::Input(format!("{message}\nhint: {hint}")))
     }
 }

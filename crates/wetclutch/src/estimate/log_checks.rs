@@ -6,12 +6,10 @@ use logs::plausibility::{likely_time_unit, too_fast_a_time};
 use logs::{ChannelMap, Quality, Readings, Role};
 use trace::{ShownPath as _, TraceError, signal};
 
-use super::Messages;
-use crate::failure::Failure;
-use crate::output;
+use crate::{Error, Notes, grouped};
 
 /// A table with another delimiter than the comma is one of a single column; a channel map reads it.
-pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
+pub(crate) fn other_delimiter(path: &Path, error: TraceError) -> Error {
     let delimiter = match &error {
         TraceError::MissingColumn { present, .. } => match present.as_slice() {
             [only] => [';', '\t', '|'].into_iter().find(|delimiter| only.contains(*delimiter)),
@@ -21,7 +19,7 @@ pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
     };
     let Some(delimiter) = delimiter else { return error.into() };
     let given = path.shown();
-    Failure::Input(format!(
+    Error::Input(format!(
         "{}: the columns are separated by `{}`, which is read by a channel map only\n\
          hint: `wetclutch inspect {given} --suggest > map.toml` writes one; check it, then add --map map.toml",
         path.shown(),
@@ -30,7 +28,7 @@ pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
 }
 
 /// Refuses a log with so much time between its rows that it has no shifts: the time is in another unit by all appearances.
-pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<(), Failure> {
+pub(crate) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<(), Error> {
     const LONGEST_S: f64 = 1.0;
     if median_s < LONGEST_S || median_s.is_nan() {
         return Ok(());
@@ -41,7 +39,7 @@ pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<
         (false, "ms") => format!("call its column `time_ms` in place of `{}`", signal::TIME),
         (false, _) => format!("convert it to s, or let a channel map read it, with `unit = \"{unit}\"` under [time]"),
     };
-    Err(Failure::Input(format!(
+    Err(Error::Input(format!(
         "{}: the middle time between two rows is {median_s} s, longer than a phase of a shift\n\
          hint: if the time is in {unit}, {hint}",
         path.shown()
@@ -49,13 +47,13 @@ pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<
 }
 
 /// Refuses a log whose time passes too fast, once its last row is known.
-pub(super) fn check_span(path: &Path, median_s: f64, span_s: f64) -> Result<(), Failure> {
+pub(crate) fn check_span(path: &Path, median_s: f64, span_s: f64) -> Result<(), Error> {
     let wrong = too_fast_a_time(median_s, span_s);
-    wrong.map_or(Ok(()), |wrong| Err(Failure::Input(format!("{}: {wrong}", path.shown()))))
+    wrong.map_or(Ok(()), |wrong| Err(Error::Input(format!("{}: {wrong}", path.shown()))))
 }
 
 /// Says that commands, by their names, are sent on change.
-pub(super) fn sent_on_change(names: &str) -> String {
+pub(crate) fn sent_on_change(names: &str) -> String {
     format!(
         "the commands of {names} are sent on change, as their samples show: each stands until the next one (`sent_on_change = true` of a channel \
          map says so)"
@@ -63,7 +61,7 @@ pub(super) fn sent_on_change(names: &str) -> String {
 }
 
 /// Says that a log has too few rows for its shifts.
-pub(super) fn slow_log(median_s: f64) -> Option<String> {
+pub(crate) fn slow_log(median_s: f64) -> Option<String> {
     /// Five rows in an inertia phase of half a second \[chosen\].
     const LONGEST_S: f64 = 0.1;
     (median_s > LONGEST_S * (1.0 + ROUNDING)).then(|| {
@@ -76,18 +74,18 @@ pub(super) fn slow_log(median_s: f64) -> Option<String> {
 }
 
 /// What the ranges assume of the sensors where no file describes them.
-pub(super) const WITHOUT_SENSORS: &str = "ranges: no sensor file was given (--sensors), so a reading of a speed counts as one of the time of its row, and a command errs \
+pub const WITHOUT_SENSORS: &str = "ranges: no sensor file was given (--sensors), so a reading of a speed counts as one of the time of its row, and a command errs \
      by no more than the error bounds of the vehicle file. The ranges are guaranteed only where that is so; a [sensors] table makes them those of the sensors";
 
 /// Warns of a DBC that is given for a table with the names of the program.
-pub(super) fn warn_of_dbc(map: &ChannelMap) {
+pub(crate) fn warn_of_dbc(map: &ChannelMap, say: Notes<'_>) {
     if map.open.dbc.is_some() {
-        output::note(&format!("warning: {}", logs::log::NO_FRAMES));
+        say(&format!("warning: {}", logs::log::NO_FRAMES));
     }
 }
 
 /// Says that commands may be older than the bounds of the vehicle file allow: a row shows a command that was sent since the row before.
-pub(super) fn old_commands(median_s: f64, bound_s: f64) -> Option<String> {
+pub(crate) fn old_commands(median_s: f64, bound_s: f64) -> Option<String> {
     (median_s > bound_s * (1.0 + ROUNDING)).then(|| {
         format!(
             "warning: the middle time between two rows is {median_s:.3} s, and by `command_age_s` of the vehicle file a command is at most {bound_s} s \
@@ -104,28 +102,24 @@ const ROUNDING: f64 = 1e-3;
 ///
 /// # Errors
 /// Most samples of a channel could not be used, or a unit is wrong by all appearances.
-pub(super) fn report_readings(
-    readings: &Readings<'_>,
-    may_be_empty: &[Role],
-    say: &mut Messages,
-) -> Result<(), Failure> {
+pub(crate) fn report_readings(readings: &Readings<'_>, may_be_empty: &[Role], say: Notes<'_>) -> Result<(), Error> {
     for role in readings.summary() {
         let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
         if total == 0 && may_be_empty.contains(&role.role) {
-            say.note(&format!("warning: the channel of {} has no samples", role.name));
+            say(&format!("warning: the channel of {} has no samples", role.name));
         }
         if good < total {
-            say.note(&format!(
+            say(&format!(
                 "{} of {} samples of {} are not used: {}",
-                output::grouped(total - good),
-                output::grouped(total),
+                grouped(total - good),
+                grouped(total),
                 role.name,
                 role.counts.faults()
             ));
         }
     }
     for note in readings.notes() {
-        say.note(&format!("warning: {note}"));
+        say(&format!("warning: {note}"));
     }
     Ok(readings.check_without(may_be_empty)?)
 }

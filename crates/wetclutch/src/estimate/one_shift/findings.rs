@@ -11,14 +11,13 @@ use trace::units;
 use super::measured::{Measured, Step};
 use super::observer::is_open_loop;
 use super::ratios::Ratios;
-use super::said_of_origin;
-use super::watched::is_looked_at;
-use crate::commands::shown_from_s;
-use crate::failure::Failure;
-use crate::output;
+
+use crate::estimate::watched::is_looked_at;
+use crate::estimate::{said_of_origin, shown_from_s};
+use crate::{Error, grouped};
 
 /// Summary of the estimates for the user, updated with each estimate.
-pub(super) struct Findings {
+pub(crate) struct Findings {
     ratios: Ratios,
     rows: u64,
     other_gear: u64,
@@ -42,7 +41,7 @@ const ENOUGH_ROWS: u64 = 100;
 const CHANNELS: usize = 7;
 
 impl Findings {
-    pub(super) fn new(vehicle: &Vehicle) -> Self {
+    pub(crate) fn new(vehicle: &Vehicle) -> Self {
         Self {
             ratios: Ratios::new(vehicle),
             rows: 0,
@@ -59,7 +58,7 @@ impl Findings {
     }
 
     /// Takes a step in a gear that the vehicle file does not describe.
-    pub(super) fn push_other_gear(&mut self, time_s: f64) {
+    pub(crate) fn push_other_gear(&mut self, time_s: f64) {
         self.other_gear += 1;
         self.pass(time_s);
     }
@@ -71,7 +70,7 @@ impl Findings {
         self.last_s = time_s;
     }
 
-    pub(super) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
+    pub(crate) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
         self.pass(row.time_s);
         self.rows += 1;
         self.ratios.push(row.time_s, &row.input, is_looked_at(self.rows, FIRST_LOOK));
@@ -110,12 +109,12 @@ impl Findings {
     }
 
     /// From the first step to the last, s.
-    pub(super) fn span_s(&self) -> f64 {
+    pub(crate) fn span_s(&self) -> f64 {
         self.last_s - self.first_s
     }
 
     /// From which time on the times of the log are shown, s.
-    pub(super) fn origin_s(&self) -> f64 {
+    pub(crate) fn origin_s(&self) -> f64 {
         if self.first_s.is_nan() { 0.0 } else { shown_from_s(self.first_s) }
     }
 
@@ -123,10 +122,10 @@ impl Findings {
     ///
     /// # Errors
     /// More than half of the readings of a channel were refused, or none came; or most estimates are outside their range.
-    pub(super) fn check(&self, commands: [Role; 2], log: &Measured<'_>, observer: ObserverKind) -> Result<(), Failure> {
+    pub(crate) fn check(&self, commands: [Role; 2], log: &Measured<'_>, observer: ObserverKind) -> Result<(), Error> {
         let needs_wheel = log.has_wheel_speed() && observer != ObserverKind::Rigid && !is_open_loop(observer);
         if self.rows == 0 && self.other_gear > 0 {
-            return Err(Failure::Input(
+            return Err(Error::Input(
                 "the log is never in the gears of the vehicle file's shift\nhint: check `gearbox.ratios` of the channel map and the \
                  gear train of the vehicle file; `wetclutch inspect --shifts` lists the shifts"
                     .to_owned(),
@@ -143,18 +142,18 @@ impl Findings {
                 _ => true,
             };
             if came == 0 && is_needed {
-                return Err(Failure::Input(format!(
+                return Err(Error::Input(format!(
                     "{name} has no value in any of {} samples\nhint: look at the log with `wetclutch inspect`",
-                    output::grouped(self.rows)
+                    grouped(self.rows)
                 )));
             }
             if 2 * taken < came {
-                return Err(Failure::Input(format!(
+                return Err(Error::Input(format!(
                     "{} of {} readings of {name} were refused: they are impossible for this car, or contradict the other \
                      signals\nhint: check the unit, scale and sign of {name}, and whether the vehicle file is of this car; \
                      `wetclutch inspect` shows least and greatest values",
-                    output::grouped(came - taken),
-                    output::grouped(came)
+                    grouped(came - taken),
+                    grouped(came)
                 )));
             }
         }
@@ -163,17 +162,17 @@ impl Findings {
     }
 
     /// Most estimates have to be possible.
-    fn check_estimates(&self) -> Result<(), Failure> {
+    fn check_estimates(&self) -> Result<(), Error> {
         let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::HeldClutchSlips, Health::Flare];
         let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
         let lost = self.without_command;
         if 2 * lost > self.rows && self.rows >= ENOUGH_ROWS {
-            return Err(Failure::Input(format!(
+            return Err(Error::Input(format!(
                 "{} of {} samples have no command of the valve that can be used\nhint: if it is sent on change, say so by `sent_on_change = true` \
                  in a channel map; else look at its channel with `wetclutch inspect`. A log of another car, or of one with a whole gearbox, may have \
                  it in its shifts alone, and that needs the vehicle file of that car",
-                output::grouped(lost),
-                output::grouped(self.rows)
+                grouped(lost),
+                grouped(self.rows)
             )));
         }
         let count: u64 = impossible.iter().map(of).sum();
@@ -181,17 +180,17 @@ impl Findings {
             return Ok(());
         }
         let worst = impossible.iter().max_by_key(|health| of(health)).map_or("", |health| health.name());
-        Err(Failure::Input(format!(
+        Err(Error::Input(format!(
             "{} of {} estimates are impossible for this car, most of them `{worst}`\nhint: a channel with a wrong scale does this, \
              another car than that of the vehicle file, and a log of other gears; `wetclutch inspect` shows least and greatest values, \
              and a channel map with `gearbox.ratios` tells the gears apart",
-            output::grouped(count),
-            output::grouped(self.rows)
+            grouped(count),
+            grouped(self.rows)
         )))
     }
 
     /// What was found, in sentences.
-    pub(super) fn sentences(&self) -> Vec<String> {
+    pub(crate) fn sentences(&self) -> Vec<String> {
         let mut said: Vec<String> =
             self.ratios.contradiction().map(|said| format!("warning: {said}")).into_iter().collect();
         for (health, count) in &self.health {
@@ -201,7 +200,7 @@ impl Findings {
                 continue;
             }
             let meaning = health_meaning(*health);
-            said.push(format!("{} of {} samples have {meaning}", output::grouped(*count), output::grouped(self.rows)));
+            said.push(format!("{} of {} samples have {meaning}", grouped(*count), grouped(self.rows)));
         }
         let scores = self.errors.as_ref().map(ErrorScore::finish).unwrap_or_default();
         for score in scores.iter().filter(|score| score.samples > 0) {
@@ -212,11 +211,11 @@ impl Findings {
                 units::mpa(score.rms),
             ));
         }
-        let rows = output::grouped(self.rows + self.other_gear);
+        let rows = grouped(self.rows + self.other_gear);
         if self.other_gear > 0 {
             said.push(format!(
                 "{} of {rows} samples are in gears that the vehicle file does not describe: they have no estimate",
-                output::grouped(self.other_gear)
+                grouped(self.other_gear)
             ));
         }
         let origin_s = self.origin_s();
@@ -237,8 +236,8 @@ impl Findings {
         let mut parts: Vec<String> = times.collect();
         match count - parts.len() as u64 {
             0 => {}
-            more => parts.push(format!("and {} more", output::grouped(more))),
+            more => parts.push(format!("and {} more", grouped(more))),
         }
-        if parts.is_empty() { "none".to_owned() } else { format!("{} ({})", output::grouped(*count), parts.join(", ")) }
+        if parts.is_empty() { "none".to_owned() } else { format!("{} ({})", grouped(*count), parts.join(", ")) }
     }
 }

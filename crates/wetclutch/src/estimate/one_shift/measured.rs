@@ -18,23 +18,21 @@ use study::any_shift::pressure_command::command_of_valve;
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use trace::{CsvRows, Following, ShownPath as _, signal};
 
-use super::Messages;
-use super::log_checks::{check_step, other_delimiter, report_readings, sent_on_change};
-use super::watched::{WatchedColumn, WatchedColumns};
-use crate::failure::Failure;
-use crate::output;
+use crate::estimate::log_checks::{check_step, other_delimiter, report_readings, sent_on_change};
+use crate::estimate::watched::{WatchedColumn, WatchedColumns};
+use crate::{Error, Notes, grouped};
 
 /// Steps of a followed log that are looked at before the first estimate.
 const FOLLOWED_LOOK: usize = 50;
 
 /// A log with its shifts.
-pub(super) struct Measured<'a> {
+pub(crate) struct Measured<'a> {
     source: Source<'a>,
     /// The step that [`Self::advance`] went on to.
-    pub(super) step: Step,
+    pub(crate) step: Step,
     finder: ShiftFinder,
     /// Ratios of the gears that the finder numbers, 1st first.
-    pub(super) ratios: Vec<f64>,
+    pub(crate) ratios: Vec<f64>,
     resets: u32,
     /// The gears of the vehicle's shift among those of the gearbox; none if it has no more.
     gears: Option<GearsOfShift>,
@@ -91,22 +89,22 @@ struct Channels<'a> {
 }
 
 /// What is known at one time.
-pub(super) struct Step {
+pub(crate) struct Step {
     /// Time of the step, s.
-    pub(super) time_s: f64,
+    pub(crate) time_s: f64,
     /// What the observer is given.
-    pub(super) input: Input<f64>,
+    pub(crate) input: Input<f64>,
     /// The truth, in a simulated log.
-    pub(super) truth: Option<Truth>,
+    pub(crate) truth: Option<Truth>,
     resets: u32,
     /// Whether the car is in another gear than those of the vehicle file's shift: its observer is not valid there.
-    pub(super) is_other_gear: bool,
+    pub(crate) is_other_gear: bool,
     /// Measured pressure of the oncoming clutch, Pa.
-    pub(super) pressure_pa: Option<Measurement<f64>>,
+    pub(crate) pressure_pa: Option<Measurement<f64>>,
     /// Measured torque of the oncoming clutch, N m.
-    pub(super) torque_n_m: Option<Measurement<f64>>,
+    pub(crate) torque_n_m: Option<Measurement<f64>>,
     /// Shifts that ended some seconds ago, and are known now.
-    pub(super) shifts: Vec<Shift>,
+    pub(crate) shifts: Vec<Shift>,
 }
 
 impl Step {
@@ -174,10 +172,10 @@ fn each_reading(input: &Input<f64>, row: &LogRow, mut see: impl FnMut(&Reading))
 
 impl<'a> Measured<'a> {
     /// A table with the names of the program. `stop` ends one that is followed.
-    pub(super) fn rows(path: &Path, vehicle: &Vehicle, stop: Option<Arc<AtomicBool>>) -> Result<Self, Failure> {
+    pub(crate) fn rows(path: &Path, vehicle: &Vehicle, stop: Option<Arc<AtomicBool>>) -> Result<Self, Error> {
         let is_pipe = path == Path::new("-");
         if !is_pipe && logs::needs_map(path)? {
-            return Err(Failure::Input(format!(
+            return Err(Error::Input(format!(
                 "{}: this log needs a channel map\nhint: `wetclutch inspect` with --suggest writes a first one, for --map",
                 path.shown()
             )));
@@ -205,13 +203,13 @@ impl<'a> Measured<'a> {
     }
 
     /// Channels of a log by a map.
-    pub(super) fn channels(
+    pub(crate) fn channels(
         path: &Path,
         log: &'a mut Log,
         map: &ChannelMap,
         vehicle: &Vehicle,
         is_followed: bool,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, Error> {
         let command = match vehicle.settings.valve.command_kind() {
             CommandKind::Current => Role::OncomingCurrent,
             CommandKind::DutyCycle => Role::OncomingDuty,
@@ -219,7 +217,7 @@ impl<'a> Measured<'a> {
         let asked = Role::OncomingPressureCommand;
         let command = if !map.has(command) && map.has(asked) { asked } else { command };
         if !map.has(command) {
-            return Err(Failure::Input(format!(
+            return Err(Error::Input(format!(
                 "the channel map has no {0}, the command of this vehicle's valve: without it no pressure can be estimated\n\
                  hint: add `[channel.{0}]` or --channel {0}=NAME if the log has it, or {1} if it has the pressure that is asked of the clutch",
                 command.name(),
@@ -228,7 +226,7 @@ impl<'a> Measured<'a> {
         }
         let needed = [Role::TurbineSpeed, Role::OutputSpeed, command];
         if let Some(missing) = needed.into_iter().find(|role| !map.has(*role)) {
-            return Err(Failure::Input(format!(
+            return Err(Error::Input(format!(
                 "the channel map has no {}\nhint: an estimate needs {}; add `[channel.{}]` or --channel {0}=NAME",
                 missing.name(),
                 needed.map(Role::name).join(", "),
@@ -302,17 +300,17 @@ impl<'a> Measured<'a> {
     }
 
     /// Whether a reading of the wheel speed came before the first estimate.
-    pub(super) fn has_wheel_speed(&self) -> bool {
+    pub(crate) fn has_wheel_speed(&self) -> bool {
         self.looked_at.has_wheel
     }
 
     /// The same of the engine speed.
-    pub(super) fn has_engine_speed(&self) -> bool {
+    pub(crate) fn has_engine_speed(&self) -> bool {
         self.looked_at.has_engine
     }
 
     /// Refuses a log without engine or wheel speed.
-    pub(super) fn require(&self, role: Role) -> Result<(), Failure> {
+    pub(crate) fn require(&self, role: Role) -> Result<(), Error> {
         let (comes, column, hint) = match role {
             Role::WheelSpeed => (self.has_wheel_speed(), signal::WHEEL_SPEED, "rigid"),
             _ => (self.has_engine_speed(), signal::ENGINE_SPEED, "open-loop"),
@@ -325,19 +323,19 @@ impl<'a> Measured<'a> {
             Source::Rows(rows) => rows.log.require(column)?,
             Source::Channels(channels) if channels.maps(role) => {}
             Source::Channels(_) => {
-                return Err(Failure::Input(format!(
+                return Err(Error::Input(format!(
                     "the channel map has no {name}, which this observer needs\nhint: add `[channel.{name}]`, or use `--observer {hint}`"
                 )));
             }
         }
-        Err(Failure::Input(format!(
+        Err(Error::Input(format!(
             "{name} has no value in any of the first {} samples, and this observer needs it\nhint: use `--observer {hint}`, or look at \
              the log with `wetclutch inspect`",
-            output::grouped(self.looked_at.steps)
+            grouped(self.looked_at.steps)
         )))
     }
 
-    pub(super) fn median_step_s(&self) -> f64 {
+    pub(crate) fn median_step_s(&self) -> f64 {
         match &self.source {
             Source::Rows(rows) => rows.log.median_step_s(),
             Source::Channels(channels) => channels.median_step_s,
@@ -345,7 +343,7 @@ impl<'a> Measured<'a> {
     }
 
     /// Takes the readings of the step that the observer refused back from the shift finder, before a shift is known that has them.
-    pub(super) fn take_back(&mut self, channels: &observer::Channels<ChannelHealth>) {
+    pub(crate) fn take_back(&mut self, channels: &observer::Channels<ChannelHealth>) {
         let Input { engine_rad_s, turbine_rad_s, output_rad_s, .. } = &self.step.input;
         for (role, reading, health) in [
             (Role::EngineSpeed, engine_rad_s, channels.engine),
@@ -359,7 +357,7 @@ impl<'a> Measured<'a> {
     }
 
     /// The shifts that were not given with a step, after the last step.
-    pub(super) fn last_shifts(&mut self) -> Vec<Shift> {
+    pub(crate) fn last_shifts(&mut self) -> Vec<Shift> {
         self.finder.restart();
         self.finder.take_settled(f64::INFINITY)
     }
@@ -368,16 +366,16 @@ impl<'a> Measured<'a> {
     ///
     /// # Errors
     /// Most samples of a channel could not be used, or a unit is wrong by all appearances.
-    pub(super) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
+    pub(crate) fn finish(&self, say: Notes<'_>) -> Result<(), Error> {
         let shown = self.commands.iter().zip(["oncoming", "offgoing"]).filter(|((_, is_shown), _)| *is_shown);
         let shown: Vec<&str> = shown.map(|(_, name)| name).collect();
         if !shown.is_empty() {
-            say.note(&sent_on_change(&shown.join(", ")));
+            say(&sent_on_change(&shown.join(", ")));
         }
         let channels = match &self.source {
             Source::Rows(rows) => {
                 for note in rows.log.check_readings()? {
-                    say.note(&format!("warning: {note}"));
+                    say(&format!("warning: {note}"));
                 }
                 return rows.watched.check(Seen::All);
             }
@@ -386,7 +384,7 @@ impl<'a> Measured<'a> {
         // An observer that needs one of them was not chosen, or has refused the log.
         let may_be_empty = [Role::EngineSpeed, Role::WheelSpeed];
         if let Some(contradiction) = self.finder.contradiction() {
-            say.note(&format!("warning: {contradiction}"));
+            say(&format!("warning: {contradiction}"));
         }
         report_readings(channels.steps.readings(), &may_be_empty, say)
     }
@@ -444,7 +442,7 @@ fn values(input: &Input<f64>) -> [Option<f64>; 5] {
 
 impl Rows {
     /// Reads the next step; `see` gets its readings, with the resets of the clock so far. False at the end.
-    fn read(&mut self, step: &mut Step, mut see: impl FnMut(u32, &Reading)) -> Result<bool, Failure> {
+    fn read(&mut self, step: &mut Step, mut see: impl FnMut(u32, &Reading)) -> Result<bool, Error> {
         let Self { log, row, .. } = self;
         if !log.advance(&mut step.input, row)? {
             return Ok(false);
@@ -466,11 +464,11 @@ impl Channels<'_> {
         self.steps.readings().summary().iter().any(|entry| entry.role == role)
     }
 
-    fn read(&mut self) -> Option<Result<(Step, Vec<Reading>), Failure>> {
+    fn read(&mut self) -> Option<Result<(Step, Vec<Reading>), Error>> {
         let mut readings = Vec::new();
         let step = self.steps.next_seeing(|reading| readings.push(reading))?;
         let resets = self.steps.readings().resets();
-        Some(step.map_err(Failure::from).map(|mut step| {
+        Some(step.map_err(Error::from).map(|mut step| {
             if let (Some((valve, most_pa)), Some(command)) = (&self.asked_of, &mut step.input.command) {
                 command.value = command_of_valve(valve, *most_pa, command.value);
             }
@@ -485,7 +483,7 @@ impl Measured<'_> {
     ///
     /// # Errors
     /// The log cannot be read.
-    pub(super) fn advance(&mut self) -> Result<bool, Failure> {
+    pub(crate) fn advance(&mut self) -> Result<bool, Error> {
         let Self { source, step, finder, resets, gears, .. } = self;
         // A clock that begins anew begins a new log for the finder, before the first reading of it.
         let mut see = |log_resets: u32, reading: &Reading| {

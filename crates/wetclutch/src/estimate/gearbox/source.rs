@@ -16,25 +16,27 @@ use study::any_shift::channels::{CarChannels, own_map};
 use study::log::FIRST_LOOK;
 use trace::{CsvRows, Following, ShownPath as _};
 
-use super::super::Messages;
-use super::super::log_checks::{other_delimiter, report_readings, sent_on_change, warn_of_dbc};
 use super::checks::Columns;
-use crate::failure::Failure;
+use crate::estimate::log_checks::{other_delimiter, report_readings, sent_on_change, warn_of_dbc};
+use crate::{Error, Notes};
 
 /// How a log of a car is read.
 #[derive(Clone, Copy)]
-pub(in crate::commands) struct CarReading<'a> {
-    pub(in crate::commands) car: &'a Car,
-    pub(in crate::commands) tables: &'a ShiftTables<f64>,
-    pub(in crate::commands) map: &'a ChannelMap,
+pub struct CarReading<'a> {
+    /// The car.
+    pub car: &'a Car,
+    /// The tables of its filter.
+    pub tables: &'a ShiftTables<f64>,
+    /// The channel map.
+    pub map: &'a ChannelMap,
     /// Set when a log that is followed is to end; none for one that is not followed.
-    pub(in crate::commands) stop: Option<&'a Arc<AtomicBool>>,
+    pub stop: Option<&'a Arc<AtomicBool>>,
     /// How many threads read it.
-    pub(in crate::commands) threads: usize,
+    pub threads: usize,
 }
 
 /// The steps of a log.
-pub(in crate::commands) struct CarSource<'a> {
+pub struct CarSource<'a> {
     kind: SourceKind<'a>,
     /// The first steps, which are looked at before the first is used.
     looked_at: VecDeque<LogStep>,
@@ -50,7 +52,7 @@ enum SourceKind<'a> {
 }
 
 impl SourceKind<'_> {
-    fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
+    fn next_step(&mut self) -> Result<Option<LogStep>, Error> {
         Ok(match self {
             Self::Rows(rows) => rows.next_step()?,
             Self::Channels(channels) => channels.next_step()?,
@@ -60,17 +62,21 @@ impl SourceKind<'_> {
 
 impl<'a> CarSource<'a> {
     /// Opens a log; `opened` holds it where it has channels.
-    pub(in crate::commands) fn open(
+    ///
+    /// # Errors
+    /// It cannot be read, or has not the channels that an estimate needs.
+    pub fn open(
         reading: CarReading<'a>,
         path: &Path,
         opened: &'a mut Option<Log>,
-    ) -> Result<Self, Failure> {
+        say: Notes<'_>,
+    ) -> Result<Self, Error> {
         let CarReading { car, tables, map, stop, threads } = reading;
         let is_followed = stop.is_some();
         let stop = stop.map(Arc::clone);
         let is_pipe = path == Path::new("-");
         if map.channels.is_empty() && (is_pipe || !logs::needs_map(path)?) {
-            warn_of_dbc(map);
+            warn_of_dbc(map, say);
             let opening = |source| LogError::Io { path: path.to_owned(), source };
             let input: Box<dyn Read> = match stop {
                 Some(stop) => Box::new(Following::open(path, stop).map_err(opening)?),
@@ -89,7 +95,7 @@ impl<'a> CarSource<'a> {
         let map = if map.channels.is_empty() {
             own = own_map(&log, car).map_err(|missing| {
                 if log.lacks_dbc() {
-                    return Failure::Input(format!(
+                    return Error::Input(format!(
                         "{}: there are frames of a CAN bus, whose signals are not read\n\
                          hint: a DBC defines the signals in them: give it with --dbc, and a channel map with --map",
                         path.shown()
@@ -100,7 +106,7 @@ impl<'a> CarSource<'a> {
                 } else {
                     ""
                 };
-                Failure::Input(format!(
+                Error::Input(format!(
                     "{}: this log needs a channel map, because its channels have other names than those of `wetclutch simulate`: none with \
                      numbers is `{}`\n\
                      hint: `wetclutch inspect` names the channels that hold none; with --suggest it writes a first map, for --map{gear}",
@@ -123,7 +129,7 @@ impl<'a> CarSource<'a> {
         mut commands: [OnChange; MAX_ELEMENTS],
         CarReading { car, tables, .. }: CarReading<'a>,
         is_followed: bool,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, Error> {
         let mut looked_at = VecDeque::new();
         while !is_followed && looked_at.len() < FIRST_LOOK {
             let Some(step) = kind.next_step()? else { break };
@@ -140,14 +146,18 @@ impl<'a> CarSource<'a> {
     }
 
     /// What watches the columns of a table; mapped channels are watched by their readings.
-    pub(super) fn columns(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<Columns> {
+    pub(crate) fn columns(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<Columns> {
         match &self.kind {
             SourceKind::Rows(rows) => Some(Columns::of(rows, car, tables)),
             SourceKind::Channels(_) => None,
         }
     }
 
-    pub(in crate::commands) fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
+    /// The next step; `None` after the last.
+    ///
+    /// # Errors
+    /// The log cannot be read.
+    pub fn next_step(&mut self) -> Result<Option<LogStep>, Error> {
         let next = match self.looked_at.pop_front() {
             Some(step) => Some(step),
             None => self.kind.next_step()?,
@@ -161,18 +171,21 @@ impl<'a> CarSource<'a> {
     }
 
     /// Says what was met in the log, after its last step.
-    pub(in crate::commands) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    /// Most samples of a channel could not be used.
+    pub fn finish(&self, say: Notes<'_>) -> Result<(), Error> {
         if !self.on_change.is_empty() {
-            say.note(&sent_on_change(&self.on_change.join(", ")));
+            say(&sent_on_change(&self.on_change.join(", ")));
         }
         match &self.kind {
             SourceKind::Rows(rows) => {
-                rows.check_readings()?.iter().for_each(|note| say.note(&format!("warning: {note}")));
+                rows.check_readings()?.iter().for_each(|note| say(&format!("warning: {note}")));
                 Ok(())
             }
             SourceKind::Channels(channels) => {
                 let gears = channels.check_gears()?;
-                gears.iter().for_each(|note| say.note(&format!("warning: {note}")));
+                gears.iter().for_each(|note| say(&format!("warning: {note}")));
                 report_readings(channels.readings(), &[Role::EngineSpeed, Role::WheelSpeed], say)
             }
         }

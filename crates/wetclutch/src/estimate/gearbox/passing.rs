@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use car::Car;
 
-use super::super::selection::{AFTER_S, BEFORE_S, Selection};
 use super::columns::Row;
-use crate::failure::Failure;
+use crate::Error;
+use crate::estimate::selection::{AFTER_S, BEFORE_S, Selection};
 
 /// The rows of a drive as they pass by.
-pub(super) struct Passing<'a> {
+pub(crate) struct Passing<'a> {
     selection: Selection,
     /// Rows that a shift which is wanted would begin with.
     recent: VecDeque<(f64, Row<'a>)>,
@@ -20,17 +20,17 @@ pub(super) struct Passing<'a> {
 }
 
 impl<'a> Passing<'a> {
-    pub(super) fn new(selection: Selection) -> Self {
+    pub(crate) fn new(selection: Selection) -> Self {
         Self { selection, recent: VecDeque::new(), gears: None, is_wanted: false, until_s: f64::NEG_INFINITY }
     }
 
     /// Takes a row; `write` gets those that are to be written.
-    pub(super) fn push(
+    pub(crate) fn push(
         &mut self,
         time_s: f64,
         row: Row<'a>,
-        mut write: impl FnMut(f64, &Row<'a>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        mut write: impl FnMut(f64, &Row<'a>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         let gears = (row.gears[0] != row.gears[1]).then_some(row.gears);
         if gears != self.gears {
             if self.gears.is_some() && self.is_wanted {
@@ -59,12 +59,12 @@ impl<'a> Passing<'a> {
     }
 
     /// Whether a shift is wanted.
-    pub(super) fn wants(&self, number: usize, car: &Car, pair: [usize; 2]) -> bool {
+    pub(crate) fn wants(&self, number: usize, car: &Car, pair: [usize; 2]) -> bool {
         self.selection.wants(number, &names(car, pair))
     }
 
     /// Refuses a selection that no shift is in.
-    pub(super) fn check(&self) -> Result<(), Failure> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         self.selection.check("`gear` and `target_gear` tell a shift")
     }
 }

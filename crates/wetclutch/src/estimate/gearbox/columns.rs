@@ -8,17 +8,17 @@ use study::any_shift::channels::gear_number;
 use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
 
-use crate::failure::Failure;
+use crate::Error;
 
 /// What a row of the estimate is made from.
 #[derive(Clone, Copy)]
-pub(super) struct Row<'a> {
-    pub(super) car: &'a Car,
-    pub(super) places: &'a [(usize, &'a str)],
-    pub(super) gears: [usize; 2],
-    pub(super) estimate: ShiftEstimate<f64>,
+pub(crate) struct Row<'a> {
+    pub(crate) car: &'a Car,
+    pub(crate) places: &'a [(usize, &'a str)],
+    pub(crate) gears: [usize; 2],
+    pub(crate) estimate: ShiftEstimate<f64>,
     /// Guaranteed ranges of the pressures of the elements, Pa.
-    pub(super) ranges_pa: [Option<[f64; 2]>; MAX_ELEMENTS],
+    pub(crate) ranges_pa: [Option<[f64; 2]>; MAX_ELEMENTS],
 }
 
 /// What the columns of readings say of a row: of channels, of the commands of elements, and which of these are those of the shift.
@@ -26,7 +26,7 @@ type Said = (Channels<ChannelHealth>, [ChannelHealth; MAX_ELEMENTS], Option<[usi
 
 impl<'a> Row<'a> {
     /// What its columns of readings say, which is mostly the same as in the row before.
-    pub(super) fn said(&self) -> Said {
+    pub(crate) fn said(&self) -> Said {
         let ShiftEstimate { channels, commands, clutches, .. } = &self.estimate;
         (*channels, *commands, clutches.map(|clutches| clutches.map(|clutch| clutch.element)))
     }
@@ -114,7 +114,7 @@ const ROLES: [&str; 2] = ["offgoing", "oncoming"];
 
 /// Where the cells of a column come from.
 #[derive(Clone, Copy)]
-pub(super) enum Value {
+pub(crate) enum Value {
     Of(for<'a> fn(&Row<'a>) -> Cell<'a>),
     Clutch(usize, usize),
     /// The number of the gear (0) or the target gear (1).
@@ -130,7 +130,7 @@ pub(super) enum Value {
 }
 
 impl Value {
-    pub(super) fn cell<'a>(self, row: &Row<'a>) -> Cell<'a> {
+    pub(crate) fn cell<'a>(self, row: &Row<'a>) -> Cell<'a> {
         match self {
             Self::Of(value) => value(row),
             Self::Clutch(which, what) => row.clutch_cell(which, what),
@@ -144,27 +144,27 @@ impl Value {
 }
 
 /// How many columns stand before the columns of readings that end a table.
-pub(super) fn before_readings(columns: &[Column]) -> usize {
+pub(crate) fn before_readings(columns: &[Column]) -> usize {
     let is_other = |column: &Column| !matches!(column.value, Value::Reading(_) | Value::Command(_));
     columns.iter().rposition(is_other).map_or(0, |last| last + 1)
 }
 
 /// A column of the estimate.
-pub(super) struct Column {
-    pub(super) name: String,
-    pub(super) kind: ColumnKind,
-    pub(super) value: Value,
+pub(crate) struct Column {
+    pub(crate) name: String,
+    pub(crate) kind: ColumnKind,
+    pub(crate) value: Value,
 }
 
 /// What decides which columns a car has.
 #[derive(Clone, Copy)]
-pub(super) struct Knows {
+pub(crate) struct Knows {
     converter: bool,
     elements: bool,
 }
 
 impl Knows {
-    pub(super) fn of(car: &Car) -> Self {
+    pub(crate) fn of(car: &Car) -> Self {
         Self { converter: car.converter.is_some(), elements: !car.gearbox.has_ratios_alone() }
     }
 }
@@ -178,7 +178,7 @@ fn number(name: impl Into<String>, value: Value) -> Column {
 }
 
 /// The columns of a car whose elements have these places in the filter's tables.
-pub(super) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
+pub(crate) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
     let mut columns = vec![
         word(trace::signal::GEAR, |row| row.gear(0)),
         word(trace::signal::TARGET_GEAR, |row| row.gear(1)),
@@ -244,7 +244,7 @@ fn readings(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
 }
 
 /// Whether the estimate of some car may have a column of this name.
-pub(in crate::commands::estimate) fn is_car_column(name: &str) -> bool {
+pub fn is_car_column(name: &str) -> bool {
     let of_element = |what: &str| {
         let rest = name.strip_suffix(what).and_then(|rest| rest.strip_suffix('_'));
         rest.is_some_and(|rest| rest.starts_with("element_"))
@@ -261,7 +261,7 @@ fn of(value: Option<f64>) -> Cell<'static> {
 }
 
 /// The columns of these names in their order, or all.
-pub(super) fn chosen(mut all: Vec<Column>, names: &[String]) -> Result<Vec<Column>, Failure> {
+pub(crate) fn chosen(mut all: Vec<Column>, names: &[String]) -> Result<Vec<Column>, Error> {
     if names.is_empty() {
         return Ok(all);
     }
@@ -269,7 +269,7 @@ pub(super) fn chosen(mut all: Vec<Column>, names: &[String]) -> Result<Vec<Colum
     for name in names.iter().map(|name| name.trim()).filter(|name| *name != trace::signal::TIME) {
         let Some(at) = all.iter().position(|column| column.name == name) else {
             let known: Vec<&str> = all.iter().map(|column| column.name.as_str()).collect();
-            return Err(Failure::Input(format!(
+            return Err(Error::Input(format!(
                 "--columns: there is no column `{}`, or it is there twice\nhint: the other columns are {}",
                 name.escape_debug(),
                 known.join(", ")

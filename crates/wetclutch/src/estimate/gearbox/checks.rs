@@ -17,14 +17,13 @@ use study::any_shift::car_log::{CarLog, LogStep};
 use study::log::FIRST_LOOK;
 use trace::{ShownPath as _, signal};
 
-use super::super::log_checks::{check_span, check_step};
-use super::super::watched::{WatchedColumn, WatchedColumns};
-use crate::failure::Failure;
-use crate::output;
+use crate::estimate::log_checks::{check_span, check_step};
+use crate::estimate::watched::{WatchedColumn, WatchedColumns};
+use crate::{Error, grouped};
 
 /// The times of the rows of a log.
 #[derive(Default)]
-pub(super) struct RowTimes {
+pub(crate) struct RowTimes {
     /// Between the first rows, s.
     steps_s: Vec<f64>,
     /// Of the first and the last row, s.
@@ -32,7 +31,7 @@ pub(super) struct RowTimes {
 }
 
 impl RowTimes {
-    pub(super) fn push(&mut self, step: &LogStep) {
+    pub(crate) fn push(&mut self, step: &LogStep) {
         if self.steps_s.len() < FIRST_LOOK {
             self.steps_s.push(step.input.dt_s);
         }
@@ -40,7 +39,7 @@ impl RowTimes {
     }
 
     /// The time of the first row, s; zero without one.
-    pub(super) fn first_s(&self) -> f64 {
+    pub(crate) fn first_s(&self) -> f64 {
         self.ends_s.map_or(0.0, |[first_s, _]| first_s)
     }
 
@@ -48,7 +47,7 @@ impl RowTimes {
     ///
     /// # Errors
     /// The time is in another unit by all appearances.
-    pub(super) fn check(self, path: &Path, is_mapped: bool) -> Result<f64, Failure> {
+    pub(crate) fn check(self, path: &Path, is_mapped: bool) -> Result<f64, Error> {
         let median_s = trace::median_step_s(self.steps_s);
         check_step(path, median_s, is_mapped)?;
         check_span(path, median_s, self.ends_s.map_or(f64::NAN, |[first_s, last_s]| last_s - first_s))?;
@@ -57,7 +56,7 @@ impl RowTimes {
 }
 
 /// Why a log is no drive of this car: the filter could use no row in a gear.
-pub(super) fn refused(unusable: Unusable, path: &Path) -> Failure {
+pub(crate) fn refused(unusable: Unusable, path: &Path) -> Error {
     let Unusable { rows, health } = unusable;
     let hint = match health {
         Health::CommandRejected => {
@@ -68,17 +67,17 @@ pub(super) fn refused(unusable: Unusable, path: &Path) -> Failure {
              inspect` shows least and greatest values, and with --shifts whether the ratios fit the gears"
         }
     };
-    Failure::Input(format!(
+    Error::Input(format!(
         "{}: in none of {} rows in a gear, with the car moving, can the estimate be used; most of them have {} (`{}`)\nhint: {hint}",
         path.shown(),
-        output::grouped(rows),
+        grouped(rows),
         health_meaning(health),
         health.name()
     ))
 }
 
 /// The columns of a table of a drive, to tell wrong units and empty columns.
-pub(super) struct Columns {
+pub(crate) struct Columns {
     /// Of the four speeds, the engine torque, each command and then each measured pressure.
     watched: WatchedColumns,
     /// Places of the commands in the filter's tables, and the valve where the column has the pressure that is asked of it.
@@ -90,7 +89,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    pub(super) fn of(log: &CarLog<'_>, car: &Car, tables: &ShiftTables<f64>) -> Self {
+    pub(crate) fn of(log: &CarLog<'_>, car: &Car, tables: &ShiftTables<f64>) -> Self {
         let has_converter = car.converter.is_some();
         let others = [
             // Without it the estimate is the open loop.
@@ -132,7 +131,7 @@ impl Columns {
         Self { watched, places, pressures, is_forward }
     }
 
-    pub(super) fn push(&mut self, step: &LogStep) {
+    pub(crate) fn push(&mut self, step: &LogStep) {
         let input = &step.input;
         let value = |reading: Option<Reading<f64>>| reading.map(|reading| reading.value);
         // Only in a forward gear the sign of these speeds tells whether it is right: in reverse the car goes backwards.
@@ -151,7 +150,7 @@ impl Columns {
     }
 
     /// Refuses a table in which a column that is needed has no value, or whose unit cannot be right.
-    pub(super) fn check(&self) -> Result<(), Failure> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         self.watched.check(Seen::All)
     }
 }

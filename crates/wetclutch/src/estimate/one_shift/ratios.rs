@@ -6,7 +6,7 @@ use evaluate::checks::ratio_histogram::RatioHistogram;
 use evaluate::checks::swapped_speeds::SwappedSpeeds;
 use observer::{Input, Reading};
 
-use crate::failure::Failure;
+use crate::Error;
 
 /// Below this output speed a ratio says nothing, rad/s.
 const OUTPUT_MIN_RAD_S: f64 = 8.0;
@@ -25,7 +25,7 @@ const STEPS: u64 = 200;
 const TIME_S: f64 = 3.0;
 
 /// Ratios of the speeds so far.
-pub(super) struct Ratios {
+pub(crate) struct Ratios {
     gears: [f64; 2],
     final_ratio: f64,
     /// Engine, turbine, output and wheel speed.
@@ -41,7 +41,7 @@ pub(super) struct Ratios {
 }
 
 impl Ratios {
-    pub(super) fn new(vehicle: &Vehicle) -> Self {
+    pub(crate) fn new(vehicle: &Vehicle) -> Self {
         Self {
             gears: [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()],
             final_ratio: vehicle.driveline.final_ratio,
@@ -57,12 +57,12 @@ impl Ratios {
     }
 
     /// What contradicts the channels of the speeds, in a sentence.
-    pub(super) fn contradiction(&self) -> Option<String> {
+    pub(crate) fn contradiction(&self) -> Option<String> {
         self.swapped.contradiction()
     }
 
     /// Takes the speeds of a row; only where it is looked at, they are judged.
-    pub(super) fn push(&mut self, time_s: f64, input: &Input<f64>, is_looked_at: bool) {
+    pub(crate) fn push(&mut self, time_s: f64, input: &Input<f64>, is_looked_at: bool) {
         let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         for (came, reading) in self.came.iter_mut().zip(readings) {
             if let Some(Reading { value, .. }) = reading.filter(|reading| reading.value.is_finite()) {
@@ -87,7 +87,7 @@ impl Ratios {
     ///
     /// # Errors
     /// The car is hardly ever in its gears, or its wheels do not turn with its output.
-    pub(super) fn check(&self) -> Result<(), Failure> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         if self.moving < STEPS || self.moving_s < TIME_S {
             return Ok(());
         }
@@ -97,7 +97,7 @@ impl Ratios {
             // Turbine and wheels fit each other: it is the output that is wrong.
             let (final_ratio, found) = (self.final_ratio, self.output_over_wheel.middle());
             if share(self.in_gear_by_wheel) > MOSTLY && check_wheel(found, final_ratio).is_err() {
-                return Err(Failure::Input(format!(
+                return Err(Error::Input(format!(
                     "output_speed over wheel_speed is {found:.2} in the middle, and the final ratio of the vehicle file is {final_ratio:.2}; \
                      turbine_speed and wheel_speed fit the gears\nhint: output_speed is {:.3} times too large: check its unit and scale",
                     found / final_ratio
@@ -109,7 +109,7 @@ impl Ratios {
                  channel map with `gearbox.ratios` tells them apart"
                     .to_owned()
             });
-            return Err(Failure::Input(format!(
+            return Err(Error::Input(format!(
                 "turbine_speed over output_speed is {:.3} in the middle, and the gears of the vehicle file have {offgoing:.3} and \
                  {oncoming:.3}: the car is in them for {:.0} % of the time\nhint: {hint}",
                 self.turbine_over_output.middle(),
@@ -121,9 +121,9 @@ impl Ratios {
 }
 
 /// Refuses wheels that do not turn with the output: their middle ratio is far from that of the vehicle file.
-pub(super) fn check_wheel(output_over_wheel: f64, final_ratio: f64) -> Result<(), Failure> {
+pub(crate) fn check_wheel(output_over_wheel: f64, final_ratio: f64) -> Result<(), Error> {
     if (output_over_wheel / final_ratio - 1.0).abs() > WHEEL {
-        return Err(Failure::Input(format!(
+        return Err(Error::Input(format!(
             "output_speed over wheel_speed is {output_over_wheel:.2} in the middle, and the final ratio of the vehicle file is {final_ratio:.2}\n\
              hint: check unit and scale of wheel_speed and output_speed, and `driveline.final_ratio`",
         )));

@@ -1,0 +1,70 @@
+//! `wetclutch estimate` of a drive of a car with a gearbox.
+
+use std::path::Path;
+
+use config::CarFile;
+use report::drive_page::{findings, shift_cells, shift_rows, shift_words};
+use trace::{Cell, ShownPath as _};
+use wetclutch::EstimateOptions;
+use wetclutch::estimate::gearbox::{self, DriveEstimates};
+
+use super::learnt::{self, Kept};
+use super::outputs::beside;
+use super::{Messages, SHOWN, Setup, destination, finish, shift_lines};
+use crate::args::Estimate;
+use crate::commands::{JsonObject, write_cells, write_json_list};
+use crate::failure::Failure;
+
+/// Refuses options that have no effect with such a car.
+pub(super) fn check(arguments: &Estimate, file: &CarFile, options: &EstimateOptions) -> Result<(), Failure> {
+    gearbox::Setup::new(file, options)?;
+    let Some(path) = &arguments.learnt else { return Ok(()) };
+    if file.gearbox.has_ratios_alone() {
+        let vehicle = arguments.vehicle.shown();
+        let message = format!("--learnt has no effect with {vehicle}: the ratios alone are known of its gearbox");
+        let hint = "leave it out; what is learnt is of clutches and valves, which such a gearbox file does not have";
+        return Err(Failure::Input(format!("{message}\nhint: {hint}")));
+    }
+    learnt::check(path, file)
+}
+
+/// Estimates a log, and says what was found and where it is.
+pub(super) fn estimate(
+    setup: &Setup<'_>,
+    file: &CarFile,
+    path: &Path,
+    output: Option<&Path>,
+    say: &mut Messages,
+) -> Result<(), Failure> {
+    let learnt_file = setup.arguments.learnt.as_deref();
+    let learnt = learnt_file.map(|path| learnt::read(path, file)).transpose()?.flatten();
+    let options = EstimateOptions { learnt, ..setup.options_for(output) };
+    let prepared = gearbox::Setup::new(file, &options)?;
+    let found = gearbox::estimate(&prepared, setup.log(path), destination(output), &mut |note| say.note(note))?;
+    let places = output.and_then(beside).filter(|_| !found.drive.shifts.is_empty());
+    if let Some([csv, json, _]) = &places {
+        let shifts = found.drive.shifts.iter();
+        let cells: Vec<Vec<(String, Cell<'_>)>> = shifts.map(|shift| shift_cells(shift, file)).collect();
+        write_cells(csv, &cells)?;
+        write_json_list(json, cells.into_iter().map(JsonObject::of))?;
+    }
+    let found = found.with_times_from_origin();
+    report(&found, file, output.is_some(), say)?;
+    found.said_of_sensors().into_iter().for_each(|sentence| say.note(sentence));
+    finish(output, places.as_ref(), || found.page(file, path), say)?;
+    learnt_file.map_or(Ok(()), |path| Kept::of(path, file, &found.learnt).write(say))
+}
+
+/// The shifts as a table, and what was found; `has_file` says whether standard output is free for the table.
+fn report(found: &DriveEstimates, file: &CarFile, has_file: bool, say: &mut Messages) -> Result<(), Failure> {
+    let (titles, mut rows) = shift_rows(&found.drive, file);
+    let more = rows.len().saturating_sub(SHOWN);
+    rows.truncate(SHOWN);
+    let titles: Vec<String> = titles.into_iter().map(str::to_owned).collect();
+    if !rows.is_empty() {
+        say.table(&shift_lines(&titles, &rows, more), has_file)?;
+    }
+    shift_words(&found.drive, file).iter().for_each(|(word, meaning)| say.note(&format!("{word}: {meaning}")));
+    findings(&found.drive).iter().for_each(|sentence| say.note(sentence));
+    Ok(())
+}

@@ -1,0 +1,124 @@
+//! Estimates from a log.
+
+pub mod gearbox;
+pub(crate) mod log_checks;
+pub mod one_shift;
+pub(crate) mod output;
+pub mod selection;
+pub(crate) mod watched;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use car::{GainMethod, ObserverKind, Sensors};
+use logs::ChannelMap;
+use observer::any_shift::Learnt;
+use report::drive_page::shift_cells;
+
+pub use self::log_checks::WITHOUT_SENSORS;
+pub use self::output::Destination;
+pub use self::selection::{GearPair, ShiftChoice};
+use crate::{Error, Notes, Table, VehicleFile};
+
+/// How a log is estimated. The default is the best observer, over the whole log, with all columns.
+#[derive(Debug, Clone, Default)]
+pub struct EstimateOptions {
+    /// The observer, for a vehicle file of one shift; the best for the log if none is given. A car with a gearbox has the gearbox filter.
+    pub observer: Option<ObserverKind>,
+    /// The design method of its gains, of the rigid and the compliant observer.
+    pub method: Option<GainMethod>,
+    /// The sensors that the log was recorded with; without them a reading of a speed counts as one of the time of its row.
+    pub sensors: Option<Sensors>,
+    /// Names of the columns, in their order; all of them if empty. The time is always the first.
+    pub columns: Vec<String>,
+    /// The shifts that are wanted.
+    pub shifts: ShiftChoice,
+    /// What was learnt of a car with a gearbox in earlier logs.
+    pub learnt: Option<Learnt<f64>>,
+    /// Threads that read the log; none counts as one.
+    pub threads: usize,
+    /// Shifts of which every row is kept, for a page.
+    pub with_page: bool,
+    /// For a log that is still being written: set when it is to end.
+    pub follow: Option<Arc<AtomicBool>>,
+}
+
+impl EstimateOptions {
+    pub(crate) fn is_followed(&self) -> bool {
+        self.follow.is_some()
+    }
+}
+
+/// A log and how its channels are mapped to signals.
+#[derive(Debug, Clone, Copy)]
+pub struct LogInput<'a> {
+    /// The file; `-` is standard input.
+    pub path: &'a Path,
+    /// The channel map; an empty one for a table with the names of the program.
+    pub map: &'a ChannelMap,
+}
+
+/// Estimates of a log in memory.
+#[derive(Debug, Clone)]
+pub struct Estimates {
+    /// A row for each row of the log.
+    pub rows: Table,
+    /// A row for each shift.
+    pub shifts: Table,
+    /// What was found in the log, in sentences.
+    pub notes: Vec<String>,
+    /// What was learnt of the car, for the next log; `None` for a vehicle file of one shift, and where nothing was learnt.
+    pub learnt: Option<Learnt<f64>>,
+    /// The page of the drive, as HTML.
+    pub page: Option<String>,
+}
+
+/// Estimates a log into tables in memory.
+///
+/// # Errors
+/// The log cannot be read, is not of this car, or an option does not fit it.
+pub fn estimate(vehicle: &VehicleFile, log: LogInput<'_>, options: &EstimateOptions) -> Result<Estimates, Error> {
+    let mut notes = Vec::new();
+    let mut say = |note: &str| notes.push(note.to_owned());
+    let (rows, shifts, learnt, page) = match vehicle {
+        VehicleFile::Gearbox(file) => {
+            let setup = gearbox::Setup::new(file, options)?;
+            let found = gearbox::estimate(&setup, log, Destination::Memory, &mut say)?;
+            let shifts = Table::of_rows(found.drive.shifts.iter().map(|shift| shift_cells(shift, file)));
+            let found = found.with_times_from_origin();
+            found.sentences().iter().for_each(|sentence| say(sentence));
+            let page = if options.with_page { found.page(file, log.path)? } else { None };
+            (found.rows, shifts, found.learnt.learnt, page)
+        }
+        VehicleFile::OneShift(file) => {
+            let setup = one_shift::Setup::new(file, options)?;
+            let found = one_shift::estimate(&setup, log, Destination::Memory, &mut say)?;
+            let shifts = Table::of_rows(found.shift_cells());
+            let found = found.with_times_from_origin();
+            found.findings.iter().for_each(|sentence| say(sentence));
+            let page = if options.with_page { found.page(file, log.path)? } else { None };
+            (found.rows, shifts, None, page)
+        }
+    };
+    Ok(Estimates { rows: rows.unwrap_or_default(), shifts, notes, learnt, page })
+}
+
+/// From which time on the times of a log are shown, s: times of a clock since 1970 from the first one on.
+pub fn shown_from_s(first_s: f64) -> f64 {
+    const LONGEST_S: f64 = 1e7;
+    if first_s.abs() > LONGEST_S { first_s.floor() } else { 0.0 }
+}
+
+/// Says from where on the times in sentences and on the page count, if not from zero of the log's clock.
+pub(crate) fn said_of_origin(origin_s: f64) -> Option<String> {
+    (origin_s != 0.0)
+        .then(|| format!("times from {origin_s:.0} s of the log's clock on; the tables in files keep that clock"))
+}
+
+/// Says that a log which is followed has ended by itself, where it is a file that may grow.
+pub(crate) fn say_end_of_followed(options: &EstimateOptions, path: &Path, say: Notes<'_>) {
+    if options.follow.as_ref().is_some_and(|stop| !stop.load(Ordering::Relaxed)) && path.is_file() {
+        say("warning: the log became shorter or was replaced by another file: the estimate ends there");
+    }
+}

@@ -1,0 +1,165 @@
+//! Which observer estimates a log.
+
+use car::{GainMethod, ObserverKind, Vehicle};
+use design::{compliant_open_loop_phases, rigid_open_loop_phases};
+use logs::Role;
+use report::tables::phase_name;
+use study::AnyObserver;
+
+use super::measured::Measured;
+use crate::estimate::EstimateOptions;
+use crate::{Error, Notes};
+
+/// An observer for a log.
+pub(crate) struct Chosen {
+    pub(crate) observer: AnyObserver,
+    pub(crate) kind: ObserverKind,
+    /// The observer and how its gains were found, in words.
+    pub(crate) name: String,
+}
+
+/// Refuses options that have no effect together.
+pub(crate) fn check_options(options: &EstimateOptions) -> Result<(), Error> {
+    let designed = matches!(options.observer, Some(ObserverKind::Rigid | ObserverKind::Compliant));
+    if options.method.is_some() && !designed {
+        return Err(Error::Input(
+            "--method has no effect with this observer\n\
+             hint: use it with `--observer rigid` or `--observer compliant`"
+                .to_owned(),
+        ));
+    }
+    if options.learnt.is_some() {
+        return Err(learnt_without_effect());
+    }
+    // Without a wheel speed the best observer is another; that is known when the log is known.
+    if options.sensors.is_some() && options.observer.is_some_and(|kind| !is_filter(kind)) {
+        return Err(sensors_without_effect());
+    }
+    Ok(())
+}
+
+/// Refuses what was learnt with a vehicle file that does not use it.
+pub fn learnt_without_effect() -> Error {
+    Error::Input(
+        "--learnt has no effect with the vehicle file of one shift\n\
+         hint: leave it out; the filter of a car with a gearbox, such as vehicles/eight_speed.toml, keeps what it learns"
+            .to_owned(),
+    )
+}
+
+fn sensors_without_effect() -> Error {
+    Error::Input(
+        "--sensors has no effect with this observer\nhint: use it with `--observer` kalman, extended or unscented"
+            .to_owned(),
+    )
+}
+
+fn is_filter(kind: ObserverKind) -> bool {
+    [ObserverKind::Kalman, ObserverKind::Extended, ObserverKind::Unscented].contains(&kind)
+}
+
+/// Whether it is a valve model alone, which reads no engine speed.
+pub(crate) fn is_open_loop(kind: ObserverKind) -> bool {
+    matches!(kind, ObserverKind::OpenLoop | ObserverKind::OpenLoopMaps)
+}
+
+/// The observer for a log, with what is to be said about it.
+pub(crate) fn choose(
+    options: &EstimateOptions,
+    vehicle: &Vehicle,
+    log: &Measured<'_>,
+    say: Notes<'_>,
+) -> Result<Chosen, Error> {
+    let (has_engine, has_wheel) = (log.has_engine_speed(), log.has_wheel_speed());
+    let (kind, method) = match options.observer {
+        None if !has_engine => (ObserverKind::OpenLoopMaps, GainMethod::Iss),
+        None => best(has_wheel),
+        Some(chosen) => (chosen, options.method.unwrap_or_default()),
+    };
+    if options.observer.is_none() {
+        say(match (has_engine, has_wheel) {
+            (false, _) => {
+                "observer: open-loop-maps, because the log has no engine speed, which all observers need but the open loops"
+            }
+            (true, true) => "observer: kalman, because the log has a wheel speed",
+            (true, false) => {
+                "observer: rigid with peak-to-peak gains, because the log has no wheel_speed_rad_s, which kalman needs"
+            }
+        });
+    }
+    if options.sensors.is_some() && !is_filter(kind) {
+        return Err(match options.observer {
+            None if !has_engine => Error::Input(
+                "the log has no engine speed: the best observer is then open-loop-maps, which does not use --sensors\n\
+                 hint: leave --sensors out, or give the log an engine_speed_rad_s (in a channel map: engine_speed)"
+                    .to_owned(),
+            ),
+            None => Error::Input(
+                "the log has no wheel speed: the best observer is then rigid, which does not use --sensors\n\
+                 hint: leave --sensors out, or give the log a wheel_speed_rad_s (in a channel map: wheel_speed), with which it is kalman"
+                    .to_owned(),
+            ),
+            _ => sensors_without_effect(),
+        });
+    }
+    if is_filter(kind) || [ObserverKind::Compliant, ObserverKind::Inversion].contains(&kind) {
+        log.require(Role::WheelSpeed)?;
+    }
+    if !is_open_loop(kind) {
+        log.require(Role::EngineSpeed)?;
+    }
+    let step_s = log.median_step_s();
+    let (observer, missed) = AnyObserver::best(vehicle, kind, method, step_s, options.sensors.as_ref())?;
+    for missed in &missed {
+        say(&format!("warning: continuing with the best certified gain\n{missed}"));
+    }
+    if step_s > observer.sample_max_s() && !is_open_loop(kind) {
+        say(&format!(
+            "the sample time is {:.0} ms, and this observer corrects over at most {:.0} ms: using the open loop\n\
+             hint: `--observer rigid --method peak-to-peak` designs gains for the sample time of the log",
+            1e3 * step_s,
+            1e3 * observer.sample_max_s(),
+        ));
+    }
+    open_loop_phases(vehicle, (&observer, kind, method), step_s).iter().for_each(|line| say(line));
+    Ok(Chosen { observer, kind, name: name_of(kind, method) })
+}
+
+/// The phases in which the observer is the open loop, each with the reason.
+fn open_loop_phases(
+    vehicle: &Vehicle,
+    (observer, kind, method): (&AnyObserver, ObserverKind, GainMethod),
+    step_s: f64,
+) -> Vec<String> {
+    let phases = match observer {
+        AnyObserver::Rigid(rigid) if kind == ObserverKind::Rigid => {
+            rigid_open_loop_phases(vehicle, &rigid.gains, step_s)
+        }
+        AnyObserver::Compliant(compliant) => compliant_open_loop_phases(vehicle, &compliant.gains, step_s),
+        _ => Vec::new(),
+    };
+    let why = match method {
+        GainMethod::Iss => "the valve alone has the required decay",
+        _ => "no gain reduces the bound",
+    };
+    phases.into_iter().map(|phase| format!("{}: the gain is the open loop: {why}", phase_name(phase))).collect()
+}
+
+/// The observer for a log, if the user names none.
+pub fn best(has_wheel_speed: bool) -> (ObserverKind, GainMethod) {
+    if has_wheel_speed {
+        (ObserverKind::Kalman, GainMethod::Iss)
+    } else {
+        (ObserverKind::Rigid, GainMethod::PeakToPeak)
+    }
+}
+
+/// An observer and how its gains were found.
+fn name_of(kind: ObserverKind, method: GainMethod) -> String {
+    match kind {
+        ObserverKind::Rigid | ObserverKind::Compliant => {
+            format!("{}, gains by the method {}", kind.name(), method.name())
+        }
+        _ => kind.name().to_owned(),
+    }
+}

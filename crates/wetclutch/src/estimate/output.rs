@@ -1,0 +1,100 @@
+//! Where estimates are written: a file, standard output, or a table in memory.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use trace::{Cell, ColumnKind, CsvWriter, TableWriter};
+
+use crate::{Error, Table};
+
+/// Where estimates go.
+#[derive(Debug, Clone, Copy)]
+pub enum Destination<'p> {
+    /// A file, in the format of its name: CSV, Parquet or MDF. It appears whole or not at all.
+    File(&'p Path),
+    /// Standard output, as CSV.
+    Standard,
+    /// A [`Table`].
+    Memory,
+}
+
+impl<'p> Destination<'p> {
+    /// The file, if it is one.
+    pub fn file(self) -> Option<&'p Path> {
+        if let Self::File(path) = self { Some(path) } else { None }
+    }
+}
+
+/// The table of the estimates.
+pub(crate) enum Output {
+    File(TableWriter, PathBuf),
+    Standard(Box<CsvWriter<BufWriter<io::Stdout>>>),
+    Memory(Table),
+}
+
+impl Output {
+    /// Begins a table with these columns.
+    pub(crate) fn named<'a>(
+        destination: Destination<'_>,
+        named: impl Iterator<Item = (&'a str, ColumnKind)>,
+    ) -> Result<Self, Error> {
+        match destination {
+            Destination::Memory => Ok(Self::Memory(Table::with_columns(named))),
+            Destination::File(path) => {
+                let writer = TableWriter::create(path, named).map_err(|error| Error::writing(path, &error))?;
+                Ok(Self::File(writer, path.to_owned()))
+            }
+            Destination::Standard => {
+                let names = named.map(|(name, _)| name);
+                Ok(Self::Standard(Box::new(CsvWriter::new(BufWriter::new(io::stdout()), names)?)))
+            }
+        }
+    }
+
+    pub(crate) fn cells<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> Result<(), Error> {
+        match self {
+            Self::File(writer, path) => writer.row(time_s, cells).map_err(|error| Error::writing(path, &error)),
+            Self::Standard(writer) => Ok(writer.row(time_s, cells)?),
+            Self::Memory(table) => {
+                table.push(time_s, cells);
+                Ok(())
+            }
+        }
+    }
+
+    /// Writes a row of numbers, and behind them the words of the row before.
+    pub(crate) fn numbers(&mut self, time_s: f64, numbers: &[f64]) -> Result<(), Error> {
+        match self {
+            Self::File(writer, path) => writer.numbers(time_s, numbers).map_err(|error| Error::writing(path, &error)),
+            Self::Standard(writer) => Ok(writer.numbers(time_s, numbers)?),
+            Self::Memory(table) => {
+                table.push_numbers(time_s, numbers);
+                Ok(())
+            }
+        }
+    }
+
+    /// Hands the rows so far to their reader.
+    pub(crate) fn flush(&mut self) -> Result<(), Error> {
+        match self {
+            Self::File(writer, path) => writer.flush().map_err(|error| Error::writing(path, &error)),
+            Self::Standard(writer) => Ok(writer.flush()?),
+            Self::Memory(_) => Ok(()),
+        }
+    }
+
+    /// Completes the table, and returns it if it is in memory.
+    pub(crate) fn finish(self) -> Result<Option<Table>, Error> {
+        match self {
+            Self::File(writer, path) => {
+                writer.finish().map_err(|error| Error::writing(&path, &error))?;
+                Ok(None)
+            }
+            Self::Standard(writer) => {
+                writer.finish()?.flush()?;
+                Ok(None)
+            }
+            Self::Memory(table) => Ok(Some(table)),
+        }
+    }
+}

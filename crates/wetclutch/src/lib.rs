@@ -1,0 +1,23 @@
+//! A virtual pressure sensor for the wet clutches of automatic transmissions.
+//!
+//! Everything that the command `wetclutch` does is a function here: [`estimate()`] pressures and torques from a log.
+//! Quantities are in SI units, and names end in their unit.
+//!
+//! **Architecture invariant:** nothing here prints or parses arguments. What is to be said to a user goes to a [`Notes`] as it comes.
+
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
+mod error;
+pub mod estimate;
+mod table;
+mod text;
+mod vehicle;
+
+pub use error::Error;
+pub use estimate::{Destination, EstimateOptions, Estimates, LogInput, estimate};
+pub use table::{Column, Table, Values, Words};
+pub use text::grouped;
+pub use vehicle::{VehicleFile, read_sensors};
+
+/// Takes a sentence for the user as it comes. It may have several lines; one that begins with `hint: ` says what to do.
+pub type Notes<'a> = &'a mut dyn FnMut(&str);

@@ -1,0 +1,105 @@
+//! A table in memory as the text of a log, made while it is read.
+
+use std::cell::RefCell;
+use std::io::{self, Read, Write};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use trace::{Cell, CsvWriter};
+
+use crate::{Table, Values};
+
+/// Rows that are made at a time.
+const ROWS: usize = 256;
+
+/// The text of a table, a piece at a time.
+pub(crate) struct TableText {
+    table: Arc<Table>,
+    writer: CsvWriter<Piece>,
+    piece: Piece,
+    /// The next row.
+    row: usize,
+    /// How much of the piece has been read.
+    read: usize,
+}
+
+/// What was written and not read yet.
+#[derive(Clone, Default)]
+struct Piece(Rc<RefCell<Vec<u8>>>);
+
+impl Write for Piece {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.borrow_mut().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl TableText {
+    pub(crate) fn new(table: Arc<Table>) -> io::Result<Self> {
+        let piece = Piece::default();
+        let writer = CsvWriter::without_time(piece.clone(), table.columns.iter().map(|column| column.name.as_str()))?;
+        Ok(Self { table, writer, piece, row: 0, read: 0 })
+    }
+
+    fn write_rows(&mut self) -> io::Result<()> {
+        let end = self.table.len().min(self.row + ROWS);
+        for row in self.row..end {
+            let cells = self.table.columns.iter().map(|column| match &column.values {
+                Values::Numbers(numbers) => Cell::Number(numbers.get(row).copied().unwrap_or(f64::NAN)),
+                Values::Words(words) => Cell::Word(words.get(row).unwrap_or_default()),
+            });
+            self.writer.cells(cells)?;
+        }
+        self.row = end;
+        self.writer.flush()
+    }
+}
+
+impl Read for TableText {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.read == self.piece.0.borrow().len() {
+            self.piece.0.borrow_mut().clear();
+            self.read = 0;
+            self.write_rows()?;
+        }
+        let piece = self.piece.0.borrow();
+        let rest = &piece[self.read..];
+        let count = rest.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&rest[..count]);
+        self.read += count;
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Column, Words};
+
+    #[test]
+    fn the_text_of_a_table_has_every_row_and_its_numbers_exactly() {
+        let numbers: Vec<f64> = (0..1000).map(|row| 1.0 / f64::from(row)).collect();
+        let words = ["1", "", "a, \"b\""].into_iter().cycle().take(1000);
+        let table = Table {
+            columns: vec![
+                Column { name: "turbine_speed_rad_s".to_owned(), values: Values::Numbers(numbers.clone()) },
+                Column { name: "gear".to_owned(), values: Values::Words(words.collect::<Words>()) },
+            ],
+        };
+        let mut text = String::new();
+        TableText::new(Arc::new(table)).unwrap().read_to_string(&mut text).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 1001);
+        assert_eq!(lines[0], "turbine_speed_rad_s,gear");
+        // Infinity is no number of a log.
+        assert!(lines[1].starts_with(','), "{}", lines[1]);
+        for (line, number) in lines[2..].iter().zip(&numbers[1..]) {
+            assert_eq!(line.split(',').next().unwrap().parse::<f64>().unwrap().to_bits(), number.to_bits());
+        }
+        assert!(lines[3].ends_with(",\"a, \"\"b\"\"\""), "{}", lines[3]);
+    }
+}
