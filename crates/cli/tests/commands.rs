@@ -356,12 +356,12 @@ fn without_settings(line: &str) -> String {
 fn the_reproduction_in_the_documentation_is_what_the_program_writes() {
     let folder = Folder::new("stale");
     wetclutch(&["reproduce", "-o", &folder.path("a"), "--settings", "1"]);
-    let committed = read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reproduction.md"));
+    let committed = read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/reproduction.md"));
     let lines = |text: &str| text.lines().map(without_settings).collect::<Vec<_>>();
     assert_eq!(
         lines(&read(folder.path("a/reproduction.md"))),
         lines(&committed),
-        "docs/reproduction.md is stale: run `cargo run --release -- reproduce` and copy reproduction.md there"
+        "docs/reference/reproduction.md is stale: run `cargo run --release -- reproduce` and copy reproduction.md there"
     );
 }
 

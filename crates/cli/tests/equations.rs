@@ -1,4 +1,4 @@
-//! `docs/equations.md` against the code, both ways.
+//! `docs/reference/equations.md` against the code, both ways.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -61,7 +61,7 @@ fn file_and_word(cell: &str) -> (String, String) {
 }
 
 fn rows() -> Vec<[String; 4]> {
-    let page = fs::read_to_string(root().join("docs/equations.md")).unwrap();
+    let page = fs::read_to_string(root().join("docs/reference/equations.md")).unwrap();
     (page.lines())
         .filter(|line| line.starts_with("| (2."))
         .map(|line| {

@@ -1,4 +1,4 @@
-//! The commands of `docs/fit.md` and `docs/guide.md`, from a log to an estimate with a fitted file, as they stand there.
+//! The commands of `docs/tutorial/3-your-own-log.md` and `docs/how-to/fit.md`, from a log to an estimate with a fitted file, as they stand there.
 
 use std::path::Path;
 use std::process::Command;

@@ -167,7 +167,7 @@ fn teeth_that_are_unusual_are_warned_of_with_their_line() {
 
 #[test]
 fn the_examples_of_the_documentation_are_gearbox_files() {
-    let page = include_str!("../../../docs/gearboxes.md");
+    let page = include_str!("../../../docs/reference/gearbox-file.md");
     let examples: Vec<&str> = page.split("```toml").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
     assert_eq!(examples.len(), 2);
     let gearboxes =

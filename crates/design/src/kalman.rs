@@ -45,7 +45,7 @@ fn share(error: f64, weighed_at: f64) -> f64 {
 ///
 /// A bound of the budget counts as the edge of a uniform distribution.
 ///
-/// With its guaranteed ranges, in single precision, for a controller (`docs/controller.md`):
+/// With its guaranteed ranges, in single precision, for a controller (`docs/how-to/put-on-a-controller.md`):
 ///
 /// ```
 /// # use observer::{Estimator, Input, Reading};

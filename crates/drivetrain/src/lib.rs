@@ -6,7 +6,7 @@
 //!
 //! Units are SI and part of each name (`_pa`, `_n_m`, `_rad_s`, `_kg_m2`, `_s`, `_a`, `_rad`).
 //! Slip is input side minus output side; a positive clutch torque drives the output side; pressures
-//! are gauge. `docs/conventions.md` states the signs once for the whole project.
+//! are gauge. `docs/reference/conventions.md` states the signs once for the whole project.
 #![no_std]
 
 pub mod clutch;

@@ -52,7 +52,7 @@ pub(crate) fn commands(page: &mut String) -> Figure {
     page.push_str(
         "\n## Estimates of logs\n\n`wetclutch estimate` of a log of a million rows in CSV, the same 3.3 s with a shift again and again, with the guaranteed range, shifts and page: read, \
          estimated, written. A core is kept busy; by the clock the disk is waited for besides, which gets 200 MB of CSV.\n\n\
-         ![Rows per second and core of each observer](figures/estimates.svg)\n\n| observer | output | rows per second and core | by the clock |\n|---|---|---|---|\n",
+         ![Rows per second and core of each observer](../figures/estimates.svg)\n\n| observer | output | rows per second and core | by the clock |\n|---|---|---|---|\n",
     );
     let mut bars = Vec::new();
     let run = |(observer, _, columns, ending)| estimate(&program, &log, observer, columns, ending);

@@ -1,4 +1,4 @@
-//! Everything that has to be fast, measured beside its rivals in one run, as the page `docs/performance.md`.
+//! Everything that has to be fast, measured beside its rivals in one run, as the page `docs/reference/performance.md`.
 //!
 //! `cargo bench -p study --bench performance` prints the page; `cargo bench -p study --bench performance -- --write` writes it with
 //! its figures. That takes about five minutes. Times are the fastest of many runs. CVODE is a rival where `cc` has SUNDIALS, SciPy
@@ -37,7 +37,7 @@ fn main() -> ExitCode {
     }
     let (page, figures) = page();
     if arguments.iter().any(|argument| argument == "--write") {
-        std::fs::write(root().join("docs/performance.md"), &page).unwrap();
+        std::fs::write(root().join("docs/reference/performance.md"), &page).unwrap();
         for (name, svg) in figures {
             std::fs::write(root().join("docs/figures").join(name), svg).unwrap();
         }

@@ -54,7 +54,7 @@ pub(crate) fn steps(page: &mut String) -> Figure {
     let times = fastest(2 * LONG, &mut jobs);
     page.push_str(
         "\n## One step of an observer, f64\n\nMean over the steps of a simulated shift of `experiments/bench.toml` at 100 Hz, through its sensors, from 1.2 s before the \
-         request.\n\n![Time of a step of each observer](figures/steps.svg)\n\n\
+         request.\n\n![Time of a step of each observer](../figures/steps.svg)\n\n\
          | observer | by itself | with the guaranteed ranges of pressure and torque | with the expected range of the shaft torque too |\n\
          |---|---|---|---|\n",
     );

@@ -49,7 +49,7 @@ pub(crate) fn of_a_run(page: &mut String, campaign: &Campaign) -> Figure {
     let _ = write!(
         page,
         "\n### Stages of a run\n\nObservers: {}. Each stage by itself, over {RUNS} runs.\n\n\
-         ![Time of each stage of a run](figures/stages.svg)\n\n| stage | time per run | share |\n|---|---|---|\n",
+         ![Time of each stage of a run](../figures/stages.svg)\n\n| stage | time per run | share |\n|---|---|---|\n",
         campaign.layout.observers.join(", ")
     );
     for (name, seconds) in STAGES.iter().zip(best) {

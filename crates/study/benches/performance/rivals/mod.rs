@@ -175,7 +175,7 @@ pub(crate) fn integrators(page: &mut String) -> Figure {
     page.push_str(
         "\n## The integrator compared with others\n\nTwo seconds in first gear on the same equations, without recording. Error: largest relative \
          error of a state at the\nend. Each method is run at several tolerances, that of fixed step with several steps; the table has the \
-         shortest time with an error of at\nmost 1e-4.\n\n![Time over error of each method](figures/work_precision.svg)\n\n\
+         shortest time with an error of at\nmost 1e-4.\n\n![Time over error of each method](../figures/work_precision.svg)\n\n\
          | integrator | constant inputs | relative to wetclutch | inputs that change every 10 ms | relative |\n|---|---|---|---|---|\n",
     );
     let at = |panel: usize, method: usize| time_at(&panels[panel].curves[method].points, EQUAL_ERROR);
