@@ -31,6 +31,20 @@ pub enum ObserverKind {
 }
 
 impl ObserverKind {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::OpenLoop,
+        Self::OpenLoopMaps,
+        Self::Rigid,
+        Self::Compliant,
+        Self::Sliding,
+        Self::Kalman,
+        Self::Extended,
+        Self::Unscented,
+        Self::SuperTwisting,
+        Self::Inversion,
+    ];
+
     /// Its name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {

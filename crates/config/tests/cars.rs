@@ -182,8 +182,7 @@ fn a_first_file_of_every_shipped_gearbox_is_short_and_a_car_of_its_numbers() {
                 .collect();
             let given = CarFile::from_sources(Source::built_in("car.toml", &given), gearbox.clone()).unwrap();
             assert!(given.defaults_taken.len() + 10 < made.defaults_taken.len());
-            let source = (made.source.clone(), made.defaults_taken.clone());
-            assert_eq!(CarFile { source: source.0, defaults_taken: source.1, ..given }, made, "{name}");
+            assert_eq!(given.car, made.car, "{name}");
             // Pistons are as large as the engine is strong, and touch at the same pressure.
             let shipped = CarFile::from_sources(
                 Source::built_in("car.toml", "name = \"x\"\ngearbox = \"g.toml\"\n"),

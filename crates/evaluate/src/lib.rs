@@ -37,9 +37,9 @@ pub const SAMPLE_S: f64 = 0.01;
 /// Torque below which a clutch carries nothing but drag, N m.
 pub(crate) const CARRIES_N_M: f64 = 2.0;
 /// Pressure that counts as outside its range only beyond rounding, Pa.
-pub(crate) const ROUNDING_PA: f64 = 1.0;
+pub const ROUNDING_PA: f64 = 1.0;
 /// Drag of an open clutch, which the range leaves out, N m.
-pub(crate) const DRAG_N_M: f64 = 1.2;
+pub const DRAG_N_M: f64 = 1.2;
 
 /// Why a shift could not be scored.
 #[derive(Debug, Error)]

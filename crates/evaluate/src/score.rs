@@ -239,7 +239,7 @@ pub fn score_from(
 }
 
 /// Whether a value lies in a range up to a tolerance; what is not known lies in it.
-pub(crate) fn within(range: Option<[f64; 2]>, value: f64, tolerance: f64) -> bool {
+pub fn within(range: Option<[f64; 2]>, value: f64, tolerance: f64) -> bool {
     value.is_nan() || range.is_none_or(|[low, high]| low - tolerance <= value && value <= high + tolerance)
 }
 

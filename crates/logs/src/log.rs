@@ -95,6 +95,14 @@ impl Log {
         Self::of(path, options, Box::new(reader), true)
     }
 
+    /// Opens a log whose text is read from elsewhere than from a file; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    pub fn of_text(path: &Path, options: &OpenOptions, text: Box<dyn Read>) -> Result<Self, LogError> {
+        Self::of(path, options, text, false)
+    }
+
     fn of(path: &Path, options: &OpenOptions, reader: Box<dyn Read>, is_followed: bool) -> Result<Self, LogError> {
         let (head, reader) = beginning(path, reader)?;
         let database = options.dbc.as_deref().map(Database::read).transpose()?;

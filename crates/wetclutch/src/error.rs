@@ -57,6 +57,11 @@ impl Error {
         is_key.then(|| key.to_owned())
     }
 
+    /// Of work that was ended from outside.
+    pub(crate) fn interrupted() -> Self {
+        Self::Work("interrupted".to_owned())
+    }
+
     /// A file that could not be written.
     pub fn writing(path: &Path, error: &io::Error) -> Self {
         let mut message = format!("{}: {error}", path.shown());

@@ -9,15 +9,21 @@
 
 mod error;
 pub mod estimate;
+mod score;
+pub mod simulate;
 mod table;
+mod table_text;
 mod text;
 mod vehicle;
 
+pub use car::{Car, Drive, ErrorBudget, Sensors};
 pub use error::Error;
 pub use estimate::{Destination, EstimateOptions, Estimates, LogInput, estimate};
+pub use score::{PhaseScore, Scores, score};
+pub use simulate::{Simulation, simulate};
 pub use table::{Column, Table, Values, Words};
 pub use text::grouped;
-pub use vehicle::{VehicleFile, read_sensors};
+pub use vehicle::{TemplateNumbers, VehicleFile, gearboxes, method_named, observer_named, read_drive, read_sensors};
 
 /// Takes a sentence for the user as it comes. It may have several lines; one that begins with `hint: ` says what to do.
 pub type Notes<'a> = &'a mut dyn FnMut(&str);

@@ -71,6 +71,14 @@ impl Words {
     }
 }
 
+impl<'a> FromIterator<&'a str> for Words {
+    fn from_iter<I: IntoIterator<Item = &'a str>>(words: I) -> Self {
+        let mut all = Self::default();
+        words.into_iter().for_each(|word| all.push(word));
+        all
+    }
+}
+
 impl Column {
     /// The unit of its values by its name, such as `Pa`; `None` without one.
     pub fn unit(&self) -> Option<&'static str> {

@@ -45,6 +45,8 @@ pub struct CarFile {
     pub car: Car,
     /// The vehicle file.
     pub source: Source,
+    /// The gearbox file that it names.
+    pub gearbox_source: Source,
     /// What the file leaves out, so that it is as in `vehicles/eight_speed.toml`, scaled if the file has `engine.max_torque_n_m`.
     pub defaults_taken: Vec<DefaultTaken>,
 }
@@ -96,13 +98,14 @@ impl CarFile {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_sources(source: Source, gearbox: Source) -> Result<Self, ConfigError> {
-        let gearbox = GearboxFile::from_source(gearbox)?.gearbox;
-        let defaults = car_defaults(&source, Source::built_in(DEFAULTS.0, DEFAULTS.1), &gearbox)?;
+        let gearbox = GearboxFile::from_source(gearbox)?;
+        let defaults = car_defaults(&source, Source::built_in(DEFAULTS.0, DEFAULTS.1), &gearbox.gearbox)?;
         Self::over(&defaults, source.clone(), gearbox).map_err(|error| of_default(error, &defaults, &source))
     }
 
     /// The car of a file over these defaults.
-    fn over(defaults: &Source, source: Source, mut gearbox: Gearbox) -> Result<Self, ConfigError> {
+    fn over(defaults: &Source, source: Source, gearbox: GearboxFile) -> Result<Self, ConfigError> {
+        let GearboxFile { source: gearbox_source, mut gearbox, .. } = gearbox;
         let raw: RawCar = Layers { source: defaults, over: Some(&source) }
             .parse()
             .map_err(|error| incomplete_table(&source).unwrap_or(error))?;
@@ -143,7 +146,7 @@ impl CarFile {
             oil_temperature_degc,
         };
         let defaults_taken = car_defaults_taken(&source, defaults, matches!(raw.launch, RawLaunch::Converter))?;
-        Ok(Self { car, source, defaults_taken })
+        Ok(Self { car, source, gearbox_source, defaults_taken })
     }
 }
 

@@ -7,19 +7,23 @@ pub(crate) mod output;
 pub mod selection;
 pub(crate) mod watched;
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 
 use car::{GainMethod, ObserverKind, Sensors};
-use logs::ChannelMap;
+use logs::{ChannelMap, Log, LogError};
 use observer::any_shift::Learnt;
 use report::drive_page::shift_cells;
 
 pub use self::log_checks::WITHOUT_SENSORS;
 pub use self::output::Destination;
 pub use self::selection::{GearPair, ShiftChoice};
+use crate::table_text::TableText;
 use crate::{Error, Notes, Table, VehicleFile};
+use trace::Following;
 
 /// How a log is estimated. The default is the best observer, over the whole log, with all columns.
 #[derive(Debug, Clone, Default)]
@@ -40,6 +44,8 @@ pub struct EstimateOptions {
     pub threads: usize,
     /// Shifts of which every row is kept, for a page.
     pub with_page: bool,
+    /// Set when the estimate is to end with an error, before the end of the log.
+    pub interrupt: Option<Arc<AtomicBool>>,
     /// For a log that is still being written: set when it is to end.
     pub follow: Option<Arc<AtomicBool>>,
 }
@@ -48,15 +54,67 @@ impl EstimateOptions {
     pub(crate) fn is_followed(&self) -> bool {
         self.follow.is_some()
     }
+
+    /// Ends the estimate if it is to end.
+    pub(crate) fn check_interrupt(&self) -> Result<(), Error> {
+        match &self.interrupt {
+            Some(flag) if flag.load(Ordering::Relaxed) => Err(Error::interrupted()),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A log and how its channels are mapped to signals.
 #[derive(Debug, Clone, Copy)]
 pub struct LogInput<'a> {
-    /// The file; `-` is standard input.
+    /// The file; `-` is standard input. For a table in memory, what messages call it.
     pub path: &'a Path,
+    /// The table, if the log is one in memory.
+    pub table: Option<&'a Arc<Table>>,
     /// The channel map; an empty one for a table with the names of the program.
     pub map: &'a ChannelMap,
+}
+
+impl<'a> LogInput<'a> {
+    /// A table in memory, with the names of the program; messages call it so.
+    pub fn of_table(name: &'a str, table: &'a Arc<Table>) -> Self {
+        static NO_MAP: LazyLock<ChannelMap> = LazyLock::new(ChannelMap::default);
+        Self { path: Path::new(name), table: Some(table), map: &NO_MAP }
+    }
+}
+
+impl LogInput<'_> {
+    /// The text of the table in memory, if it is one.
+    pub(crate) fn text(&self) -> Result<Option<Box<dyn Read>>, Error> {
+        let Some(table) = self.table else { return Ok(None) };
+        let text = TableText::new(Arc::clone(table)).map_err(|error| Error::Work(error.to_string()))?;
+        Ok(Some(Box::new(text)))
+    }
+
+    /// Whether its text comes from a pipe or from memory, and not from a file.
+    pub(crate) fn is_stream(&self) -> bool {
+        self.table.is_some() || self.path == Path::new("-")
+    }
+
+    /// Opens its text.
+    pub(crate) fn reader(&self, stop: Option<&Arc<AtomicBool>>) -> Result<Box<dyn Read>, Error> {
+        let opening = |source| LogError::Io { path: self.path.to_owned(), source };
+        Ok(match (self.text()?, stop) {
+            (Some(text), _) => text,
+            (None, Some(stop)) => Box::new(Following::open(self.path, Arc::clone(stop)).map_err(opening)?),
+            (None, None) if self.is_stream() => Box::new(io::stdin()),
+            (None, None) => Box::new(File::open(self.path).map_err(opening)?),
+        })
+    }
+
+    /// Opens its channels.
+    pub(crate) fn open(&self, stop: Option<&Arc<AtomicBool>>, threads: usize) -> Result<Log, Error> {
+        Ok(match (self.text()?, stop) {
+            (Some(text), _) => Log::of_text(self.path, &self.map.open, text)?,
+            (None, Some(stop)) => Log::follow(self.path, &self.map.open, Arc::clone(stop))?,
+            (None, None) => Log::open(self.path, &self.map.open)?.on_threads(threads.max(1)),
+        })
+    }
 }
 
 /// Estimates of a log in memory.

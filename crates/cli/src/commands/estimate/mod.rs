@@ -39,7 +39,7 @@ struct Setup<'a> {
 
 impl Setup<'_> {
     fn log<'l>(&'l self, path: &'l Path) -> LogInput<'l> {
-        LogInput { path, map: &self.map }
+        LogInput { path, table: None, map: &self.map }
     }
 
     /// How a log is estimated whose estimates go there.
@@ -193,6 +193,7 @@ fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
         learnt: None,
         threads: arguments.threads_of_log(),
         with_page: false,
+        interrupt: None,
         follow: stop(arguments)?,
     };
     let vehicle = VehicleFile::read(&arguments.vehicle)?;

@@ -11,6 +11,7 @@ use logs::ChannelMap;
 use observer::ShiftTables;
 use study::any_shift::logged::LoggedDrive;
 use trace::ShownPath as _;
+use wetclutch::estimate::LogInput;
 use wetclutch::estimate::gearbox::check_ratios;
 use wetclutch::estimate::gearbox::source::{CarReading, CarSource};
 use wetclutch::read_sensors as sensors;
@@ -107,10 +108,11 @@ fn record_one(
     bar: &ProgressBar,
 ) -> Result<Recorded, Failure> {
     let mut opened = None;
-    let mut steps =
-        CarSource::open(CarReading { car, tables, map, stop: None, threads: 1 }, log, &mut opened, &mut |note| {
-            output::note(note)
-        })?;
+    let mut steps = CarSource::open(
+        CarReading { car, tables, log: LogInput { path: log, table: None, map }, stop: None, threads: 1 },
+        &mut opened,
+        &mut |note| output::note(note),
+    )?;
     let mut count = 0_u64;
     while let Some(step) = steps.next_step()? {
         recorder.push_reported(step.reported_n_m);

@@ -123,9 +123,8 @@ pub fn estimate(
     let Setup { file, options, tables } = setup;
     let (car, path) = (&file.car, log.path);
     let mut opened = None;
-    let reading =
-        CarReading { car, tables, map: log.map, stop: options.follow.as_ref(), threads: options.threads.max(1) };
-    let mut source = CarSource::open(reading, path, &mut opened, say)?;
+    let reading = CarReading { car, tables, log, stop: options.follow.as_ref(), threads: options.threads };
+    let mut source = CarSource::open(reading, &mut opened, say)?;
     let mut drive = LoggedDrive::new(car, tables, options.sensors.as_ref(), options.learnt.as_ref());
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();
@@ -141,6 +140,7 @@ pub fn estimate(
     // Without a page no shift is drawn.
     let most_drawn = if options.with_page { MOST_DRAWN } else { 0 };
     while let Some(step) = source.next_step()? {
+        options.check_interrupt()?;
         times.push(&step);
         if let Some(checks) = &mut checks {
             checks.push(&step);

@@ -1,22 +1,20 @@
 //! Where the steps of a drive come from: a table with the names of the program, or mapped channels.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{self, Read};
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use car::Car;
-use logs::{ChannelMap, Log, LogError, OnChange, Role};
+use logs::{Log, OnChange, Role};
 use observer::ShiftTables;
 use observer::any_shift::MAX_ELEMENTS;
 use study::any_shift::car_log::{CarLog, LogStep};
 use study::any_shift::channels::{CarChannels, own_map};
 use study::log::FIRST_LOOK;
-use trace::{CsvRows, Following, ShownPath as _};
+use trace::{CsvRows, ShownPath as _};
 
 use super::checks::Columns;
+use crate::estimate::LogInput;
 use crate::estimate::log_checks::{other_delimiter, report_readings, sent_on_change, warn_of_dbc};
 use crate::{Error, Notes};
 
@@ -27,8 +25,8 @@ pub struct CarReading<'a> {
     pub car: &'a Car,
     /// The tables of its filter.
     pub tables: &'a ShiftTables<f64>,
-    /// The channel map.
-    pub map: &'a ChannelMap,
+    /// The log.
+    pub log: LogInput<'a>,
     /// Set when a log that is followed is to end; none for one that is not followed.
     pub stop: Option<&'a Arc<AtomicBool>>,
     /// How many threads read it.
@@ -65,32 +63,17 @@ impl<'a> CarSource<'a> {
     ///
     /// # Errors
     /// It cannot be read, or has not the channels that an estimate needs.
-    pub fn open(
-        reading: CarReading<'a>,
-        path: &Path,
-        opened: &'a mut Option<Log>,
-        say: Notes<'_>,
-    ) -> Result<Self, Error> {
-        let CarReading { car, tables, map, stop, threads } = reading;
+    pub fn open(reading: CarReading<'a>, opened: &'a mut Option<Log>, say: Notes<'_>) -> Result<Self, Error> {
+        let CarReading { car, tables, log, stop, threads } = reading;
+        let LogInput { path, map, .. } = log;
         let is_followed = stop.is_some();
-        let stop = stop.map(Arc::clone);
-        let is_pipe = path == Path::new("-");
-        if map.channels.is_empty() && (is_pipe || !logs::needs_map(path)?) {
+        if map.channels.is_empty() && (log.is_stream() || !logs::needs_map(path)?) {
             warn_of_dbc(map, say);
-            let opening = |source| LogError::Io { path: path.to_owned(), source };
-            let input: Box<dyn Read> = match stop {
-                Some(stop) => Box::new(Following::open(path, stop).map_err(opening)?),
-                None if is_pipe => Box::new(io::stdin()),
-                None => Box::new(File::open(path).map_err(opening)?),
-            };
-            let rows = CsvRows::of_log(path, input).map_err(|error| other_delimiter(path, error))?;
+            let rows = CsvRows::of_log(path, log.reader(stop)?).map_err(|error| other_delimiter(path, error))?;
             let kind = SourceKind::Rows(Box::new(CarLog::of(rows, car, tables)?));
             return Self::looking_ahead(kind, [OnChange::default(); MAX_ELEMENTS], reading, is_followed);
         }
-        let log = match stop {
-            Some(stop) => Log::follow(path, &map.open, stop)?,
-            None => Log::open(path, &map.open)?.on_threads(threads),
-        };
+        let log = log.open(stop, threads)?;
         let own;
         let map = if map.channels.is_empty() {
             own = own_map(&log, car).map_err(|missing| {

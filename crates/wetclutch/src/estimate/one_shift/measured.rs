@@ -1,8 +1,6 @@
 //! A log as the observers read it, with the shifts that were found in it.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -10,14 +8,13 @@ use std::sync::atomic::AtomicBool;
 use car::Vehicle;
 use drivetrain::{ClutchValve, CommandKind};
 use logs::plausibility::Seen;
-use logs::{
-    ChannelMap, Gearbox, GearsOfShift, Log, LogError, OnChange, Reading, Readings, Role, Shift, ShiftFinder, Steps,
-};
+use logs::{ChannelMap, Gearbox, GearsOfShift, Log, OnChange, Reading, Readings, Role, Shift, ShiftFinder, Steps};
 use observer::{ChannelHealth, Input, Reading as Measurement};
 use study::any_shift::pressure_command::command_of_valve;
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
-use trace::{CsvRows, Following, ShownPath as _, signal};
+use trace::{CsvRows, ShownPath as _, signal};
 
+use crate::estimate::LogInput;
 use crate::estimate::log_checks::{check_step, other_delimiter, report_readings, sent_on_change};
 use crate::estimate::watched::{WatchedColumn, WatchedColumns};
 use crate::{Error, Notes, grouped};
@@ -172,22 +169,16 @@ fn each_reading(input: &Input<f64>, row: &LogRow, mut see: impl FnMut(&Reading))
 
 impl<'a> Measured<'a> {
     /// A table with the names of the program. `stop` ends one that is followed.
-    pub(crate) fn rows(path: &Path, vehicle: &Vehicle, stop: Option<Arc<AtomicBool>>) -> Result<Self, Error> {
-        let is_pipe = path == Path::new("-");
-        if !is_pipe && logs::needs_map(path)? {
+    pub(crate) fn rows(input: LogInput<'_>, vehicle: &Vehicle, stop: Option<&Arc<AtomicBool>>) -> Result<Self, Error> {
+        let path = input.path;
+        if !input.is_stream() && logs::needs_map(path)? {
             return Err(Error::Input(format!(
                 "{}: this log needs a channel map\nhint: `wetclutch inspect` with --suggest writes a first one, for --map",
                 path.shown()
             )));
         }
         let look = if stop.is_some() { FOLLOWED_LOOK } else { FIRST_LOOK };
-        let opening = |source| LogError::Io { path: path.to_owned(), source };
-        let input: Box<dyn Read> = match stop {
-            Some(stop) => Box::new(Following::open(path, stop).map_err(opening)?),
-            None if is_pipe => Box::new(io::stdin()),
-            None => Box::new(File::open(path).map_err(opening)?),
-        };
-        let rows = CsvRows::of_log(path, input).map_err(|error| other_delimiter(path, error))?;
+        let rows = CsvRows::of_log(path, input.reader(stop)?).map_err(|error| other_delimiter(path, error))?;
         let mut watched = watched(&rows, vehicle, look);
         let log = study::log::Log::of(rows, vehicle, look)?;
         log.looked_at().for_each(|(input, _)| watched.push(values(input)));

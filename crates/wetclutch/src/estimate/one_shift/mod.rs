@@ -123,7 +123,7 @@ pub fn estimate(
         written_s: f64::NEG_INFINITY,
         is_followed: options.is_followed(),
     };
-    let (log, mut rows) = pass(&observer, vehicle, log, rows)?;
+    let (log, mut rows) = pass((&observer, options), vehicle, log, rows)?;
     if matches!(destination, Destination::Standard) {
         rows.table.flush()?;
     }
@@ -156,24 +156,20 @@ fn open<'a>(
     say: Notes<'_>,
 ) -> Result<Measured<'a>, Error> {
     let Setup { options, vehicle, .. } = setup;
-    let LogInput { path, map } = log;
-    let stop = options.follow.clone();
+    let LogInput { path, map, .. } = log;
+    let stop = options.follow.as_ref();
     if map.channels.is_empty() {
         warn_of_dbc(map, say);
-        return Measured::rows(path, vehicle, stop);
+        return Measured::rows(log, vehicle, stop);
     }
-    let is_followed = stop.is_some();
-    let log = match stop {
-        Some(stop) => Log::follow(path, &map.open, stop)?,
-        None => Log::open(path, &map.open)?.on_threads(options.threads.max(1)),
-    };
-    Measured::channels(path, opened.insert(log), map, vehicle, is_followed)
+    let channels = log.open(stop, options.threads)?;
+    Measured::channels(path, opened.insert(channels), map, vehicle, stop.is_some())
 }
 
 /// Passes all steps of a log through the observer to the rows. The observer gets the steps in the gears of its shift; the others
 /// go by it.
 fn pass<'log, 'rows>(
-    observer: &Chosen,
+    (observer, options): (&Chosen, &EstimateOptions),
     vehicle: &Vehicle,
     log: Measured<'log>,
     rows: Rows<'rows>,
@@ -182,6 +178,9 @@ fn pass<'log, 'rows>(
     let in_gears = std::iter::from_fn(|| {
         let mut log = log.borrow_mut();
         loop {
+            if let Err(interrupted) = options.check_interrupt() {
+                return Some(Err(interrupted));
+            }
             match log.advance() {
                 Ok(false) => return None,
                 Ok(true) if log.step.is_other_gear => {

@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import copy
+import pickle
+from pathlib import Path
+
+import pytest
+
+import wetclutch as wc
+
+from conftest import ROOT
+
+
+@pytest.mark.parametrize("name", ["eight_speed", "six_speed", "dual_clutch", "two_speed_at", "two_speed_pwm"])
+def test_a_car_is_the_same_after_pickle_copy_and_its_own_text(name: str) -> None:
+    car = wc.Car.read(ROOT / "vehicles" / f"{name}.toml")
+    for other in (
+        pickle.loads(pickle.dumps(car)),
+        copy.deepcopy(car),
+        wc.Car(car.to_toml(), car.gearbox_toml()),
+    ):
+        assert other == car and hash(other) == hash(car) and other.gears == car.gears
+
+
+def test_a_template_can_be_written_and_read_again(tmp_path: Path) -> None:
+    for gearbox in wc.gearboxes():
+        car = wc.Car.template(gearbox, mass_kg=1500.0)
+        folder = tmp_path / gearbox
+        folder.mkdir()
+        car.write(folder / "car.toml")
+        assert wc.Car.read(folder / "car.toml") == car
+        assert len(car.gears) >= 4 and car.kind == "gearbox"
+
+
+def test_a_written_car_does_not_replace_another_gearbox(tmp_path: Path) -> None:
+    car = wc.Car.template("8hp", mass_kg=1900.0)
+    (tmp_path / "8hp.toml").write_text("another one")
+    with pytest.raises(FileExistsError, match="another gearbox"):
+        car.write(tmp_path / "car.toml")
+    assert not (tmp_path / "car.toml").exists()
+
+
+def test_keys_are_replaced_and_checked() -> None:
+    car = wc.Car.template("8hp", mass_kg=1900.0)
+    heavier = car.replace(vehicle__mass_kg=2100.0)
+    assert heavier.replace({"vehicle.mass_kg": 1900.0}) == car.replace({"vehicle.mass_kg": 1900.0})
+    assert heavier != car
+    with pytest.raises(wc.InputError) as wrong:
+        car.replace(vehicle__mass_kg=-1.0)
+    assert wrong.value.key == "vehicle.mass_kg" and wrong.value.line is not None
+    with pytest.raises(wc.InputError) as unknown:
+        car.replace(vehicle__mass=1900.0)
+    assert unknown.value.line is not None
+
+
+def test_errors_have_their_parts_and_pickle(tmp_path: Path) -> None:
+    path = tmp_path / "car.toml"
+    path.write_text('name = "x"\ngearbox = "no_such.toml"\n')
+    with pytest.raises(wc.InputError) as raised:
+        wc.Car.read(path)
+    error = raised.value
+    assert error.file is not None and isinstance(error, ValueError)
+    again = pickle.loads(pickle.dumps(error))
+    assert (again.message, again.hint, again.file, again.line, again.key) == (
+        error.message,
+        error.hint,
+        error.file,
+        error.line,
+        error.key,
+    )
+
+
+def test_arguments_that_cannot_be_right_are_named() -> None:
+    with pytest.raises(wc.InputError, match="gearboxes are"):
+        wc.Car.template("9hp", mass_kg=1900.0)
+    with pytest.raises(wc.WetclutchError):
+        wc.Car.template("8hp", mass_kg=-5.0)
+    with pytest.raises(wc.WetclutchError):
+        wc.Car.template("8hp", mass_kg=float("nan"))
+    with pytest.raises(TypeError):
+        wc.Car.template("8hp")  # type: ignore[call-arg]

@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import concurrent.futures
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import wetclutch as wc
+
+from conftest import ROOT
+
+np = pytest.importorskip("numpy")
+pl = pytest.importorskip("polars")
+pd = pytest.importorskip("pandas")
+
+
+def test_a_simulated_drive_is_estimated(car: wc.Car, measured: wc.Table) -> None:
+    found = wc.estimate(car, measured, page=True)
+    assert found.rows.rows == measured.rows and found.shifts.rows > 3
+    assert np.array_equal(found.rows["time_s"], measured["time_s"])
+    assert found.learnt and found.page and "<html" in found.page
+    again = wc.estimate(car, measured, learnt=found.learnt, shift=1)
+    assert 0 < again.rows.rows < measured.rows and again.shifts.rows == 1
+
+
+def test_every_source_of_the_same_log_gives_the_same_bytes(car: wc.Car, measured: wc.Table, tmp_path: Path) -> None:
+    expected = wc.estimate(car, measured)
+    path = tmp_path / "log.csv"
+    pl.DataFrame(measured).write_csv(path)
+    for log in (pl.DataFrame(measured), measured.to_pandas(), path, wc.read(path), wc.read(pl.DataFrame(measured))):
+        found = wc.estimate(car, log)
+        assert found.rows == expected.rows and found.shifts == expected.shifts, type(log)
+
+
+def test_the_command_gives_the_same_numbers(car: wc.Car, measured: wc.Table, tmp_path: Path) -> None:
+    command = os.environ.get("WETCLUTCH")
+    if not command:
+        pytest.skip("WETCLUTCH names no binary")
+    log, out = tmp_path / "log.csv", tmp_path / "out.csv"
+    pl.DataFrame(measured).write_csv(log)
+    vehicle = os.fspath(ROOT / "vehicles" / "six_speed.toml")
+    subprocess.run([command, "estimate", log, "--vehicle", vehicle, "-o", out], check=True, capture_output=True)
+    rows = wc.estimate(car, measured).rows
+    written = pl.read_csv(out, infer_schema_length=None)
+    assert written.columns == list(rows)
+    for name in rows:
+        if isinstance(rows[name], list):
+            continue
+        assert np.array_equal(written[name].cast(pl.Float64).to_numpy(), np.asarray(rows[name]), equal_nan=True), name
+
+
+def test_a_mapped_frame_is_read(car: wc.Car, measured: wc.Table) -> None:
+    del car
+    two_speed = wc.Car.read(ROOT / "vehicles" / "two_speed_at.toml")
+    time_s = np.arange(0.0, 4.0, 0.01)
+    frame = pd.DataFrame({"t": time_s, "n_t": 1500.0 + 0.0 * time_s})
+    with pytest.raises(wc.InputError) as raised:
+        wc.estimate(two_speed, wc.read(frame, channels={"turbine_speed": "n_t"}))
+    assert raised.value.hint
+
+
+def test_what_is_no_log_of_the_car_is_refused_with_a_hint(car: wc.Car, measured: wc.Table) -> None:
+    missing = {name: measured[name] for name in measured if name != "turbine_speed_rad_s"}
+    with pytest.raises(wc.InputError, match="turbine_speed_rad_s"):
+        wc.estimate(car, missing)
+    with pytest.raises(wc.InputError):
+        wc.estimate(car, {"time_s": []})
+    with pytest.raises(wc.InputError, match="no effect"):
+        wc.estimate(car, measured, observer="kalman")
+    with pytest.raises(wc.InputError, match="expected one of"):
+        wc.estimate(wc.Car.read(ROOT / "vehicles" / "two_speed_at.toml"), measured, observer="kalmann")
+    with pytest.raises(wc.InputError, match="no column"):
+        wc.estimate(car, measured, columns=["pressure"])
+    with pytest.raises(ValueError, match="threads"):
+        wc.estimate(car, measured, threads=0)
+    with pytest.raises(wc.InputError):
+        wc.estimate(car, ROOT / "no_such.csv")
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), 1e300, -1e6])
+def test_wrong_readings_end_in_an_estimate_or_an_error(car: wc.Car, measured: wc.Table, wrong: float) -> None:
+    rows = 3000
+    for name in ("turbine_speed_rad_s", "output_speed_rad_s", "engine_speed_rad_s"):
+        columns: dict[str, Any] = {key: measured[key][:rows] for key in measured}
+        columns[name] = np.array(columns[name])
+        columns[name][1000:1200] = wrong
+        try:
+            found = wc.estimate(car, columns)
+        except wc.InputError:
+            continue
+        assert found.rows.rows == rows
+
+
+def test_the_same_seed_gives_the_same_drive(car: wc.Car, drive_file: str, run: wc.Simulation) -> None:
+    assert wc.simulate(car, drive_file).measured == run.measured
+    assert run.shifts > 10 and run.distance_m > 1000.0
+
+
+def test_threads_estimate_at_the_same_time(car: wc.Car, measured: wc.Table) -> None:
+    expected = wc.estimate(car, measured).rows
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        for found in pool.map(lambda _: wc.estimate(car, measured), range(20)):
+            assert found.rows == expected
+
+
+def test_processes_estimate_after_a_fork(car: wc.Car, measured: wc.Table) -> None:
+    expected = wc.estimate(car, measured).rows
+    with concurrent.futures.ProcessPoolExecutor(2) as pool:
+        for found in pool.map(wc.estimate, [car] * 2, [measured] * 2):
+            assert found.rows == expected
+
+
+def test_other_threads_of_python_run_meanwhile(car: wc.Car, drive_file: str) -> None:
+    ticks = 0
+    is_done = threading.Event()
+
+    def tick() -> None:
+        nonlocal ticks
+        while not is_done.wait(0.005):
+            ticks += 1
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    wc.simulate(car, drive_file)
+    is_done.set()
+    thread.join()
+    assert ticks > 10
+
+
+def test_ctrl_c_ends_an_estimate(car: wc.Car, measured: wc.Table) -> None:
+    rows = {name: list(measured[name]) * 40 for name in measured if name != "time_s"}
+    rows["time_s"] = [0.01 * at for at in range(40 * measured.rows)]
+    log = wc.read({"time_s": rows.pop("time_s"), **rows})
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        wc.estimate(car, log)
+    assert time.monotonic() - begin < 30.0
+
+
+def test_only_the_initialiser_is_exported() -> None:
+    from wetclutch import _wetclutch
+
+    nm = subprocess.run(["nm", "-D", "--defined-only", _wetclutch.__file__], capture_output=True, text=True)
+    if nm.returncode != 0 or sys.platform != "linux":
+        pytest.skip("there is no nm")
+    names = {line.split()[-1].split("@")[0] for line in nm.stdout.splitlines()}
+    assert names == {"PyInit__wetclutch"}
+
+
+def test_importing_is_fast() -> None:
+    code = "import time; t = time.perf_counter(); import wetclutch; print(time.perf_counter() - t)"
+    best = min(float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout) for _ in range(5))
+    assert best < 0.25

@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import math
+import pickle
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import wetclutch as wc
+
+np = pytest.importorskip("numpy")
+pd = pytest.importorskip("pandas")
+pl = pytest.importorskip("polars")
+pa = pytest.importorskip("pyarrow")
+
+
+def frame() -> dict[str, list[Any]]:
+    return {"time_s": [0.0, 0.01, 0.02], "output_speed_rad_s": [1.5, None, math.inf], "gear": ["1", None, "N"]}
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda data: data,
+        lambda data: pl.DataFrame(data),
+        lambda data: pl.DataFrame(data).with_columns(pl.col("gear").cast(pl.Categorical)),
+        lambda data: pa.table(data),
+        lambda data: pa.RecordBatch.from_pydict(data),
+        lambda data: pd.DataFrame(data),
+        lambda data: pa.concat_tables([pa.table(data).slice(0, 1), pa.table(data).slice(1)]),
+    ],
+)
+def test_every_kind_of_frame_gives_the_same_table(make: Any) -> None:
+    table = wc.Table(make(frame()))
+    assert list(table) == ["time_s", "output_speed_rad_s", "gear"]
+    speeds = list(table["output_speed_rad_s"])
+    assert speeds[0] == 1.5 and math.isnan(speeds[1]) and speeds[2] == math.inf
+    assert table["gear"] == ["1", "", "N"]
+    assert table.units == {"time_s": "s", "output_speed_rad_s": "rad/s", "gear": None}
+
+
+def test_tables_leave_with_units_to_every_library() -> None:
+    table = wc.Table(frame())
+    arrow = pa.table(table)
+    assert arrow.schema.field("output_speed_rad_s").metadata == {b"unit": b"rad/s"}
+    assert arrow["gear"].to_pylist() == ["1", "", "N"]
+    assert pl.DataFrame(table).shape == (3, 3)
+    assert table.to_pandas().shape == (3, 3)
+    assert wc.Table(pl.DataFrame(table)) == table == wc.Table(arrow) == wc.Table(table.to_pandas())
+    assert wc.Table(table.to_numpy()) == table
+    assert pickle.loads(pickle.dumps(table)) == table
+
+
+def test_columns_are_seen_without_a_copy_and_cannot_be_written() -> None:
+    table = wc.Table({"time_s": np.arange(1000.0)})
+    first, second = table["time_s"], table["time_s"]
+    assert np.shares_memory(first, second)
+    with pytest.raises(ValueError):
+        first[0] = 1.0
+    del table
+    assert first[999] == 999.0
+
+
+@pytest.mark.parametrize("kind", ["float32", "int8", "int64", "uint16", "bool"])
+def test_every_width_of_numbers_is_taken(kind: str) -> None:
+    values = np.array([0, 1, 1, 0], dtype=kind)
+    assert list(wc.Table({"x": values})["x"]) == [0.0, 1.0, 1.0, 0.0]
+    assert list(wc.Table(pa.table({"x": values}))["x"]) == [0.0, 1.0, 1.0, 0.0]
+
+
+def test_strided_and_empty_columns() -> None:
+    assert list(wc.Table({"x": np.arange(10.0)[::-3]})["x"]) == [9.0, 6.0, 3.0, 0.0]
+    assert wc.Table({"x": []}).rows == 0 and wc.Table({}).rows == 0
+    assert pa.table(wc.Table({"x": np.array([])})).num_rows == 0
+
+
+def test_times_of_day_are_seconds() -> None:
+    times = pd.to_datetime(["2026-01-01 00:00:00.250", "2026-01-01 00:00:01"])
+    expected = [1767225600.25, 1767225601.0]
+    assert list(wc.Table(pd.DataFrame({"time_s": times}))["time_s"]) == expected
+    assert list(wc.Table(pa.table({"time_s": pa.array(times)}))["time_s"]) == expected
+
+
+def test_what_is_no_table_is_refused() -> None:
+    for wrong in (3, "log.csv", [1, 2], {"x": [object()]}, {"x": [[1.0]]}):
+        with pytest.raises(TypeError):
+            wc.Table(wrong)
+    with pytest.raises(ValueError, match="has 1 values"):
+        wc.Table({"x": [1.0, 2.0], "y": [1.0]})
+    with pytest.raises(TypeError, match="Arrow's type"):
+        wc.Table(pa.table({"x": [[1.0], [2.0]]}))
+    with pytest.raises(ValueError, match="one dimension"):
+        wc.Table({"x": np.zeros((2, 2))})
+    with pytest.raises(KeyError):
+        wc.Table({"x": [1.0]})["y"]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(width=64), max_size=40), st.lists(st.one_of(st.none(), st.text(max_size=5)), max_size=40))
+def test_numbers_and_words_come_back_as_they_were(numbers: list[float], words: list[str | None]) -> None:
+    count = min(len(numbers), len(words))
+    if not any(words[:count]):
+        words = ["w"] * count
+    table = wc.Table({"x": numbers[:count], "word": words[:count]})
+    again = wc.Table(pl.DataFrame(table))
+    assert again == table
+    if count:
+        assert table["word"] == [word or "" for word in words[:count]]

@@ -1,0 +1,222 @@
+"""Cars."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from typing import Any, Self
+
+from . import _wetclutch as native
+from ._errors import InputError
+
+_PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def gearboxes() -> tuple[str, ...]:
+    """Names of the gearboxes of the program.
+
+    >>> "8hp" in gearboxes()
+    True
+    """
+    return tuple(native.gearboxes())
+
+
+class Car:
+    """A car as its vehicle file describes it: with its whole gearbox, or as one of its shifts sees it.
+
+    Two cars are equal if their files have the same text. A car is pickled as these texts, so that it can be sent to other processes.
+
+    Attributes:
+        name: Name of the car.
+        kind: ``"gearbox"`` or ``"one-shift"``.
+        gears: Names of its gears.
+        elements: Names of the clutches, brakes and one-way clutches of its gearbox.
+    """
+
+    __slots__ = ("_gearbox", "_text", "elements", "gears", "kind", "name")
+
+    name: str
+    kind: str
+    gears: tuple[str, ...]
+    elements: tuple[str, ...]
+    _text: str
+    _gearbox: str | None
+
+    def __init__(self, text: str, gearbox: str | None = None) -> None:
+        """A car from the text of a vehicle file and, of a car with a gearbox, that of its gearbox file.
+
+        Raises:
+            InputError: Something in them is wrong; the error has line and key.
+        """
+        self._take(native.check_car("car.toml", text, gearbox))
+
+    def _take(self, described: tuple[str, str, str, str | None, list[str], list[str]]) -> None:
+        self.name, self.kind, self._text, self._gearbox, gears, elements = described
+        self.gears, self.elements = tuple(gears), tuple(elements)
+
+    @classmethod
+    def _of(cls, described: tuple[str, str, str, str | None, list[str], list[str]]) -> Self:
+        car = cls.__new__(cls)
+        car._take(described)
+        return car
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Self:
+        """Reads a vehicle file, and the gearbox file that it names.
+
+        Raises:
+            InputError: A file cannot be read, or something in it is wrong; the error has file, line and key.
+        """
+        return cls._of(native.read_car(os.fspath(path)))
+
+    @classmethod
+    def template(
+        cls,
+        gearbox: str,
+        *,
+        mass_kg: float,
+        name: str = "my car",
+        wheel_radius_m: float | None = None,
+        final_ratio: float | None = None,
+        engine_torque_n_m: float | None = None,
+        converter: bool | None = None,
+        stroke: bool = False,
+    ) -> Self:
+        """A car of a few numbers with one of the gearboxes of the program; what is not given is usual for a car of this mass.
+
+        Args:
+            gearbox: One of :func:`gearboxes`.
+            mass_kg: Mass with driver, kg: 200 to 60000.
+            name: Name of the car.
+            wheel_radius_m: Rolling radius of the driven wheels, m: 0.1 to 1.
+            final_ratio: Ratio from the gearbox output to the wheels, 0.5 to 10.
+            engine_torque_n_m: Maximum engine torque, N m: 20 to 2000.
+            converter: Whether a torque converter connects engine and gearbox, and not a clutch.
+            stroke: Whether the pistons of the clutches have a stroke, so that the fill takes time.
+
+        Raises:
+            InputError: There is no such gearbox, or a number cannot be right.
+
+        >>> Car.template("8hp", mass_kg=1900.0)
+        Car('my car', 8 forward gears)
+        """
+        return cls._of(
+            native.template_car(
+                gearbox, name, mass_kg, wheel_radius_m, final_ratio, engine_torque_n_m, converter, stroke
+            )
+        )
+
+    def to_toml(self) -> str:
+        """The text of the vehicle file."""
+        return self._text
+
+    def gearbox_toml(self) -> str | None:
+        """The text of the gearbox file; None of a file of one shift."""
+        return self._gearbox
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes the vehicle file and, of a car with a gearbox, the gearbox file where the vehicle file names it.
+
+        Raises:
+            FileExistsError: The gearbox file is there already and is another one.
+        """
+        path = os.fspath(path)
+        if self._gearbox is not None:
+            named = os.path.join(os.path.dirname(path), tomllib.loads(self._text)["gearbox"])
+            if os.path.exists(named):
+                with open(named, encoding="utf-8") as there:
+                    if there.read() != self._gearbox:
+                        raise FileExistsError(f"{named}: this file is there already, and is another gearbox")
+            else:
+                _write_whole(named, self._gearbox)
+        _write_whole(path, self._text)
+
+    def replace(self, values: dict[str, Any] | None = None, /, **keys: Any) -> Self:
+        """The same car with other values in its vehicle file.
+
+        Args:
+            values: New values by their keys in the file, such as ``{"vehicle.mass_kg": 1900.0}``.
+            keys: The same with two underscores for the dot: ``vehicle__mass_kg=1900.0``.
+
+        Raises:
+            InputError: There is no such key, or a value cannot be right.
+
+        >>> car = Car.template("8hp", mass_kg=1900.0)
+        >>> car.replace(vehicle__mass_kg=2000.0) == car
+        False
+        """
+        table = tomllib.loads(self._text)
+        for key, value in {**(values or {}), **{key.replace("__", "."): value for key, value in keys.items()}}.items():
+            parts = key.split(".")
+            at = table
+            for part in parts[:-1]:
+                at = at.setdefault(part, {})
+                if not isinstance(at, dict):
+                    raise InputError(f"`{key}`: `{part}` is no table of the file", key=key)
+            at[parts[-1]] = value
+        return type(self)(_toml(table), self._gearbox)
+
+    @property
+    def _native(self) -> tuple[str, str, str | None]:
+        return self.name, self._text, self._gearbox
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Car):
+            return NotImplemented
+        return (self._text, self._gearbox) == (other._text, other._gearbox)
+
+    def __hash__(self) -> int:
+        return hash((self._text, self._gearbox))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._text, self._gearbox)
+
+    def __repr__(self) -> str:
+        if self.kind == "one-shift":
+            return f"Car({self.name!r}, one shift)"
+        forward = [gear for gear in self.gears if not gear.startswith("R")]
+        return f"Car({self.name!r}, {len(forward)} forward gears)"
+
+
+def _write_whole(path: str, text: str) -> None:
+    partial = f"{path}.partial"
+    with open(partial, "w", encoding="utf-8", newline="\n") as file:
+        file.write(text)
+    os.replace(partial, path)
+
+
+def _key(key: str) -> str:
+    return key if _PLAIN_KEY.fullmatch(key) else _value(key)
+
+
+def _value(value: Any) -> str:
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int():
+            return str(value)
+        case float():
+            return repr(value)
+        case str():
+            escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+            return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
+        case list() | tuple():
+            return "[" + ", ".join(_value(item) for item in value) + "]"
+        case dict():
+            return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
+        case _ if hasattr(value, "item"):
+            return _value(value.item())
+        case _:
+            raise InputError(f"a {type(value).__name__} is no value of a vehicle file")
+
+
+def _toml(table: dict[str, Any], path: str = "") -> str:
+    plain = {key: value for key, value in table.items() if not isinstance(value, dict)}
+    lines = [f"{_key(key)} = {_value(value)}\n" for key, value in plain.items()]
+    if path and (lines or not table):
+        lines.insert(0, f"\n[{path}]\n")
+    for key, value in table.items():
+        if isinstance(value, dict):
+            lines.append(_toml(value, f"{path}.{_key(key)}" if path else _key(key)))
+    return "".join(lines)

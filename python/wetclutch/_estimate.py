@@ -1,0 +1,166 @@
+"""Estimates from logs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import _wetclutch as native
+from ._car import Car
+from ._table import Table
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """A log, and which of its channels are which signals.
+
+    Attributes:
+        path: The file; None for a table in memory.
+        table: The table in memory, or None.
+        map: Channel map, a file as ``wetclutch inspect --suggest`` writes it.
+        dbc: Messages and signals of a CAN log.
+        channels: Channels by signals, such as ``{"engine_speed": "N_Eng [rpm]"}``; they replace those of the map.
+    """
+
+    path: str | None = None
+    table: Table | None = None
+    map: str | None = None
+    dbc: str | None = None
+    channels: Mapping[str, str] = field(default_factory=dict)
+
+
+def read(
+    log: Any,
+    *,
+    map: str | os.PathLike[str] | None = None,
+    dbc: str | os.PathLike[str] | None = None,
+    channels: Mapping[str, str] | None = None,
+) -> Log:
+    """A log of a file (CSV, Parquet, MDF 4, CAN with a DBC) or of a data frame.
+
+    A table whose columns have the names of the program (``turbine_speed_rad_s``, ``gear``, ...) needs neither map nor channels.
+
+    Args:
+        log: A path, or whatever :class:`Table` takes.
+        map: Channel map, as ``wetclutch inspect --suggest`` writes it.
+        dbc: Messages and signals of a CAN log.
+        channels: Channels by signals; they replace those of the map.
+
+    >>> read({"time_s": [0.0, 0.01], "turbine_speed_rad_s": [100.0, 101.0]}).table
+    Table(2 rows: time_s, turbine_speed_rad_s)
+    """
+    is_file = isinstance(log, (str, os.PathLike))
+    return Log(
+        path=os.fspath(log) if is_file else None,
+        table=None if is_file else Table(log),
+        map=None if map is None else os.fspath(map),
+        dbc=None if dbc is None else os.fspath(dbc),
+        channels=dict(channels or {}),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """Estimates of a log.
+
+    Attributes:
+        rows: A row for each row of the log: pressures and torques with their guaranteed ranges, phase and health.
+        shifts: A row for each shift.
+        findings: What was found in the log, in sentences.
+        learnt: What was learnt of the car, for the next log; None where nothing was.
+        page: The page of the drive as HTML, if it was asked for and the log has a shift.
+    """
+
+    rows: Table
+    shifts: Table
+    findings: tuple[str, ...]
+    learnt: str | None
+    page: str | None
+
+    def _repr_html_(self) -> str | None:
+        if self.page is None:
+            return None
+        from html import escape
+
+        return f'<iframe srcdoc="{escape(self.page)}" style="width:100%;height:640px;border:0"></iframe>'
+
+    def __repr__(self) -> str:
+        return f"Estimates({self.rows.rows} rows, {self.shifts.rows} shifts)"
+
+    def plot(self, shift: int = 1) -> Any:
+        """Draws pressures and torques of a shift with their guaranteed ranges; needs matplotlib.
+
+        Args:
+            shift: Number of the shift, from 1.
+
+        Returns:
+            The axes of the figure: pressures above, torques below.
+
+        Raises:
+            IndexError: There is no such shift.
+        """
+        from ._plot import plot_shift
+
+        return plot_shift(self, shift)
+
+
+def estimate(
+    car: Car,
+    log: Any,
+    *,
+    observer: str | None = None,
+    method: str | None = None,
+    sensors: str | os.PathLike[str] | None = None,
+    columns: Sequence[str] = (),
+    shift: int | None = None,
+    shifts: Sequence[str] = (),
+    learnt: str | None = None,
+    threads: int = 1,
+    page: bool = False,
+) -> Estimates:
+    """Estimates pressures and torques of the clutches from a log. The results are those of ``wetclutch estimate``.
+
+    Ends within some milliseconds of Ctrl-C; other threads of Python run meanwhile.
+
+    Args:
+        car: The car.
+        log: A :class:`Log`, or what :func:`read` makes one of.
+        observer: Observer of a car of one shift, such as ``"kalman"``; the best for the log if none is given.
+        method: Design method of its gains, such as ``"peak-to-peak"``, of the observers rigid and compliant.
+        sensors: File whose table ``sensors`` describes the sensors of the log.
+        columns: Columns of the rows, in this order; all of them if empty. The time is always the first.
+        shift: The shift with this number alone, from 1.
+        shifts: Shifts between these gears alone, such as ``["1-2", "2-3"]``.
+        learnt: What was learnt of the car in an earlier log: ``Estimates.learnt``.
+        threads: Threads that read the log.
+        page: Whether to make the page of the drive.
+
+    Raises:
+        InputError: The log cannot be read or is not of this car, or an argument does not fit it.
+    """
+    if not isinstance(log, Log):
+        log = read(log)
+    if not 1 <= threads <= 1024:
+        raise ValueError(f"threads is {threads}, expected 1 to 1024")
+    mapping = {
+        "map": log.map,
+        "dbc": log.dbc,
+        "channels": [f"{signal}={channel}" for signal, channel in log.channels.items()],
+    }
+    options = {
+        "observer": observer,
+        "method": method,
+        "sensors": None if sensors is None else os.fspath(sensors),
+        "columns": list(columns),
+        "shift": shift,
+        "shifts": list(shifts),
+        "learnt": learnt,
+        "threads": threads,
+        "with_page": page,
+    }
+    table = None if log.table is None else log.table._table
+    name = "the table" if log.path is None else log.path
+    rows, found, findings, learnt_now, html = native.estimate(car._native, name, table, mapping, options)
+    return Estimates(Table(rows), Table(found), tuple(findings), learnt_now, html)
