@@ -5,7 +5,7 @@ use std::process::Output;
 use crate::support::{Folder, ROOT, VEHICLE, refused, said, wetclutch};
 
 /// The page with an example of what is said.
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/estimates.md");
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/how-to/estimate-logs.md");
 
 fn vehicle(name: &str) -> String {
     format!("{ROOT}vehicles/{name}.toml")
