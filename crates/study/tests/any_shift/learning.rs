@@ -200,7 +200,7 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
             }
             // Asked for is 1.2 of the known car's error. Since shifts do not correct converter and stiffness, all errors of this table are
             // smaller or the same, and the known car's own most, by 6 %: 1.46 to 1.37 N m with two draws. The bound is that of the earlier error
-            // of the known car. What each way has stands in docs/explanation/gearbox-filter.md.
+            // of the known car. What each way has stands in docs/explanation/results.md.
             println!("{name} either way: {:.2} of the known car's", over_known(&of_both));
             let most = 1.2 * 1.46 / 1.37;
             assert!(over_known(&of_both) < most, "{name}, converter {converter}: {}", over_known(&of_both));
