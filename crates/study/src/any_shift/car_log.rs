@@ -173,7 +173,7 @@ impl<'c> CarLog<'c> {
             .collect();
         (!unread.is_empty()).then(|| {
             format!(
-                "not read: {}. No element of this car has such a command or pressure, or the name does not end with its unit (docs/reference/estimates.md)",
+                "not read: {}. No element of this car has such a command or pressure, or the name does not end with its unit (docs/reference/logs.md)",
                 unread.join(", ")
             )
         })
