@@ -12,6 +12,7 @@
 pub mod checks;
 pub mod drive;
 pub mod errors;
+mod estimator;
 pub mod learning_count;
 pub mod logged;
 pub mod measured;
@@ -22,6 +23,7 @@ mod step;
 mod thinned;
 pub mod worth_a_look;
 
+pub use estimator::Estimator;
 pub use score::{ClutchRow, ShiftScoreRow, SquaredErrors, TruePhase};
 pub use step::LogStep;
 

@@ -16,7 +16,8 @@ mod table_text;
 mod text;
 mod vehicle;
 
-pub use car::{Car, Drive, ErrorBudget, Sensors};
+pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors, ShiftCommand, Step};
+pub use evaluate::Estimator;
 pub use error::Error;
 pub use estimate::{Destination, EstimateOptions, Estimates, LogInput, estimate};
 pub use score::{PhaseScore, Scores, score};

@@ -1,0 +1,199 @@
+//! The gearbox filter step by step, for a log that is not there yet: on a test bench, in a loop, behind another language.
+
+use car::{Car, ElementId, ErrorBudget, Gear, GearId, Sensors, Step};
+use observer::any_shift::{
+    AnyShiftFilter, AnyShiftState, GearCommand, GearboxTables, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput,
+};
+use observer::{ShiftTables, any_shift_filter};
+
+use crate::AnyShiftError;
+
+/// The gearbox filter of a car, with what it knows after the steps so far.
+///
+/// ```
+/// use car::{Car, Reading, ShiftCommand, Step};
+/// use evaluate::Estimator;
+///
+/// # let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml"));
+/// let car: Car = config::CarFile::read(path)?.car;
+/// let mut estimator = Estimator::new(&car, None, None)?;
+/// let mut step = Step::none(0.01);
+/// step.speeds.turbine = Some(Reading::now(150.0));
+/// step.speeds.output = Some(Reading { value: 32.0, age_s: 0.004 });
+/// step.shift = estimator.gear("1").map(ShiftCommand::in_gear);
+/// let estimate = estimator.step(&step);
+/// println!("{}", estimate.health.name());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Estimator {
+    tables: ShiftTables<f64>,
+    /// With tables of no gearbox; those of this one are put in for each step.
+    filter: AnyShiftFilter<'static, f64>,
+    state: AnyShiftState<f64>,
+    gears: Vec<String>,
+    elements: Vec<String>,
+}
+
+/// Of no gearbox.
+const NO_TABLES: GearboxTables<'static, f64> = GearboxTables { elements: &[], gears: &[], shifts: &[] };
+
+impl Estimator {
+    /// The filter of a car, for readings of these sensors, with what was learnt of it before.
+    ///
+    /// # Errors
+    /// The gearbox has more clutches than the filter has room for.
+    pub fn new(car: &Car, sensors: Option<&Sensors>, learnt: Option<&Learnt<f64>>) -> Result<Self, AnyShiftError> {
+        let budget = ErrorBudget::of_logged_car(car).read_by(car, sensors);
+        let tables = ShiftTables::of_car(car, &budget).map_err(AnyShiftError::TooManyElements)?;
+        let (filter, state) = {
+            let filter = any_shift_filter(car, &tables, &budget, sensors);
+            let state = learnt.map_or_else(|| filter.start(), |learnt| filter.start_with(learnt));
+            (without_tables(&filter), state)
+        };
+        let gears = car.gearbox.gears.iter().map(|gear| gear.name.clone()).collect();
+        let elements = car.gearbox.elements.iter().map(|element| element.name.clone()).collect();
+        Ok(Self { tables, filter, state, gears, elements })
+    }
+
+    /// The gear of this name.
+    pub fn gear(&self, name: &str) -> Option<GearId> {
+        self.gears.iter().position(|gear| gear == name).and_then(GearId::new)
+    }
+
+    /// The clutch, brake or one-way clutch of this name.
+    pub fn element(&self, name: &str) -> Option<ElementId> {
+        self.elements.iter().position(|element| element == name).and_then(ElementId::new)
+    }
+
+    /// The name of the element that a [`observer::any_shift::ClutchEstimate`] is of; `None` of a one-way clutch.
+    pub fn name_of(&self, place: usize) -> Option<&str> {
+        if place == ONE_WAY {
+            return None;
+        }
+        let elements = self.elements.iter().enumerate();
+        elements.filter(|(at, _)| self.tables.place(*at) == Some(place)).map(|(_, name)| name.as_str()).next()
+    }
+
+    /// Takes a step and returns the estimate for it. Readings of elements that the filter does not have are left out.
+    pub fn step(&mut self, step: &Step) -> ShiftEstimate<f64> {
+        let input = self.input(step);
+        let filter = AnyShiftFilter { tables: self.tables.tables(), ..self.filter };
+        filter.step(&mut self.state, &input)
+    }
+
+    /// Guaranteed range of the pressure of an element after the last step, Pa; `None` where there is none.
+    pub fn pressure_range_pa(&self, element: ElementId) -> Option<[f64; 2]> {
+        let filter = AnyShiftFilter { tables: self.tables.tables(), ..self.filter };
+        filter.pressure_range_pa(&self.state, self.tables.place(element.place())?)
+    }
+
+    /// Takes the temperature of the oil in the gearbox, degC.
+    pub fn take_oil_temperature(&mut self, degc: f64) {
+        self.state.take_oil_temperature(degc);
+    }
+
+    /// What was learnt of the car so far.
+    pub fn learnt(&self) -> &Learnt<f64> {
+        self.state.learnt()
+    }
+
+    /// The step as the filter takes it.
+    fn input(&self, step: &Step) -> ShiftInput<f64> {
+        let mut commands = [None; MAX_ELEMENTS];
+        for (element, command) in step.commands.given() {
+            if let Some(place) = self.tables.place(element.place()) {
+                commands[place] = Some(*command);
+            }
+        }
+        let place = |gear: Gear| gear.id().map_or(GearCommand::NEUTRAL, GearId::place);
+        let gear = step.shift.map_or([GearCommand::NEUTRAL; 2], |shift| [place(shift.from), place(shift.to)]);
+        ShiftInput {
+            dt_s: step.dt_s,
+            engine_rad_s: step.speeds.engine,
+            turbine_rad_s: step.speeds.turbine,
+            output_rad_s: step.speeds.output,
+            wheel_rad_s: step.speeds.wheel,
+            engine_n_m: step.engine_torque_n_m,
+            lock_up_applied: step.lock_up_applied,
+            commands,
+            gear: GearCommand { from: gear[0], to: gear[1] },
+        }
+    }
+}
+
+/// The filter without its gearbox.
+fn without_tables(filter: &AnyShiftFilter<'_, f64>) -> AnyShiftFilter<'static, f64> {
+    let AnyShiftFilter { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits, .. } = *filter;
+    AnyShiftFilter { tables: NO_TABLES, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits }
+}
+
+#[cfg(test)]
+mod tests {
+    use car::{Reading, ShiftCommand};
+
+    use super::*;
+
+    fn six_speed() -> Car {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles/six_speed.toml");
+        config::CarFile::read(&path).unwrap().car
+    }
+
+    #[test]
+    fn a_step_is_what_the_filter_takes_of_it() {
+        let car = six_speed();
+        let budget = ErrorBudget::of_logged_car(&car);
+        let tables = ShiftTables::of_car(&car, &budget).unwrap();
+        let filter = any_shift_filter(&car, &tables, &budget, None);
+        let mut state = filter.start();
+        let mut estimator = Estimator::new(&car, None, None).unwrap();
+        let [first, second] = ["1", "2"].map(|name| estimator.gear(name).unwrap());
+        let ratio = |gear: GearId| car.gearbox.gears[gear.place()].ratio;
+        for at in 0..300_u32 {
+            let output = 40.0 + 0.05 * f64::from(at);
+            let is_shifting = (150..200).contains(&at);
+            let gear = if at < 150 { first } else { second };
+            let mut step = Step::none(0.01);
+            step.speeds.engine = Some(Reading::now(230.0));
+            step.speeds.turbine = Some(Reading { value: output * ratio(gear), age_s: 0.003 });
+            step.speeds.output = Some(Reading::now(output));
+            step.shift = Some(if is_shifting {
+                ShiftCommand { from: Gear::In(first), to: Gear::In(second) }
+            } else {
+                ShiftCommand::in_gear(gear)
+            });
+            for element in (0..car.gearbox.elements.len()).filter_map(ElementId::new) {
+                step.commands[element] = Some(Reading::now(0.02 * element.place() as f64));
+            }
+            let input = estimator.input(&step);
+            let [from, to] = if is_shifting { [first, second] } else { [gear; 2] }.map(GearId::place);
+            assert_eq!(input.gear, GearCommand { from, to });
+            let expected = filter.step(&mut state, &input);
+            assert_eq!(format!("{:?}", estimator.step(&step)), format!("{expected:?}"), "step {at}");
+            for element in (0..car.gearbox.elements.len()).filter_map(ElementId::new) {
+                let place = tables.place(element.place());
+                let range = place.and_then(|place| filter.pressure_range_pa(&state, place));
+                assert_eq!(estimator.pressure_range_pa(element), range);
+            }
+        }
+    }
+
+    #[test]
+    fn steps_without_anything_and_with_what_is_no_number_have_an_estimate() {
+        let car = six_speed();
+        let mut estimator = Estimator::new(&car, None, None).unwrap();
+        for value in [f64::NAN, f64::INFINITY, -1e300, 0.0] {
+            for dt_s in [0.01, 0.0, -1.0, f64::NAN, 1e9] {
+                let mut step = Step::none(dt_s);
+                estimator.step(&step);
+                step.speeds.turbine = Some(Reading { value, age_s: value });
+                step.speeds.output = Some(Reading { value, age_s: dt_s });
+                step.shift = estimator.gear("2").map(ShiftCommand::in_gear);
+                step.commands[ElementId::new(15).unwrap()] = Some(Reading::now(value));
+                estimator.step(&step);
+            }
+        }
+        assert_eq!(estimator.gear("9"), None);
+        assert_eq!(estimator.name_of(ONE_WAY), None);
+    }
+}
