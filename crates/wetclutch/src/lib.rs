@@ -17,9 +17,9 @@ mod text;
 mod vehicle;
 
 pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors, ShiftCommand, Step};
-pub use evaluate::Estimator;
 pub use error::Error;
 pub use estimate::{Destination, EstimateOptions, Estimates, LogInput, estimate};
+pub use evaluate::Estimator;
 pub use score::{PhaseScore, Scores, score};
 pub use simulate::{Simulation, simulate};
 pub use table::{Column, Table, Values, Words};

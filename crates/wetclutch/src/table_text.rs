@@ -95,9 +95,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 1001);
         assert_eq!(lines[0], "turbine_speed_rad_s,gear");
-        // Infinity is no number of a log.
-        assert!(lines[1].starts_with(','), "{}", lines[1]);
-        for (line, number) in lines[2..].iter().zip(&numbers[1..]) {
+        for (line, number) in lines[1..].iter().zip(&numbers) {
             assert_eq!(line.split(',').next().unwrap().parse::<f64>().unwrap().to_bits(), number.to_bits());
         }
         assert!(lines[3].ends_with(",\"a, \"\"b\"\"\""), "{}", lines[3]);

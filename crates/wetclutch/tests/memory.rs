@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use wetclutch::{
-    EstimateOptions, LogInput, Simulation, Table, TemplateNumbers, VehicleFile, estimate, gearboxes, score, simulate,
+    EstimateOptions, LogInput, Simulation, Table, TemplateNumbers, Values, VehicleFile, estimate, gearboxes, score,
+    simulate,
 };
 
 fn root(file: &str) -> PathBuf {
@@ -54,8 +55,23 @@ fn a_table_in_memory_and_a_file_of_it_give_the_same_estimate() {
     let input = LogInput { path: &path, table: None, map: &logs::ChannelMap::default() };
     let from_file = estimate(&vehicle, input, &options).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
-    assert_eq!(format!("{:?}", in_memory.rows), format!("{:?}", from_file.rows));
-    assert_eq!(format!("{:?}", in_memory.shifts), format!("{:?}", from_file.shifts));
+    assert_same(&in_memory.rows, &from_file.rows);
+    assert_same(&in_memory.shifts, &from_file.shifts);
+}
+
+/// That two tables have the same bits.
+fn assert_same(one: &Table, other: &Table) {
+    assert_eq!(one.columns.len(), other.columns.len());
+    for (one, other) in one.columns.iter().zip(&other.columns) {
+        assert_eq!(one.name, other.name);
+        match (&one.values, &other.values) {
+            (Values::Numbers(one_s), Values::Numbers(other_s)) => {
+                let bits = |numbers: &[f64]| numbers.iter().map(|number| number.to_bits()).collect::<Vec<_>>();
+                assert_eq!(bits(one_s), bits(other_s), "{}", one.name);
+            }
+            (one_s, other_s) => assert_eq!(one_s, other_s, "{}", one.name),
+        }
+    }
 }
 
 fn text_of(table: &Table) -> String {
@@ -63,9 +79,9 @@ fn text_of(table: &Table) -> String {
     let mut text = names.join(",") + "\n";
     for row in 0..table.len() {
         let cells = table.columns.iter().map(|column| match &column.values {
-            wetclutch::Values::Numbers(numbers) if numbers[row].is_nan() => String::new(),
-            wetclutch::Values::Numbers(numbers) => format!("{}", numbers[row]),
-            wetclutch::Values::Words(words) => words.get(row).unwrap_or_default().to_owned(),
+            Values::Numbers(numbers) if numbers[row].is_nan() => String::new(),
+            Values::Numbers(numbers) => format!("{}", numbers[row]),
+            Values::Words(words) => words.get(row).unwrap_or_default().to_owned(),
         });
         text += &(cells.collect::<Vec<_>>().join(",") + "\n");
     }
