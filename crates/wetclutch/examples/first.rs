@@ -1,5 +1,7 @@
 //! Simulates a drive of a car that stands in no file, estimates its log, and compares the estimates with the truth.
 
+#![expect(clippy::print_stdout, reason = "an example")]
+
 use std::path::Path;
 use std::sync::Arc;
 

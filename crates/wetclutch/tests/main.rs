@@ -1,3 +1,5 @@
 //! The library as others use it.
 
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
 mod memory;
