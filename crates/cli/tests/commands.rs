@@ -444,7 +444,10 @@ fn sensitivity_of_a_car_with_a_gearbox_says_which_shifts_hide_their_torque() {
         "{text}"
     );
     let page = read(folder.path("out/sensitivity.html"));
-    assert!(page.contains("neither is learnt") && page.contains("with both known it is 1.7 N m"), "{page}");
+    assert!(
+        page.contains("Both are learnt from shift to shift") && page.contains("with both known it is 1.7 N m"),
+        "{page}"
+    );
     assert!(page.contains("Torque phase") && page.contains("AODE") && page.contains("bound, either way"));
     assert!(page.contains(&both.replace('`', "")));
     let apart = page.split_once("<h2>What cannot be told apart</h2>").unwrap().1;
