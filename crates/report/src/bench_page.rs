@@ -8,7 +8,7 @@ use study::bench::{BenchCell, BenchConsistency, BenchSummary};
 use study::campaign::PHASES;
 use trace::units::mpa;
 
-use crate::page::{PageError, origin, templates};
+use crate::page::{PageError, origin, render};
 use crate::tables::{coverage, number, phase_name};
 
 /// The page of a bench of this experiment on this vehicle; it needs nothing but itself.
@@ -27,20 +27,23 @@ pub fn bench_page(bench: &Bench, vehicle: &VehicleFile, experiment: &ExperimentF
             number(s.shaft_range_median_width_n_m?, 0),
         ])
     });
-    Ok(templates()?.get_template("bench.html")?.render(context! {
-        name => &experiment.name,
-        title => &experiment.title,
-        vehicle_name => &vehicle.name,
-        version => env!("CARGO_PKG_VERSION"),
-        seed => experiment.sensors.map(|sensors| sensors.seed),
-        observers,
-        ranking => bench.ranking.iter().map(ranked).collect::<Vec<_>>(),
-        phases => PHASES.map(|phase| scenarios(bench, phase)),
-        rows => bench.rows.len(),
-        widths,
-        consistency => bench.consistency.as_ref().map(consistency),
-        inputs => origin(&[&vehicle.source, &experiment.source]),
-    })?)
+    render(
+        "bench.html",
+        context! {
+            name => &experiment.name,
+            title => &experiment.title,
+            vehicle_name => &vehicle.name,
+            version => env!("CARGO_PKG_VERSION"),
+            seed => experiment.sensors.map(|sensors| sensors.seed),
+            observers,
+            ranking => bench.ranking.iter().map(ranked).collect::<Vec<_>>(),
+            phases => PHASES.map(|phase| scenarios(bench, phase)),
+            rows => bench.rows.len(),
+            widths,
+            consistency => bench.consistency.as_ref().map(consistency),
+            inputs => origin(&[&vehicle.source, &experiment.source]),
+        },
+    )
 }
 
 fn pressure(pascal: f64) -> String {

@@ -5,7 +5,7 @@ use config::CarFile;
 use minijinja::{Value, context};
 use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity};
 
-use crate::page::{PageError, origin, templates};
+use crate::page::{PageError, origin, render};
 use crate::tables::number;
 
 /// Names of the phases, in the order of [`ShiftSensitivity::phases`].
@@ -93,21 +93,24 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &CarFile) -> Resul
         context! { name => *name, rows => rows.collect::<Vec<_>>() }
     });
     let [hidden, all] = hidden_phases(shifts);
-    Ok(templates()?.get_template("car_sensitivity.html")?.render(context! {
-        name => "Sensitivity",
-        title => "Sensitivity of the estimated torques to errors",
-        version => env!("CARGO_PKG_VERSION"),
-        vehicle_name => &car.name,
-        gearbox_name => &car.gearbox.name,
-        bounds => bounds.collect::<Vec<_>>(),
-        errors => errors.iter().map(|error| error.name()).collect::<Vec<_>>(),
-        phases => phases.collect::<Vec<_>>(),
-        hidden,
-        all,
-        // A car without converter has no designs.
-        bound_and_deviation => car.converter.is_some().then(|| BOUND_AND_DEVIATION.replace('`', "")),
-        inputs => origin(&[&car.source]),
-    })?)
+    render(
+        "car_sensitivity.html",
+        context! {
+            name => "Sensitivity",
+            title => "Sensitivity of the estimated torques to errors",
+            version => env!("CARGO_PKG_VERSION"),
+            vehicle_name => &car.name,
+            gearbox_name => &car.gearbox.name,
+            bounds => bounds.collect::<Vec<_>>(),
+            errors => errors.iter().map(|error| error.name()).collect::<Vec<_>>(),
+            phases => phases.collect::<Vec<_>>(),
+            hidden,
+            all,
+            // A car without converter has no designs.
+            bound_and_deviation => car.converter.is_some().then(|| BOUND_AND_DEVIATION.replace('`', "")),
+            inputs => origin(&[&car.source]),
+        },
+    )
 }
 
 /// One shift in one phase, with every error.

@@ -6,7 +6,7 @@ use study::ErrorBound;
 use study::campaign::PHASES;
 use study::error_bound::{PARTS, PhaseErrors, Size};
 
-use crate::page::{PageError, origin, templates};
+use crate::page::{PageError, origin, render};
 use crate::tables::phase_name;
 
 /// Every error of one phase with its name: the rigid model's size, channels and parts, the compliant model's channels.
@@ -43,19 +43,22 @@ pub fn error_bound_page(found: &ErrorBound, study: &Study) -> Result<String, Pag
             .collect();
         context! { phase => phase_name(phase), runs => errors.runs, rows => rows }
     });
-    Ok(templates()?.get_template("error_bound.html")?.render(context! {
-        name => &study.name,
-        title => &study.title,
-        version => env!("CARGO_PKG_VERSION"),
-        vehicle_name => &study.vehicle.name,
-        runs => found.runs,
-        unfinished => found.unfinished,
-        phases => phases.collect::<Vec<_>>(),
-        toml => found.toml(study),
-        factors => study.factors.iter().map(|factor| {
-            let [low, high] = factor.values.ends();
-            context! { name => &factor.name, low => low, high => high }
-        }).collect::<Vec<_>>(),
-        inputs => origin(&[&study.source, &study.experiment.source, &study.vehicle.source]),
-    })?)
+    render(
+        "error_bound.html",
+        context! {
+            name => &study.name,
+            title => &study.title,
+            version => env!("CARGO_PKG_VERSION"),
+            vehicle_name => &study.vehicle.name,
+            runs => found.runs,
+            unfinished => found.unfinished,
+            phases => phases.collect::<Vec<_>>(),
+            toml => found.toml(study),
+            factors => study.factors.iter().map(|factor| {
+                let [low, high] = factor.values.ends();
+                context! { name => &factor.name, low => low, high => high }
+            }).collect::<Vec<_>>(),
+            inputs => origin(&[&study.source, &study.experiment.source, &study.vehicle.source]),
+        },
+    )
 }

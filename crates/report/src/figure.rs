@@ -18,6 +18,7 @@ pub use crate::axis::Axis;
 use crate::axis::{Scale, decimals, nice_step};
 use crate::legend::{Entry, Key, LABEL_SIZE, LINE, broken, placed, width};
 pub use crate::palette::{Stroke, Weight};
+use crate::simplified::simplified;
 
 const WIDTH: f64 = 900.0;
 const TOP: f64 = 8.0;
@@ -33,6 +34,10 @@ const KEY: f64 = 26.0;
 /// Width of the ticks of an axis and of the gap to their labels.
 const TICKS: f64 = 14.0;
 const TICK_SIZE: u32 = 12;
+/// Distance of the ticks of a value axis, about, pixels.
+const TICK_DISTANCE: f64 = 34.0;
+/// Distance from a curve within which its points may be left out, pixels.
+const TOLERANCE: f64 = 0.15;
 /// Opacity of a shaded range.
 const RANGE_OPACITY: f64 = 0.16;
 pub(crate) const TEXT: &str = "#222222";
@@ -149,11 +154,19 @@ impl Figure {
         let range = panel.band.as_ref().map(|band| [&band.lower, &band.upper].map(|ends| self.visible(ends)));
         let curves = extremes(visible.iter().flatten());
         let ends = extremes(range.iter().flatten().flatten());
-        let scale = panel.axis.scale(curves, ends, panel.height / 34.0);
+        let scale = panel.axis.scale(curves, ends, panel.height / TICK_DISTANCE);
+        let tolerance = TOLERANCE * (scale.high - scale.low) / panel.height;
+        let visible = visible.iter().map(|points| simplified(points, tolerance)).collect();
         let extremes = curves.into_iter().chain(ends).reduce(|(a, b), (low, high)| (a.min(low), b.max(high)));
         let mut placed = Placed { panel, visible, range, extremes, scale, height: panel.height };
         placed.height = placed.legend(0.0).iter().map(Entry::height).sum::<f64>().max(panel.height);
         placed
+    }
+
+    /// The value axis of a panel, and what lies beyond it in words.
+    pub(crate) fn scale_and_note(&self, panel: &Panel) -> (Scale, Option<String>) {
+        let placed = self.place(panel);
+        (placed.scale, placed.scale.beyond(placed.extremes))
     }
 
     /// The points within the common axis, no closer than half a pixel.

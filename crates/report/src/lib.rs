@@ -9,6 +9,7 @@ pub mod drive_page;
 pub mod error_bound_page;
 pub mod figure;
 pub mod gearbox_figure;
+mod interactive;
 mod legend;
 pub mod log_page;
 pub mod map_figures;
@@ -18,8 +19,10 @@ pub mod palette;
 pub mod reproduction;
 pub mod sensitivity_page;
 pub mod shift_figure;
+mod simplified;
 pub mod speeds_page;
 pub mod study_page;
+mod svg_text;
 pub mod tables;
 
 pub use bench_page::bench_page;

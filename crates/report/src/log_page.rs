@@ -1,6 +1,5 @@
 //! The page of a log: the whole drive, the table of its shifts, each shift drawn.
 
-use std::borrow::Cow;
 use std::path::Path;
 
 use config::VehicleFile;
@@ -13,19 +12,18 @@ use trace::ShownPath as _;
 use trace::units::{mpa, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
-use crate::page::{PageError, inline, origin, templates};
+use crate::interactive::within_room;
+use crate::page::{PageError, origin, render};
 use crate::palette::{RANGE, Weight};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
 use crate::tables::{coverage, number};
 
 /// Shifts that are drawn.
-pub const MOST_DRAWN: usize = 200;
+pub const MOST_DRAWN: usize = 400;
 /// Rows of the table on the page; the files beside it have them all.
 const MOST_ROWS: usize = 1000;
-/// Points of the curves of all drawn shifts together: a point takes about a dozen bytes of the page.
-const POINTS: usize = 120_000;
-/// Bytes of the figures of shifts. The rest of the page takes up to one megabyte, and a page stays below five.
-const MOST_BYTES: usize = 3_800_000;
+/// Points of the curves of all drawn shifts together: a point takes about three bytes of the page.
+const POINTS: usize = 800_000;
 /// Curves in the figure of a shift, about.
 const CURVES: usize = 12;
 
@@ -57,100 +55,42 @@ impl LogPage<'_> {
             self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MOST_DRAWN).collect();
         let points = POINTS / CURVES / drawn.len().max(1);
         let command = self.vehicle.settings.valve.command_kind();
-        let figures = within_bytes(drawn.iter().map(|shift| compact(&shift_figure(shift, command, points).svg())));
-        let figures = drawn.iter().zip(figures).map(|(shift, svg)| {
+        let figures = within_room(drawn.iter().map(|shift| shift_figure(shift, command, points)));
+        let figures = drawn.iter().zip(figures).map(|(shift, figure)| {
             context! {
                 number => shift.number,
                 title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, shift.shift.kind_name()),
                 at => format!("{:.2}", shift.begin_s()),
                 remark => remark(shift),
-                svg => inline(&svg),
+                figure,
             }
         });
         let figures: Vec<Value> = figures.collect();
         let drawn = figures.len();
         let (titles, rows) = shift_rows(&self.shifts[..self.shifts.len().min(MOST_ROWS)], MOST_ROWS);
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
-        Ok(templates()?.get_template("log.html")?.render(context! {
-            name => file,
-            title => "estimate",
-            version => env!("CARGO_PKG_VERSION"),
-            vehicle_name => &self.vehicle.name,
-            observer => self.observer,
-            log => self.log.shown().to_string(),
-            shifts_of_log => self.shifts_of_log,
-            shown => self.shifts.len(),
-            undrawn => self.shifts.len() - drawn,
-            findings => self.findings.to_vec(),
-            overview => inline(&overview_figure(self.overview, self.shifts).svg()),
-            titles => titles,
-            left_out => self.shifts.len() - rows.len(),
-            rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn }).collect::<Vec<_>>(),
-            figures => figures,
-            others => self.shifts.iter().filter(|shift| !shift.of_vehicle).count(),
-            inputs => origin(&[&self.vehicle.source]),
-        })?)
-    }
-}
-
-/// The first figures, as many as a page has room for.
-pub(crate) fn within_bytes(figures: impl Iterator<Item = String>) -> impl Iterator<Item = String> {
-    let mut bytes = 0;
-    figures.take_while(move |svg| {
-        bytes += svg.len();
-        bytes <= MOST_BYTES
-    })
-}
-
-/// The same figure with its curves to a tenth of a pixel, which is half of their text.
-pub(crate) fn compact(svg: &str) -> String {
-    let mut parts = svg.split(" d=\"");
-    let mut compact = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let (path, rest) = part.split_once('"').unwrap_or((part, ""));
-        compact.push_str(" d=\"");
-        for word in path.split(' ') {
-            match tenth(word) {
-                Some((whole, tenth)) => {
-                    if compact.ends_with(|c: char| c.is_ascii_digit()) {
-                        compact.push(' ');
-                    }
-                    compact.push_str(&whole);
-                    if tenth != b'0' {
-                        compact.extend(['.', char::from(tenth)]);
-                    }
-                }
-                None => compact.push_str(word),
-            }
-        }
-        compact.push('"');
-        compact.push_str(rest);
-    }
-    compact
-}
-
-/// A number to a tenth: what stands before the point, and the digit after it. None for what is no number.
-fn tenth(word: &str) -> Option<(Cow<'_, str>, u8)> {
-    /// Whole numbers with so many digits are exact.
-    const EXACT: usize = 15;
-    let (whole, decimals) = word.split_once('.').unwrap_or((word, ""));
-    let size = whole.strip_prefix('-').unwrap_or(whole);
-    if (1..=EXACT).contains(&size.len()) && size.bytes().chain(decimals.bytes()).all(|byte| byte.is_ascii_digit()) {
-        // The text of a figure has two decimals. It needs no more than its digits, but for a carry and for the middle between two.
-        let digit = match *decimals.as_bytes() {
-            [] => Some(b'0'),
-            [digit] | [digit, b'0'..=b'4'] => Some(digit),
-            [digit @ b'0'..=b'8', b'6'..=b'9'] => Some(digit + 1),
-            _ => None,
-        };
-        if let Some(digit) = digit {
-            return Some((Cow::Borrowed(whole), digit));
-        }
-    }
-    let text = format!("{:.1}", word.parse::<f64>().ok()?);
-    match text.split_once('.') {
-        Some((whole, tenth)) => Some((Cow::Owned(whole.to_owned()), *tenth.as_bytes().first()?)),
-        None => Some((Cow::Owned(text), b'0')),
+        render(
+            "log.html",
+            context! {
+                name => file,
+                title => "estimate",
+                version => env!("CARGO_PKG_VERSION"),
+                vehicle_name => &self.vehicle.name,
+                observer => self.observer,
+                log => self.log.shown().to_string(),
+                shifts_of_log => self.shifts_of_log,
+                shown => self.shifts.len(),
+                undrawn => self.shifts.len() - drawn,
+                findings => self.findings.to_vec(),
+                overview => overview_figure(self.overview, self.shifts).html(),
+                titles => titles,
+                left_out => self.shifts.len() - rows.len(),
+                rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn }).collect::<Vec<_>>(),
+                figures => figures,
+                others => self.shifts.iter().filter(|shift| !shift.of_vehicle).count(),
+                inputs => origin(&[&self.vehicle.source]),
+            },
+        )
     }
 }
 
@@ -453,37 +393,5 @@ mod tests {
         };
         // Until the next sample, and of a long drive for a part of it.
         assert_eq!((drawn(100, 50), drawn(30_000, 50), drawn(100, 99)), (2, 100, 1));
-    }
-
-    #[test]
-    fn a_page_takes_as_many_figures_as_it_has_room_for() {
-        let figures = |size: usize| within_bytes(std::iter::repeat_with(move || "x".repeat(size)).take(300)).count();
-        assert_eq!(figures(1000), 300);
-        assert_eq!(figures(100_000), MOST_BYTES / 100_000);
-        assert_eq!(figures(MOST_BYTES + 1), 0);
-    }
-
-    #[test]
-    fn a_compact_figure_has_its_curves_to_a_tenth_of_a_pixel() {
-        let svg =
-            r#"<svg><path d="M 74.81 36.25 L 83.04 -35.000000004 Z" fill="none"/><text x="1.25">0.25</text></svg>"#;
-        let expected = r#"<svg><path d="M74.8 36.2L83 -35Z" fill="none"/><text x="1.25">0.25</text></svg>"#;
-        assert_eq!(compact(svg), expected);
-        assert_eq!(compact("<svg></svg>"), "<svg></svg>");
-    }
-
-    #[test]
-    fn a_tenth_from_the_digits_is_that_of_the_number() {
-        let parts = ["0", "7", "99", "8123"].into_iter().flat_map(|whole| [whole.to_owned(), format!("-{whole}")]);
-        for whole in parts {
-            let decimals = (0..100).map(|i| format!(".{i:02}")).chain((0..10).map(|i| format!(".{i}")));
-            let others = [".125", ".150000001", ".05e1", "e2", "", "."].map(str::to_owned);
-            for word in decimals.chain(others).map(|decimals| whole.clone() + &decimals) {
-                let number = format!("{:.1}", word.parse::<f64>().unwrap());
-                let expected = number.strip_suffix(".0").unwrap_or(&number);
-                assert_eq!(compact(&format!(" d=\"M {word} L\"")), format!(" d=\"M{expected}L\""), "{word}");
-            }
-        }
-        assert_eq!(compact(" d=\"M NaN 1 inf A\""), " d=\"MNaN1 infA\"");
     }
 }

@@ -8,7 +8,7 @@ use study::any_shift::SquaredErrors;
 use study::any_shift::matrix::{CLASSES, Matrix, MatrixCounts, MatrixRow, NOTHING_N_M, PhaseErrors, Pooled, class};
 use trace::Cell;
 
-use crate::page::{PageError, origin, templates};
+use crate::page::{PageError, origin, render};
 use crate::tables::number;
 
 /// Names of the phases and of the clutches, in the order of the errors.
@@ -199,31 +199,34 @@ pub fn matrix_page(matrix: &Matrix, car: &CarFile, seed: u64) -> Result<String, 
     let all = Pooled::of(&matrix.rows, |_| true).counts;
     let (kind_titles, kinds) = kind_rows(matrix);
     let (titles, rows) = shift_rows(matrix, car);
-    Ok(templates()?.get_template("matrix.html")?.render(context! {
-        name => "matrix",
-        title => "shifts and kinds",
-        vehicle_name => &car.name,
-        gearbox_name => &car.gearbox.name,
-        version => env!("CARGO_PKG_VERSION"),
-        draws => matrix.draws,
-        seed,
-        nothing => NOTHING_N_M,
-        kinds => ShiftKind::ALL.map(ShiftKind::name),
-        chart => chart(matrix, car),
-        kind_titles,
-        kind_rows => kinds,
-        titles,
-        rows,
-        shifts => matrix.rows.len(),
-        counts => context! {
-            above => all.above, compared => all.compared, runs_above => all.runs_above,
-            compared_runs => all.compared_runs, outside => all.outside, values => all.values,
-            slips => all.slips_said, rows => all.rows,
+    render(
+        "matrix.html",
+        context! {
+            name => "matrix",
+            title => "shifts and kinds",
+            vehicle_name => &car.name,
+            gearbox_name => &car.gearbox.name,
+            version => env!("CARGO_PKG_VERSION"),
+            draws => matrix.draws,
+            seed,
+            nothing => NOTHING_N_M,
+            kinds => ShiftKind::ALL.map(ShiftKind::name),
+            chart => chart(matrix, car),
+            kind_titles,
+            kind_rows => kinds,
+            titles,
+            rows,
+            shifts => matrix.rows.len(),
+            counts => context! {
+                above => all.above, compared => all.compared, runs_above => all.runs_above,
+                compared_runs => all.compared_runs, outside => all.outside, values => all.values,
+                slips => all.slips_said, rows => all.rows,
+            },
+            without_tables => without_tables(matrix, car),
+            failures => failures(matrix, car),
+            inputs => origin(&[&car.source]),
         },
-        without_tables => without_tables(matrix, car),
-        failures => failures(matrix, car),
-        inputs => origin(&[&car.source]),
-    })?)
+    )
 }
 
 /// A row for each pair of gears, a cell for each kind: ratios of inertia and torque phase, coloured.

@@ -25,7 +25,7 @@ pub struct Page {
 }
 
 /// The templates of all pages.
-pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
+fn templates() -> Result<Environment<'static>, minijinja::Error> {
     let mut environment = Environment::new();
     environment.add_template("base.html", include_str!("../templates/base.html"))?;
     environment.add_template("origin.html", include_str!("../templates/origin.html"))?;
@@ -42,6 +42,30 @@ pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_template("speeds.html", include_str!("../templates/speeds.html"))?;
     environment.add_template("study.html", include_str!("../templates/study.html"))?;
     Ok(environment)
+}
+
+/// The library that draws figures.
+const PLOTS: &str = include_str!("../vendor/uplot/uPlot.iife.min.js");
+const PLOTS_STYLE: &str = include_str!("../vendor/uplot/uPlot.min.css");
+/// What the page does with it, and with tables.
+const SCRIPT: &str = concat!(
+    "(() => {\n\"use strict\";\n",
+    include_str!("page/data.js"),
+    include_str!("page/figure.js"),
+    include_str!("page/files.js"),
+    include_str!("page/table.js"),
+    include_str!("page/start.js"),
+    "})();\n"
+);
+
+/// A page from its template, with the scripts of its figures.
+pub(crate) fn render(template: &str, context: Value) -> Result<String, PageError> {
+    let html = templates()?.get_template(template)?.render(context)?;
+    if !html.contains("<div class=\"figure\">") {
+        return Ok(html);
+    }
+    let head = format!("<style>{PLOTS_STYLE}</style>\n<script>{PLOTS}</script>\n</head>");
+    Ok(html.replacen("</head>", &head, 1).replacen("</body>", &format!("<script>\n{SCRIPT}</script>\n</body>"), 1))
 }
 
 /// The files that a page follows from, for the end of the page.
@@ -61,27 +85,29 @@ impl Page {
     /// # Errors
     /// None in a released program; the tests render the template.
     pub fn of(comparison: &Comparison, vehicle: &VehicleFile, source: &Source) -> Result<Self, PageError> {
-        let shift = shift_figure(comparison).svg();
-        let drive = drive_figure(comparison).svg();
+        let (shift, drive) = (shift_figure(comparison), drive_figure(comparison));
         let experiment = &comparison.experiment;
-        let html = templates()?.get_template("report.html")?.render(context! {
-            title => &experiment.title,
-            name => &experiment.name,
-            vehicle_name => &vehicle.name,
-            version => env!("CARGO_PKG_VERSION"),
-            shift_figure => inline(&shift),
-            drive_figure => inline(&drive),
-            findings => findings(comparison),
-            scores => score_rows(comparison),
-            range_mpa => format!("{:.1}", mpa(experiment.shift.line_pressure_pa)),
-            certificates => rigid_certificates(comparison),
-            compliant => compliant_certificates(comparison),
-            quality => comparison.quality.as_ref().map(quality_rows),
-            inputs => origin(&[&vehicle.source, source]),
-            seed => experiment.sensors.map(|sensors| sensors.seed),
-            certified => comparison.runs.first().filter(|_| !comparison.bound_pa.is_empty()).map(|run| &run.entry.name),
-        })?;
-        Ok(Self { html, figures: vec![("shift.svg".into(), shift), ("drive.svg".into(), drive)] })
+        let html = render(
+            "report.html",
+            context! {
+                title => &experiment.title,
+                name => &experiment.name,
+                vehicle_name => &vehicle.name,
+                version => env!("CARGO_PKG_VERSION"),
+                shift_figure => shift.html(),
+                drive_figure => drive.html(),
+                findings => findings(comparison),
+                scores => score_rows(comparison),
+                range_mpa => format!("{:.1}", mpa(experiment.shift.line_pressure_pa)),
+                certificates => rigid_certificates(comparison),
+                compliant => compliant_certificates(comparison),
+                quality => comparison.quality.as_ref().map(quality_rows),
+                inputs => origin(&[&vehicle.source, source]),
+                seed => experiment.sensors.map(|sensors| sensors.seed),
+                certified => comparison.runs.first().filter(|_| !comparison.bound_pa.is_empty()).map(|run| &run.entry.name),
+            },
+        )?;
+        Ok(Self { html, figures: vec![("shift.svg".into(), shift.svg()), ("drive.svg".into(), drive.svg())] })
     }
 }
 

@@ -10,7 +10,7 @@ use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::map_figures::map_figures;
-use crate::page::{PageError, inline, templates};
+use crate::page::{PageError, inline, render};
 use crate::shift_figure::{observers_figure, shift_figure};
 use crate::tables::{phase_name, quality_rows, score_rows};
 
@@ -61,25 +61,28 @@ impl Reproduction {
                 }
             })
             .collect();
-        let html = templates()?.get_template("reproduction.html")?.render(context! {
-            name => "E1 to E4",
-            title => "The chapter’s experiments",
-            version => env!("CARGO_PKG_VERSION"),
-            vehicle_name => &vehicle.name,
-            vehicle_source => vehicle.source.path.shown().to_string(),
-            vehicle_sha256 => vehicle.source.sha256(),
-            range_mpa => format!("{:.1}", mpa(chapter.experiments[0].experiment.shift.line_pressure_pa)),
-            statements => groups(chapter).iter().filter(|rows| rows[0].bound.is_none()).map(|rows| statement_view(rows)).collect::<Vec<_>>(),
-            offsets => chapter.statements.iter().filter_map(offset_view).map(|view| view.page()).collect::<Vec<_>>(),
-            settings => settings_text(&chapter.settings),
-            offset_tests => OFFSETS,
-            agreeing => agreeing(chapter),
-            experiments => experiments,
-            study_source => study.source.path.shown().to_string(),
-            study_sha256 => study.source.sha256(),
-            study_seed => study.seed,
-            maps => maps.iter().map(|(_, svg)| inline(svg)).collect::<Vec<_>>(),
-        })?;
+        let html = render(
+            "reproduction.html",
+            context! {
+                name => "E1 to E4",
+                title => "The chapter’s experiments",
+                version => env!("CARGO_PKG_VERSION"),
+                vehicle_name => &vehicle.name,
+                vehicle_source => vehicle.source.path.shown().to_string(),
+                vehicle_sha256 => vehicle.source.sha256(),
+                range_mpa => format!("{:.1}", mpa(chapter.experiments[0].experiment.shift.line_pressure_pa)),
+                statements => groups(chapter).iter().filter(|rows| rows[0].bound.is_none()).map(|rows| statement_view(rows)).collect::<Vec<_>>(),
+                offsets => chapter.statements.iter().filter_map(offset_view).map(|view| view.page()).collect::<Vec<_>>(),
+                settings => settings_text(&chapter.settings),
+                offset_tests => OFFSETS,
+                agreeing => agreeing(chapter),
+                experiments => experiments,
+                study_source => study.source.path.shown().to_string(),
+                study_sha256 => study.source.sha256(),
+                study_seed => study.seed,
+                maps => maps.iter().map(|(_, svg)| inline(svg)).collect::<Vec<_>>(),
+            },
+        )?;
         figures.extend(maps.into_iter().map(|(name, svg)| (name.to_owned(), svg)));
         Ok(Self { html, markdown: markdown(chapter), figures })
     }

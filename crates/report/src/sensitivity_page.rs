@@ -5,7 +5,7 @@ use minijinja::{Value, context};
 use study::PhaseSensitivity;
 use study::sensitivity::{ShaftEffect, ValveEffect, View};
 
-use crate::page::{PageError, origin, templates};
+use crate::page::{PageError, origin, render};
 
 /// The page; it needs nothing but itself.
 ///
@@ -45,21 +45,24 @@ pub fn sensitivity_page(
         .filter(|effect| effect.error != "friction")
         .map(|effect| (effect.bound * effect.pressure_pa_per_unit).abs())
         .fold(0.0, f64::max);
-    Ok(templates()?.get_template("sensitivity.html")?.render(context! {
-        name => "Sensitivity",
-        title => "Sensitivity of the estimated pressure to errors",
-        version => env!("CARGO_PKG_VERSION"),
-        vehicle_name => &vehicle.name,
-        phases => rows.collect::<Vec<_>>(),
-        hidden_kpa => format!("{:.0}", 1e-3 * hidden_pa),
-        valve => valve
-            .iter()
-            .map(|effect| context! { error => effect.error, kpa => format!("{:.1}", 1e-3 * effect.pressure_pa) })
-            .collect::<Vec<_>>(),
-        shaft => shaft
-            .iter()
-            .map(|effect| context! { error => effect.error, n_m => format!("{:.0}", effect.torque_n_m) })
-            .collect::<Vec<_>>(),
-        inputs => origin(&[&vehicle.source]),
-    })?)
+    render(
+        "sensitivity.html",
+        context! {
+            name => "Sensitivity",
+            title => "Sensitivity of the estimated pressure to errors",
+            version => env!("CARGO_PKG_VERSION"),
+            vehicle_name => &vehicle.name,
+            phases => rows.collect::<Vec<_>>(),
+            hidden_kpa => format!("{:.0}", 1e-3 * hidden_pa),
+            valve => valve
+                .iter()
+                .map(|effect| context! { error => effect.error, kpa => format!("{:.1}", 1e-3 * effect.pressure_pa) })
+                .collect::<Vec<_>>(),
+            shaft => shaft
+                .iter()
+                .map(|effect| context! { error => effect.error, n_m => format!("{:.0}", effect.torque_n_m) })
+                .collect::<Vec<_>>(),
+            inputs => origin(&[&vehicle.source]),
+        },
+    )
 }

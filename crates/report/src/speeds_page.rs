@@ -13,8 +13,9 @@ use trace::ShownPath as _;
 use trace::units::{km_h, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
-use crate::log_page::{MOST_DRAWN, compact, panel, within_bytes};
-use crate::page::{PageError, inline, origin, templates};
+use crate::interactive::within_room;
+use crate::log_page::{MOST_DRAWN, panel};
+use crate::page::{PageError, origin, render};
 use crate::palette::{RANGE, Weight};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
 use crate::tables::number;
@@ -72,18 +73,17 @@ impl SpeedsPage<'_> {
     pub fn html(&self) -> Result<String, PageError> {
         let torques: Vec<Option<ShiftTorque>> = self.torques();
         let drawn = || self.shifts.iter().zip(&torques).take(MOST_DRAWN);
-        let svgs =
-            within_bytes(drawn().map(|(shift, torque)| compact(&self.shift_figure(shift, torque.as_ref()).svg())));
+        let of_shifts = within_room(drawn().map(|(shift, torque)| self.shift_figure(shift, torque.as_ref())));
         let figures: Vec<Value> = drawn()
-            .zip(svgs)
+            .zip(of_shifts)
             .enumerate()
-            .map(|(i, ((shift, torque), svg))| {
+            .map(|(i, ((shift, torque), figure))| {
                 context! {
                     number => i + 1,
                     title => format!("{}-{}, {}", shift.from, shift.to, shift.kind_name()),
                     at => number(shift.start_s(), 2),
                     remark => self.remark(torque.as_ref()),
-                    svg => inline(&svg),
+                    figure,
                 }
             })
             .collect();
@@ -92,22 +92,25 @@ impl SpeedsPage<'_> {
         let converter = self.converter.as_ref().ok();
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
         let inputs: Vec<&Source> = self.map.into_iter().collect();
-        Ok(templates()?.get_template("speeds.html")?.render(context! {
-            name => file,
-            title => "drive",
-            version => env!("CARGO_PKG_VERSION"),
-            log => self.log.shown().to_string(),
-            shifts => self.shifts.len(),
-            findings => self.findings(&torques),
-            cannot => self.cannot(),
-            faults => self.faults.to_vec(),
-            overview => inline(&compact(&self.overview().svg())),
-            titles, rows, figures,
-            undrawn => self.shifts.len() - drawn,
-            converter => converter.map(|fit| inline(&self.converter_figure(fit).svg())),
-            engine => converter.map(|fit| inline(&compact(&self.engine_figure(fit).svg()))),
-            inputs => origin(&inputs),
-        })?)
+        render(
+            "speeds.html",
+            context! {
+                name => file,
+                title => "drive",
+                version => env!("CARGO_PKG_VERSION"),
+                log => self.log.shown().to_string(),
+                shifts => self.shifts.len(),
+                findings => self.findings(&torques),
+                cannot => self.cannot(),
+                faults => self.faults.to_vec(),
+                overview => self.overview().html(),
+                titles, rows, figures,
+                undrawn => self.shifts.len() - drawn,
+                converter => converter.map(|fit| self.converter_figure(fit).html()),
+                engine => converter.map(|fit| self.engine_figure(fit).html()),
+                inputs => origin(&inputs),
+            },
+        )
     }
 
     /// The torques of the shifts; none without a fitted converter.

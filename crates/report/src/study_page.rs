@@ -9,7 +9,7 @@ use study::{Row, Summary};
 use trace::units::mpa;
 
 use crate::figure::{Axis, Figure, Panel, Series};
-use crate::page::{PageError, inline, origin, templates};
+use crate::page::{PageError, inline, origin, render};
 use crate::palette::{FAMILY, observer_strokes};
 use crate::shift_figure::observers_of;
 use crate::tables::{COMPARED_NAMES, number, phase_name};
@@ -52,44 +52,47 @@ impl StudyPage {
                 shown
             })
             .collect();
-        let html = templates()?.get_template("study.html")?.render(context! {
-            name => &study.name,
-            title => &study.title,
-            version => env!("CARGO_PKG_VERSION"),
-            vehicle_name => &study.vehicle.name,
-            runs => summary.runs(),
-            plan => study.plan.name(),
-            seed => study.seed,
-            factors => study.factors.iter().map(|factor| {
-                let [low, high] = factor.values.taken().ends();
-                context! {
-                    name => &factor.name,
-                    key => &factor.key,
-                    low => short(low),
-                    high => short(high),
-                    sometimes => sometimes(&factor.values),
-                }
-            }).collect::<Vec<_>>(),
-            statuses => summary.statuses.iter()
-                .map(|(status, count)| context! { name => status.name().replace('_', " "), count => count })
-                .collect::<Vec<_>>(),
-            scores => scores(summary),
-            diverged => diverged(summary),
-            relative => relative(summary),
-            errors_figure => inline(&figures[0].1),
-            effects_figures => figures[1..3].iter().map(|(_, svg)| inline(svg)).collect::<Vec<_>>(),
-            observers => &layout.observers,
-            effects => (0..PHASES.len()).map(|phase| context! {
-                phase => phase_name(PHASES[phase]),
-                rows => effect_rows(summary, phase),
-            }).collect::<Vec<_>>(),
-            has_total => summary.effects(0, 0).iter().any(|effect| effect.total.is_some()),
-            has_sometimes => study.factors.iter().any(|factor| sometimes(&factor.values).is_some()),
-            first_observer => layout.observers.first(),
-            drawn_factors => DRAWN_FACTORS.min(layout.factors.len()),
-            worst => worst_runs,
-            inputs => origin(&[&study.source, &study.experiment.source, &study.vehicle.source]),
-        })?;
+        let html = render(
+            "study.html",
+            context! {
+                name => &study.name,
+                title => &study.title,
+                version => env!("CARGO_PKG_VERSION"),
+                vehicle_name => &study.vehicle.name,
+                runs => summary.runs(),
+                plan => study.plan.name(),
+                seed => study.seed,
+                factors => study.factors.iter().map(|factor| {
+                    let [low, high] = factor.values.taken().ends();
+                    context! {
+                        name => &factor.name,
+                        key => &factor.key,
+                        low => short(low),
+                        high => short(high),
+                        sometimes => sometimes(&factor.values),
+                    }
+                }).collect::<Vec<_>>(),
+                statuses => summary.statuses.iter()
+                    .map(|(status, count)| context! { name => status.name().replace('_', " "), count => count })
+                    .collect::<Vec<_>>(),
+                scores => scores(summary),
+                diverged => diverged(summary),
+                relative => relative(summary),
+                errors_figure => inline(&figures[0].1),
+                effects_figures => figures[1..3].iter().map(|(_, svg)| inline(svg)).collect::<Vec<_>>(),
+                observers => &layout.observers,
+                effects => (0..PHASES.len()).map(|phase| context! {
+                    phase => phase_name(PHASES[phase]),
+                    rows => effect_rows(summary, phase),
+                }).collect::<Vec<_>>(),
+                has_total => summary.effects(0, 0).iter().any(|effect| effect.total.is_some()),
+                has_sometimes => study.factors.iter().any(|factor| sometimes(&factor.values).is_some()),
+                first_observer => layout.observers.first(),
+                drawn_factors => DRAWN_FACTORS.min(layout.factors.len()),
+                worst => worst_runs,
+                inputs => origin(&[&study.source, &study.experiment.source, &study.vehicle.source]),
+            },
+        )?;
         Ok(Self { html, figures })
     }
 }

@@ -12,9 +12,8 @@ use study::any_shift::matrix::Matrix;
 use study::any_shift::worth_a_look::BY_EACH;
 use study::any_shift::{ShiftDraw, TruePhase};
 
-use crate::log_page::compact;
 use crate::matrix_page::kind_rows;
-use crate::page::{PageError, inline, origin, templates};
+use crate::page::{PageError, origin, render};
 use crate::tables::{health_meaning, number};
 use figures::{overview_figure, shift_figure};
 use shifts::filled_columns;
@@ -61,35 +60,38 @@ impl DrivePage<'_> {
                 title => title(shift, car),
                 at => number(shift.time_s[0], 2),
                 clutches => clutch_words(shift, car),
-                svg => inline(&compact(&shift_figure(shift, drive, car).svg())),
+                figure => shift_figure(shift, drive, car).html(),
             }
         });
         let named = worst.iter().take(WORST).map(|shift| {
             context! { number => shift.number, gears => gears(shift, car), error => number(shift.worst_error_n_m(), 1) }
         });
-        Ok(templates()?.get_template("drive.html")?.render(context! {
-            name => self.name,
-            title => "drive",
-            version => env!("CARGO_PKG_VERSION"),
-            vehicle_name => &car.name,
-            gearbox_name => &car.gearbox.name,
-            overview => inline(&compact(&overview_figure(drive, car).svg())),
-            findings => findings(drive),
-            kind_titles,
-            kinds,
-            columns => columns.iter().map(|column| context! { title => column.title, meaning => column.meaning }).collect::<Vec<_>>(),
-            rows,
-            healths => healths(drive),
-            figures => figures.collect::<Vec<_>>(),
-            worst => named.collect::<Vec<_>>(),
-            undrawn => drive.shifts.len() - drawn.len(),
-            by_each => BY_EACH,
-            draw => self.draw.map(|(draw, _)| draw_rows(draw, car)),
-            converter => self.draw.filter(|_| car.converter.is_some()).map(|(draw, _)| number(draw.converter, 3)),
-            seed => self.draw.map(|(_, seed)| seed),
-            has_truth => drive.has_truth(),
-            inputs => origin(self.sources),
-        })?)
+        render(
+            "drive.html",
+            context! {
+                name => self.name,
+                title => "drive",
+                version => env!("CARGO_PKG_VERSION"),
+                vehicle_name => &car.name,
+                gearbox_name => &car.gearbox.name,
+                overview => overview_figure(drive, car).html(),
+                findings => findings(drive),
+                kind_titles,
+                kinds,
+                columns => columns.iter().map(|column| context! { title => column.title, meaning => column.meaning }).collect::<Vec<_>>(),
+                rows,
+                healths => healths(drive),
+                figures => figures.collect::<Vec<_>>(),
+                worst => named.collect::<Vec<_>>(),
+                undrawn => drive.shifts.len() - drawn.len(),
+                by_each => BY_EACH,
+                draw => self.draw.map(|(draw, _)| draw_rows(draw, car)),
+                converter => self.draw.filter(|_| car.converter.is_some()).map(|(draw, _)| number(draw.converter, 3)),
+                seed => self.draw.map(|(_, seed)| seed),
+                has_truth => drive.has_truth(),
+                inputs => origin(self.sources),
+            },
+        )
     }
 }
 
