@@ -29,6 +29,8 @@ mod logs;
 mod long_logs;
 mod measured;
 mod measured_pressures;
+#[cfg(unix)]
+mod open_page;
 mod other_cars;
 mod own_car;
 mod pressure_commands;

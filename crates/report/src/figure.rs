@@ -18,7 +18,7 @@ pub use crate::axis::Axis;
 use crate::axis::{Scale, decimals, nice_step};
 use crate::legend::{Entry, Key, LABEL_SIZE, LINE, broken, placed, width};
 pub use crate::palette::{Stroke, Weight};
-use crate::simplified::simplified;
+use crate::simplified::{simplified, simplified_range};
 
 const WIDTH: f64 = 900.0;
 const TOP: f64 = 8.0;
@@ -157,6 +157,7 @@ impl Figure {
         let scale = panel.axis.scale(curves, ends, panel.height / TICK_DISTANCE);
         let tolerance = TOLERANCE * (scale.high - scale.low) / panel.height;
         let visible = visible.iter().map(|points| simplified(points, tolerance)).collect();
+        let range = range.map(|ends| simplified_range(ends, tolerance));
         let extremes = curves.into_iter().chain(ends).reduce(|(a, b), (low, high)| (a.min(low), b.max(high)));
         let mut placed = Placed { panel, visible, range, extremes, scale, height: panel.height };
         placed.height = placed.legend(0.0).iter().map(Entry::height).sum::<f64>().max(panel.height);

@@ -14,8 +14,10 @@ mod legend;
 pub mod log_page;
 pub mod map_figures;
 pub mod matrix_page;
+mod motion;
 pub mod page;
 pub mod palette;
+mod panels;
 pub mod reproduction;
 pub mod sensitivity_page;
 pub mod shift_figure;
@@ -24,6 +26,7 @@ pub mod speeds_page;
 pub mod study_page;
 mod svg_text;
 pub mod tables;
+mod words;
 
 pub use bench_page::bench_page;
 pub use error_bound_page::error_bound_page;

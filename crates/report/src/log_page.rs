@@ -1,5 +1,6 @@
 //! The page of a log: the whole drive, the table of its shifts, each shift drawn.
 
+use std::cmp::Ordering;
 use std::path::Path;
 
 use config::VehicleFile;
@@ -13,10 +14,13 @@ use trace::units::{mpa, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
 use crate::interactive::within_room;
+use crate::motion::motion_panels;
 use crate::page::{PageError, origin, render};
 use crate::palette::{RANGE, Weight};
+use crate::panels::{panel, with_values};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
 use crate::tables::{coverage, number};
+use crate::words::found;
 
 /// Shifts that are drawn.
 pub const MOST_DRAWN: usize = 400;
@@ -54,8 +58,7 @@ impl LogPage<'_> {
         let drawn: Vec<&ShiftEstimate> =
             self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MOST_DRAWN).collect();
         let points = POINTS / CURVES / drawn.len().max(1);
-        let command = self.vehicle.settings.valve.command_kind();
-        let figures = within_room(drawn.iter().map(|shift| shift_figure(shift, command, points)));
+        let figures = within_room(drawn.iter().map(|shift| shift_figure(shift, self.vehicle, points)));
         let figures = drawn.iter().zip(figures).map(|(shift, figure)| {
             context! {
                 number => shift.number,
@@ -66,8 +69,12 @@ impl LogPage<'_> {
             }
         });
         let figures: Vec<Value> = figures.collect();
-        let drawn = figures.len();
-        let (titles, rows) = shift_rows(&self.shifts[..self.shifts.len().min(MOST_ROWS)], MOST_ROWS);
+        let drawn = &drawn[..figures.len()];
+        let mut order: Vec<usize> = (0..self.shifts.len().min(MOST_ROWS)).collect();
+        order.sort_by(|a, b| by_need(&self.shifts[*a], &self.shifts[*b]).then(a.cmp(b)));
+        let (titles, rows) = shift_rows(self.shifts, MOST_ROWS);
+        let is_drawn = |at: usize| drawn.iter().any(|shift| shift.number == self.shifts[at].number);
+        let opened = order.iter().copied().find(|at| is_drawn(*at)).map(|at| self.shifts[at].number);
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
         render(
             "log.html",
@@ -80,18 +87,27 @@ impl LogPage<'_> {
                 log => self.log.shown().to_string(),
                 shifts_of_log => self.shifts_of_log,
                 shown => self.shifts.len(),
-                undrawn => self.shifts.len() - drawn,
-                findings => self.findings.to_vec(),
+                undrawn => self.shifts.len() - drawn.len(),
+                opened,
+                found => found(self.findings),
                 overview => overview_figure(self.overview, self.shifts).html(),
                 titles => titles,
                 left_out => self.shifts.len() - rows.len(),
-                rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn }).collect::<Vec<_>>(),
+                rows => order.iter().map(|&at| context! { cells => &rows[at], linked => is_drawn(at) }).collect::<Vec<_>>(),
                 figures => figures,
                 others => self.shifts.iter().filter(|shift| !shift.of_vehicle).count(),
                 inputs => origin(&[&self.vehicle.source]),
             },
         )
     }
+}
+
+/// The order of the table: the worst health first, of equal ones the larger share.
+fn by_need(a: &ShiftEstimate, b: &ShiftEstimate) -> Ordering {
+    let worst = |shift: &ShiftEstimate| shift.estimated.as_ref().and_then(|e| e.unhealthy.first().copied());
+    let key = |shift: &ShiftEstimate| worst(shift).map_or((Health::Good, 0.0), |worst| worst);
+    let ((a_health, a_share), (b_health, b_share)) = (key(a), key(b));
+    b_health.cmp(&a_health).then(b_share.total_cmp(&a_share))
 }
 
 /// Titles of the table of shifts, and its first rows. Columns that no shift fills are left out.
@@ -158,10 +174,6 @@ const SPEEDS: [(&str, Stroke); 3] =
     [("engine", Stroke::THIRD), ("turbine", Stroke::SIGNAL), ("gearbox output", Stroke::SECOND)];
 pub(crate) const ESTIMATE: Stroke = Stroke { colour: RANGE, weight: Weight::Equal, dash: None };
 
-pub(crate) fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
-    Panel { y_label: y_label.to_owned(), height, series, band: None, axis: Axis::All }
-}
-
 /// The whole drive. Each interval gives its lowest and its highest value.
 fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
     let both = |value: &dyn Fn(&study::overview::Interval) -> [f64; 2], unit: fn(f64) -> f64| -> Vec<(f64, f64)> {
@@ -211,7 +223,7 @@ fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
 type Points = Vec<(f64, f64)>;
 
 /// A shift with some time around it.
-fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> Figure {
+fn shift_figure(shift: &ShiftEstimate, vehicle: &VehicleFile, points: usize) -> Figure {
     let samples = thinned(&shift.samples, points);
     let samples = Samples(&samples);
     let readings = |i: usize| samples.measured(&|sample| read(sample.speeds_rad_s[i]).map(rpm));
@@ -229,11 +241,15 @@ fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> F
         if !shaft.is_empty() {
             panels.push(panel("shaft torque (N\u{a0}m)", 100.0, vec![estimate(shaft)]));
         }
-        panels.push(samples.command_panel(command));
+        panels.push(samples.command_panel(vehicle.settings.valve.command_kind()));
+        panels.push(samples.friction_power_panel(vehicle));
         let is = |sample: &LogSample| Health::ALL.map(|health| health == sample.estimate.health);
         let healths: Vec<_> = samples.0.iter().map(|sample| (sample.time_s, is(sample))).collect();
         panels.extend(health_panel(&healths));
     }
+    let radius_m = vehicle.road.wheel_radius_m / vehicle.driveline.final_ratio;
+    panels.extend(motion_panels(samples.0.iter().map(|sample| (sample.time_s, radius_m * sample.speeds_rad_s[2]))));
+    let (panels, _) = with_values(panels);
     let [from_s, to_s] = shift.window_s;
     Figure { x_label: "time (s)", x_range: (from_s, to_s), spans: phases(shift), panels }
 }
@@ -305,6 +321,16 @@ impl Samples<'_> {
             axis: Axis::Within(-0.1 * most.max(1.0), 1.1 * most.max(1.0)),
             ..panel("clutch torque (N\u{a0}m)", 120.0, series)
         }
+    }
+
+    /// Estimated torque times slip of the oncoming clutch, from the kiss point on.
+    fn friction_power_panel(&self, vehicle: &VehicleFile) -> Panel {
+        let power = |sample: &LogSample| {
+            let [_, turbine, output] = sample.speeds_rad_s;
+            let slip_rad_s = vehicle.shift.oncoming_slip(turbine, output);
+            read(1e-3 * sample.estimate.clutch_torque_n_m * slip_rad_s)
+        };
+        panel("friction power (kW)", 80.0, vec![estimate(self.measured(&power))])
     }
 
     fn command_panel(&self, command: CommandKind) -> Panel {

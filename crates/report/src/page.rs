@@ -7,7 +7,7 @@ use study::Comparison;
 use trace::ShownPath as _;
 use trace::units::mpa;
 
-use crate::shift_figure::{drive_figure, shift_figure};
+use crate::shift_figure::{drive_figure, page_figure, shift_figure};
 use crate::tables::{compliant_certificates, phase_name, quality_rows, rigid_certificates, score_rows};
 
 /// Why a page could not be made.
@@ -28,6 +28,7 @@ pub struct Page {
 fn templates() -> Result<Environment<'static>, minijinja::Error> {
     let mut environment = Environment::new();
     environment.add_template("base.html", include_str!("../templates/base.html"))?;
+    environment.add_template("found.html", include_str!("../templates/found.html"))?;
     environment.add_template("origin.html", include_str!("../templates/origin.html"))?;
     environment.add_template("scores.html", include_str!("../templates/scores.html"))?;
     environment.add_template("report.html", include_str!("../templates/report.html"))?;
@@ -94,7 +95,7 @@ impl Page {
                 name => &experiment.name,
                 vehicle_name => &vehicle.name,
                 version => env!("CARGO_PKG_VERSION"),
-                shift_figure => shift.html(),
+                shift_figure => page_figure(comparison).html(),
                 drive_figure => drive.html(),
                 findings => findings(comparison),
                 scores => score_rows(comparison),

@@ -1,11 +1,14 @@
 //! The figures of a shift and of the drive around it.
 
+use drivetrain::jerk::WINDOW_S;
 use observer::{Bounds, Estimate};
 use study::{Comparison, ObserverRun, ShiftQuality};
 use trace::{Trace, signal, units};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke, extremes};
+use crate::motion::motion_panels;
 use crate::palette::{RANGE, main_observer, observer_strokes};
+use crate::panels::{panel, with_values};
 
 /// Colour of the torque phase.
 pub(crate) const TORQUE_PHASE: &str = "#fbf0d0";
@@ -23,6 +26,21 @@ pub fn shift_figure(comparison: &Comparison) -> Figure {
     panels.extend(t.observers());
     panels.push(t.commands(110.0));
     t.around_shift(panels)
+}
+
+/// As [`shift_figure`], with friction power, acceleration and jerk.
+pub(crate) fn page_figure(comparison: &Comparison) -> Figure {
+    let t = Curves::of(comparison);
+    let mut figure = shift_figure(comparison);
+    figure.panels.push(t.friction_power());
+    let (from_s, to_s) = figure.x_range;
+    let speeds = comparison.trace.get(signal::VEHICLE_SPEED).unwrap_or_default();
+    let speeds = comparison.trace.time_s.iter().copied().zip(speeds.iter().copied());
+    // Windows at both ends of the figure reach beyond it.
+    let around = speeds.filter(|(time_s, _)| (from_s - WINDOW_S..=to_s + WINDOW_S).contains(time_s));
+    figure.panels.extend(motion_panels(around));
+    (figure.panels, _) = with_values(figure.panels);
+    figure
 }
 
 /// Pressures, torques and errors through the shift: what an experiment with several observers is about.
@@ -53,10 +71,6 @@ pub fn drive_figure(comparison: &Comparison) -> Figure {
             panel("acceleration (m/s²)", 90.0, vehicle(signal::VEHICLE_ACCELERATION, |x| x)),
         ],
     }
-}
-
-fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
-    Panel { y_label: y_label.to_owned(), height, series, band: None, axis: Axis::All }
 }
 
 struct Curves<'a> {
@@ -202,6 +216,23 @@ impl<'a> Curves<'a> {
                 command("oncoming", Stroke::SIGNAL, oncoming),
                 command("offgoing", Stroke::SECOND, offgoing),
                 self.signal("throttle (0 to 1)", Stroke::THIRD, signal::THROTTLE, |x| x),
+            ],
+        )
+    }
+
+    /// Torque times slip of both clutches.
+    fn friction_power(&self) -> Panel {
+        let power = |label: &str, stroke, torque, slip| {
+            let [torque, slip] = [torque, slip].map(|name| self.trace.get(name).unwrap_or_default());
+            let power = torque.iter().zip(slip).map(|(torque, slip)| 1e-3 * torque * slip);
+            Series { label: label.to_owned(), stroke, points: self.trace.time_s.iter().copied().zip(power).collect() }
+        };
+        panel(
+            "friction power (kW)",
+            90.0,
+            vec![
+                power("oncoming clutch", Stroke::SIGNAL, signal::ONCOMING_TORQUE, signal::ONCOMING_SLIP),
+                power("offgoing clutch", Stroke::SECOND, signal::OFFGOING_TORQUE, signal::OFFGOING_SLIP),
             ],
         )
     }

@@ -34,6 +34,13 @@ pub(crate) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64
     kept
 }
 
+/// Both ends of a range, which are at the same places: where either needs a point, both have one.
+pub(crate) fn simplified_range(ends: [Vec<(f64, f64)>; 2], tolerance: f64) -> [Vec<(f64, f64)>; 2] {
+    let [lower, upper] = [0, 1].map(|end| simplified(&ends[end], tolerance));
+    let is_kept = |kept: &[(f64, f64)], x: f64| kept.binary_search_by(|point| point.0.total_cmp(&x)).is_ok();
+    ends.map(|points| points.into_iter().filter(|(x, _)| is_kept(&lower, *x) || is_kept(&upper, *x)).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,6 +67,14 @@ mod tests {
         let kept = simplified(&curve, 0.01);
         assert!(kept.len() < 100, "{}", kept.len());
         assert!(curve.iter().all(|&(x, y)| (at(&kept, x) - y).abs() <= 0.01 + 1e-12));
+    }
+
+    #[test]
+    fn both_ends_of_a_range_keep_the_same_places() {
+        let end = |corner: i32| (0..100).map(|i| (f64::from(i), f64::from((i - corner).max(0)))).collect::<Vec<_>>();
+        let [lower, upper] = simplified_range([end(30), end(70)], 0.1);
+        assert!(lower.len() < 10 && lower.iter().zip(&upper).all(|(lower, upper)| lower.0 == upper.0), "{lower:?}");
+        assert!((at(&lower, 30.0)).abs() <= 0.1 && (at(&upper, 70.0)).abs() <= 0.1);
     }
 
     #[test]

@@ -14,11 +14,14 @@ use trace::units::{km_h, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
 use crate::interactive::within_room;
-use crate::log_page::{MOST_DRAWN, panel};
+use crate::log_page::MOST_DRAWN;
+use crate::motion::motion_panels;
 use crate::page::{PageError, origin, render};
 use crate::palette::{RANGE, Weight};
+use crate::panels::{panel, with_values};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
 use crate::tables::number;
+use crate::words::found;
 
 /// Points of a curve over the whole drive, and of one over a shift.
 const POINTS: usize = 3000;
@@ -100,9 +103,9 @@ impl SpeedsPage<'_> {
                 version => env!("CARGO_PKG_VERSION"),
                 log => self.log.shown().to_string(),
                 shifts => self.shifts.len(),
-                findings => self.findings(&torques),
+                found => found(&self.findings(&torques)),
                 cannot => self.cannot(),
-                faults => self.faults.to_vec(),
+                faults => found(self.faults),
                 overview => self.overview().html(),
                 titles, rows, figures,
                 undrawn => self.shifts.len() - drawn,
@@ -290,7 +293,7 @@ impl SpeedsPage<'_> {
             },
             self.engine_torques([x_range.0, x_range.1], POINTS, 110.0),
         ];
-        Figure { x_label: "time (s)", x_range, spans: spans.collect(), panels: with_curves(panels) }
+        Figure { x_label: "time (s)", x_range, spans: spans.collect(), panels: with_values(panels).0 }
     }
 
     fn gears(&self, span_s: [f64; 2], most: usize) -> Panel {
@@ -447,6 +450,7 @@ impl SpeedsPage<'_> {
         }
         panels.push(self.engine_torques(window_s, SHIFT_POINTS, 90.0));
         panels.push(self.gears(window_s, SHIFT_POINTS));
+        panels.extend(motion_panels(record.vehicle.between(window_s)));
         let inertia = shift.inertia_s.map(|[start, end]| Span {
             label: "ratio changes".to_owned(),
             start,
@@ -457,7 +461,7 @@ impl SpeedsPage<'_> {
             x_label: "time (s)",
             x_range: (window_s[0], window_s[1]),
             spans: inertia.into_iter().collect(),
-            panels: with_curves(panels),
+            panels: with_values(panels).0,
         }
     }
 }
@@ -468,11 +472,6 @@ const SYNCHRONOUS: Stroke = Stroke { colour: "#009E73", weight: Weight::Equal, d
 
 fn series(label: &str, stroke: Stroke, points: Vec<(f64, f64)>) -> Series {
     Series { label: label.to_owned(), stroke, points }
-}
-
-/// The panels that show anything.
-fn with_curves(panels: Vec<Panel>) -> Vec<Panel> {
-    panels.into_iter().filter(|panel| panel.series.iter().any(|series| !series.points.is_empty())).collect()
 }
 
 /// At most so many readings of a span, evenly.

@@ -45,6 +45,9 @@ pub(crate) struct Inspect {
     /// With --shifts: a page of the drive, with its shifts, the converter, engine torque and the torque at the turbine
     #[arg(short, long, value_name = "PAGE.html", requires = "shifts")]
     pub(crate) output: Option<PathBuf>,
+    /// Open the page in the browser
+    #[arg(long, requires = "output")]
+    pub(crate) open: bool,
     /// Ratios of the forward gears, 1st first; they replace those of the map
     #[arg(long, value_name = "R1,R2,...", value_delimiter = ',', requires = "shifts")]
     pub(crate) ratios: Vec<f64>,
@@ -74,6 +77,9 @@ pub(crate) struct Estimate {
     /// standard output, as CSV
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
+    /// Open the page in the browser
+    #[arg(long, requires = "output")]
+    pub(crate) open: bool,
     /// File of what the filter of a car with a gearbox has learnt of it: read before the first row if it is there, written after the last.
     /// Several logs are then estimated one after the other, each with what the logs before it have left
     #[arg(long, value_name = "LEARNT.toml")]

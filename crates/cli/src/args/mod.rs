@@ -285,6 +285,9 @@ pub(crate) struct Demo {
     /// Folder for the report
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-demo")]
     pub(crate) output: PathBuf,
+    /// Open the page in the browser
+    #[arg(long)]
+    pub(crate) open: bool,
 }
 
 #[derive(Debug, Args)]

@@ -12,6 +12,7 @@ use trace::{ShownPath as _, Trace, signal, units};
 use wetclutch::estimate::one_shift::observer::best;
 
 use crate::args::Demo;
+use crate::browser;
 use crate::commands::{writable, write_text, write_trace};
 use crate::failure::Failure;
 use crate::output;
@@ -42,7 +43,11 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     write_trace(&measured_only, &measured)?;
     write_trace(&estimate, &default_estimate(&vehicle, &measured)?)?;
 
-    print(&comparison, &report)
+    print(&comparison, &report)?;
+    if options.open {
+        browser::open(&report);
+    }
+    Ok(())
 }
 
 /// The default output of `estimate` for measured signals with a wheel speed.

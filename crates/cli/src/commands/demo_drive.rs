@@ -19,6 +19,7 @@ use trace::{Cell, ShownPath as _};
 use super::matrix::bench_sensors;
 use super::simulate_drive::{DriveTables, keeps_inputs};
 use crate::args::Demo;
+use crate::browser;
 use crate::commands::{read_car, writable, write_cells, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -62,7 +63,11 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     let page =
         DrivePage { name: &name, car: &car, draw: Some((&draw, options.seed)), drive: &scored, sources: &sources };
     write_text(&folder.join(PAGE), &page.html()?)?;
-    print(&scored, &car, &folder.join(PAGE))
+    print(&scored, &car, &folder.join(PAGE))?;
+    if options.open {
+        browser::open(&folder.join(PAGE));
+    }
+    Ok(())
 }
 
 /// Says which shifts the car is too slow for.

@@ -13,6 +13,7 @@ use trace::ShownPath as _;
 use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
+use crate::browser;
 use crate::commands::written::{is_page, replaces_only};
 use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, write_text};
 use crate::failure::Failure;
@@ -304,6 +305,9 @@ fn page(
         output::line(&sentence)?;
     }
     output::note(&format!("page: {}", path.shown()));
+    if options.open {
+        browser::open(path);
+    }
     Ok(())
 }
 

@@ -8,8 +8,10 @@ use trace::units::{km_h, mpa, rpm};
 
 use super::{MOST_DRAWN, clutch_names, name};
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
-use crate::log_page::{ESTIMATE, health_panel, panel};
+use crate::log_page::{ESTIMATE, health_panel};
+use crate::motion::motion_panels;
 use crate::palette::{RANGE, Weight};
+use crate::panels::{panel, with_values};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
 
 /// Time before and after a shift that its figure shows, s.
@@ -55,8 +57,8 @@ fn gear_axis(steps: &[(f64, f64)]) -> Axis {
     Axis::Fixed(gears().fold(0.0, f64::min), gears().fold(1.0, f64::max) + 0.5)
 }
 
-/// Gear, speeds and pedals over the whole drive.
-pub(super) fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
+/// Gear, speeds and pedals over the whole drive, and the quantities of which the log has no value.
+pub(super) fn overview_figure(drive: &ScoredDrive, car: &Car) -> (Figure, Vec<String>) {
     let states = &drive.states;
     let every = states.len().div_ceil(POINTS).max(1);
     let thinned = || states.iter().step_by(every);
@@ -83,18 +85,20 @@ pub(super) fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
     let speeds = speeds.map(|(i, (label, stroke))| curve(label, stroke, &|state| rpm(state.speeds_rad_s[i])));
     let pedals = ["throttle", "brake"].into_iter().zip([Stroke::SIGNAL, Stroke::THIRD]).enumerate();
     let pedals = pedals.map(|(i, (label, stroke))| curve(label, stroke, &|state| state.pedals[i]));
-    let panels = [
+    let panels = vec![
         Panel { axis: gear_axis(&gear.points), ..panel("gear", 120.0, vec![gear]) },
         panel("speed (km/h)", 80.0, vec![curve("vehicle", Stroke::SIGNAL, &|state| km_h(state.vehicle_m_s))]),
         panel("speed (rpm)", 110.0, speeds.collect()),
         Panel { axis: Axis::Fixed(0.0, 1.0), ..panel("pedals (0\u{a0}to\u{a0}1)", 70.0, pedals.collect()) },
     ];
-    Figure {
+    let (panels, missing) = with_values(panels);
+    let figure = Figure {
         x_label: "time (s)",
         x_range: (first_s, last_s.max(first_s + SHORTEST_S)),
-        spans: spans.take(4 * MOST_DRAWN).collect(),
+        spans: spans.take(MOST_DRAWN).collect(),
         panels: panels.into_iter().chain(health_panel(&healths)).collect(),
-    }
+    };
+    (figure, missing)
 }
 
 /// A shift with some time around it.
@@ -128,14 +132,28 @@ pub(super) fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) 
         panels.extend(roles().map(|(c, (role, name))| torque_panel(&shift.rows, c, format!("{name}, {role}"))));
         let with_pressure = roles().filter(|(c, _)| !is_one_way(&shift.rows, *c));
         panels.extend(with_pressure.map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
+        panels.push(friction_power_panel(&shift.rows, names));
     }
+    panels.extend(motion_panels(states.iter().map(|state| (state.time_s, state.vehicle_m_s))));
     let is = |row: &ShiftScoreRow| Health::ALL.map(|health| health == row.health);
     let healths: Vec<_> = shift.rows.iter().map(|row| (row.time_s, is(row))).collect();
     panels.extend(health_panel(&healths));
     let mut spans = phase_spans(shift, "torque phase", TruePhase::Torque, TORQUE_PHASE);
     spans.extend(phase_spans(shift, "inertia phase", TruePhase::Inertia, INERTIA_PHASE));
     spans.sort_by(|a, b| a.start.total_cmp(&b.start));
-    Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels }
+    Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels: with_values(panels).0 }
+}
+
+/// Estimated torque times slip of both clutches.
+fn friction_power_panel(rows: &[ShiftScoreRow], names: [&str; 2]) -> Panel {
+    let power = |clutch: &ClutchRow| 1e-3 * clutch.torque_n_m[1] * clutch.slip_rad_s;
+    let curve = |(c, (role, stroke)): (usize, (&str, Stroke))| Series {
+        label: format!("{}, {role}", names[c]),
+        stroke,
+        points: rows.iter().map(|row| (row.time_s, power(&row.clutches[c]))).collect(),
+    };
+    let roles = ["offgoing", "oncoming"].into_iter().zip([Stroke::SECOND, Stroke::SIGNAL]).enumerate();
+    panel("friction power by the estimate (kW)", 90.0, roles.map(curve).collect())
 }
 
 /// Whether a clutch of the shift is a one-way clutch, which has no pressure and no valve model.

@@ -3,6 +3,8 @@
 mod figures;
 mod shifts;
 
+use std::cmp::Ordering;
+
 use car::Car;
 use config::Source;
 use minijinja::{Value, context};
@@ -12,15 +14,17 @@ use study::any_shift::matrix::Matrix;
 use study::any_shift::worth_a_look::BY_EACH;
 use study::any_shift::{ShiftDraw, TruePhase};
 
+use crate::interactive::within_room;
 use crate::matrix_page::kind_rows;
 use crate::page::{PageError, origin, render};
 use crate::tables::{health_meaning, number};
+use crate::words::found;
 use figures::{overview_figure, shift_figure};
 use shifts::filled_columns;
 pub use shifts::{shift_cells, shift_rows, shift_words};
 
 /// Shifts that are drawn; of a drive with more, the worst, or those worth a look.
-pub const MOST_DRAWN: usize = 60;
+pub const MOST_DRAWN: usize = 400;
 /// Worst shifts that are named.
 const WORST: usize = 5;
 
@@ -49,20 +53,27 @@ impl DrivePage<'_> {
         let mut drawn: Vec<&ScoredShift> =
             worst.iter().filter(|shift| shift.is_drawn).take(MOST_DRAWN).copied().collect();
         drawn.sort_by_key(|shift| shift.number);
-        let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
-        let (columns, (_, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
-        let rows = rows.into_iter().zip(&drive.shifts);
-        let rows: Vec<Value> = rows.map(|(cells, shift)| context! { cells, linked => is_drawn(shift) }).collect();
-        let (kind_titles, kinds) = kind_rows(&Matrix::of_drive(drive, car));
-        let figures = drawn.iter().map(|shift| {
+        let figures = within_room(drawn.iter().map(|shift| shift_figure(shift, drive, car)));
+        let figures = drawn.iter().zip(figures).map(|(shift, figure)| {
             context! {
                 number => shift.number,
                 title => title(shift, car),
                 at => number(shift.time_s[0], 2),
                 clutches => clutch_words(shift, car),
-                figure => shift_figure(shift, drive, car).html(),
+                figure,
             }
         });
+        let figures: Vec<Value> = figures.collect();
+        drawn.truncate(figures.len());
+        let (columns, (_, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
+        let mut rows: Vec<_> = rows.into_iter().zip(&drive.shifts).collect();
+        rows.sort_by(|(_, a), (_, b)| by_need(a, b));
+        let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
+        let first = rows.iter().map(|(_, shift)| *shift).find(|shift| is_drawn(shift)).map(|shift| shift.number);
+        let rows: Vec<Value> =
+            rows.into_iter().map(|(cells, shift)| context! { cells, linked => is_drawn(shift) }).collect();
+        let (kind_titles, kinds) = kind_rows(&Matrix::of_drive(drive, car));
+        let (overview, missing) = overview_figure(drive, car);
         let named = worst.iter().take(WORST).map(|shift| {
             context! { number => shift.number, gears => gears(shift, car), error => number(shift.worst_error_n_m(), 1) }
         });
@@ -74,14 +85,16 @@ impl DrivePage<'_> {
                 version => env!("CARGO_PKG_VERSION"),
                 vehicle_name => &car.name,
                 gearbox_name => &car.gearbox.name,
-                overview => overview_figure(drive, car).html(),
-                findings => findings(drive),
+                overview => overview.html(),
+                missing,
+                found => found(&findings(drive)),
                 kind_titles,
                 kinds,
                 columns => columns.iter().map(|column| context! { title => column.title, meaning => column.meaning }).collect::<Vec<_>>(),
                 rows,
                 healths => healths(drive),
-                figures => figures.collect::<Vec<_>>(),
+                figures,
+                opened => first,
                 worst => named.collect::<Vec<_>>(),
                 undrawn => drive.shifts.len() - drawn.len(),
                 by_each => BY_EACH,
@@ -142,6 +155,14 @@ fn clutch_names<'a>(shift: &ScoredShift, car: &'a Car) -> [&'a str; 2] {
 fn clutch_words(shift: &ScoredShift, car: &Car) -> String {
     let named = clutch_names(shift, car).into_iter().zip(["opens", "closes"]).filter(|(name, _)| !name.is_empty());
     named.map(|(name, does)| format!("{name} {does}")).collect::<Vec<_>>().join(", ")
+}
+
+/// The order of the table: the largest error first, where the truth is known; else the worst health.
+fn by_need(a: &ScoredShift, b: &ScoredShift) -> Ordering {
+    let health = |shift: &ScoredShift| shift.worst_health().map_or((Health::Good, 0.0), |worst| worst);
+    let ((a_health, a_share), (b_health, b_share)) = (health(a), health(b));
+    let by_health = b_health.cmp(&a_health).then(b_share.total_cmp(&a_share));
+    b.worst_error_n_m().total_cmp(&a.worst_error_n_m()).then(by_health).then(a.number.cmp(&b.number))
 }
 
 /// The shifts with the largest error first.

@@ -51,7 +51,7 @@ pub(super) fn estimate(
     let found = found.with_times_from_origin();
     report(&found, file, output.is_some(), say)?;
     found.said_of_sensors().into_iter().for_each(|sentence| say.note(sentence));
-    finish(output, places.as_ref(), || found.page(file, path), say)?;
+    finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open, say)?;
     learnt_file.map_or(Ok(()), |path| Kept::of(path, file, &found.learnt).write(say))
 }
 

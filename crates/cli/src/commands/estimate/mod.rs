@@ -21,6 +21,7 @@ use wetclutch::{Destination, EstimateOptions, VehicleFile};
 use self::earlier::replaces_only_estimates;
 use self::outputs::{beside, remove_old};
 use crate::args::{Estimate, FormatChoice};
+use crate::browser;
 use crate::commands::{channel_map_of_car, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -67,11 +68,12 @@ fn shift_lines(titles: &[String], rows: &[Vec<String>], more: usize) -> Vec<Stri
     lines
 }
 
-/// Writes the page beside the tables of shifts, or removes what an earlier estimate left there, and says where all is.
+/// Writes the page beside the tables of shifts, or removes what an earlier estimate left there, and says where all is; `opens` the page.
 fn finish(
     output: Option<&Path>,
     places: Option<&[PathBuf; 3]>,
     page: impl FnOnce() -> Result<Option<String>, Failure>,
+    opens: bool,
     say: &mut Messages,
 ) -> Result<(), Failure> {
     let Some(output) = output else {
@@ -85,6 +87,9 @@ fn finish(
     write_text(html, &page()?.unwrap_or_default())?;
     say.note(&format!("table of shifts: {}, {}", csv.shown(), json.shown()));
     say.note(&format!("report: {}", html.shown()));
+    if opens {
+        browser::open(html);
+    }
     Ok(())
 }
 
@@ -228,6 +233,11 @@ fn several<S: Sync>(
                 .to_owned(),
         ));
     };
+    if options.open {
+        return Err(Failure::Input(
+            "--open takes one log\nhint: leave it out, and open the pages that you want".to_owned(),
+        ));
+    }
     if options.follow {
         return Err(Failure::Input("--follow takes one log\nhint: start the command once for each".to_owned()));
     }

@@ -42,7 +42,7 @@ pub(super) fn estimate(
              train the torque of a clutch in another place differs by a constant factor",
         );
     }
-    finish(output, places.as_ref(), || found.page(file, path), say)
+    finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open, say)
 }
 
 /// The shifts as a table, if there are any; `has_file` says whether standard output is free for it.
