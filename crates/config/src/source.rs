@@ -99,6 +99,31 @@ pub fn toml_number(value: f64) -> String {
 const VEHICLE_TABLES: [&str; 10] =
     ["engine", "converter", "gear_train", "clutch", "driveline", "tyre", "vehicle", "oil", "observer", "design"];
 
+/// Keys by which the kinds of files are known, and `shaft`, which is no `shift`.
+const KINDS_KEYS: [&str; 12] = [
+    "gearbox",
+    "gear_train",
+    "shift",
+    "shaft",
+    "segment",
+    "trace",
+    "factor",
+    "runs",
+    "vehicle",
+    "gear",
+    "sensors",
+    "channel",
+];
+
+/// A key of a table that is none of these, and may be one of them.
+pub(crate) fn misspelt<'t>(
+    table: impl Iterator<Item = &'t str>,
+    keys: &[&'static str],
+) -> Option<(&'t str, &'static str)> {
+    let mut pairs = table.flat_map(|key| keys.iter().map(move |known| (key, *known)));
+    pairs.find(|(key, known)| !keys.contains(key) && is_near(key, known))
+}
+
 /// Text of a file with its name and fingerprint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
@@ -171,9 +196,15 @@ impl Source {
         let tables: toml::Table = self.parse()?;
         let has = |key| tables.contains_key(key);
         let of_a_vehicle = |(key, value): (&String, &toml::Value)| value.is_table() && VEHICLE_TABLES.contains(&&**key);
+        // No other kind has these, and `shifts`, which such a file has, is no `shift`.
+        if has("mean") || has("covariance") {
+            return Ok(Kind::Learnt);
+        }
+        if let Some((key, known)) = misspelt(tables.keys().map(String::as_str), &KINDS_KEYS) {
+            return Err(self.unknown_key(key, known));
+        }
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
-            (false, false, false) if has("mean") && has("covariance") => Ok(Kind::Learnt),
             (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
             (false, false, false) if has("runs") && has("vehicle") => Ok(Kind::CarStudy),
             (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
@@ -189,32 +220,24 @@ impl Source {
 
     /// What is wrong with a file that is none of those that are known.
     fn of_no_kind(&self, tables: &toml::Table) -> ConfigError {
-        /// Keys by which the kinds are known.
-        const KEYS: [&str; 11] = [
-            "gearbox",
-            "gear_train",
-            "shift",
-            "segment",
-            "trace",
-            "factor",
-            "runs",
-            "vehicle",
-            "gear",
-            "sensors",
-            "channel",
-        ];
-        let expected = "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
-                        file (with [[segment]] or [trace]), study file (with [[factor]], or with `runs` for a car with a gearbox), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
-                        with tables of a vehicle file)";
-        let unknown = tables.keys().filter(|key| !KEYS.contains(&key.as_str()));
-        let near = unknown.flat_map(|key| KEYS.map(|known| (key, known))).find(|(key, known)| is_near(key, known));
-        let (path, mut line, mut message) = (self.path.clone(), 1, expected.to_owned());
-        if let Some((key, known)) = near {
-            let begins = |text: &str| text.trim_start().trim_start_matches('[').trim_start().starts_with(key.as_str());
-            line = 1 + self.text.lines().position(begins).unwrap_or(0);
-            message = format!("unknown key `{}`, {expected}\nhint: did you mean `{known}`?", trace::printable(key));
+        if let Some((key, known)) = misspelt(tables.keys().map(String::as_str), &VEHICLE_TABLES) {
+            return self.unknown_key(key, known);
         }
-        ConfigError::Syntax { path, line, message }
+        let message = "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
+                       file (with [[segment]] or [trace]), study file (with [[factor]], or with `runs` for a car with a gearbox), gearbox file (with `gear`), sensors file (with [sensors]), bounds file (only \
+                       with tables of a vehicle file), file of what was learnt (with `mean`) or channel map (with [channel])";
+        ConfigError::Syntax { path: self.path.clone(), line: 1, message: message.to_owned() }
+    }
+
+    /// A key that is misspelt, at its line.
+    pub(crate) fn unknown_key(&self, key: &str, known: &str) -> ConfigError {
+        let begins = |text: &str| {
+            let text = text.trim_start().trim_start_matches('[').trim_start().trim_start_matches(['"', '\'']);
+            text.starts_with(key)
+        };
+        let line = 1 + self.text.lines().position(begins).unwrap_or(0);
+        let message = format!("unknown key `{}`\nhint: did you mean `{known}`?", trace::printable(key));
+        ConfigError::Syntax { path: self.path.clone(), line, message }
     }
 
     /// Reads the text into raw types.

@@ -453,8 +453,16 @@ fn weak_valves_within_the_bounds_have_their_commands() {
 #[test]
 fn a_typo_in_the_key_that_tells_the_kind_of_a_file_is_named_with_its_line() {
     for (text, words) in [
-        ("name = \"x\"\ngerbox = \"8hp.toml\"\n", "x.toml:2: unknown key `gerbox`, expected a vehicle file"),
-        ("name = \"x\"\n\n[[segmnt]]\nduration_s = 3\n", "x.toml:3: unknown key `segmnt`, expected a vehicle file"),
+        ("name = \"x\"\ngerbox = \"8hp.toml\"\n", "x.toml:2: unknown key `gerbox`\nhint: did you mean `gearbox`?"),
+        (
+            "name = \"x\"\n\n[[segmnt]]\nduration_s = 3\n",
+            "x.toml:3: unknown key `segmnt`\nhint: did you mean `segment`?",
+        ),
+        (
+            "[[sgement]]\nduration_s = 3\n[[shift]]\ntime_s = 1\n",
+            "x.toml:1: unknown key `sgement`\nhint: did you mean `segment`?",
+        ),
+        ("[desing]\n", "x.toml:1: unknown key `desing`\nhint: did you mean `design`?"),
         ("nonsense = 3\n", "x.toml:1: expected a vehicle file"),
     ] {
         let error = Source::built_in("x.toml", text).kind().unwrap_err().to_string();

@@ -1,7 +1,8 @@
 //! All errors of a file at once.
 
 use config::{
-    CarFile, ConfigError, DriveFile, ExperimentFile, GearboxFile, Source, VehicleFile, all_errors, check_learnt,
+    CarFile, CarStudy, ConfigError, DriveFile, ExperimentFile, GearboxFile, Kind, Source, Study, VehicleFile,
+    all_errors, check_learnt,
 };
 
 use super::{BENCH, EXPERIMENT, VEHICLE, line_of};
@@ -61,13 +62,13 @@ fn what_follows_from_a_guess_is_no_error() {
 }
 
 #[test]
-fn a_short_vehicle_file_names_the_unknown_keys_beside_the_missing_ones() {
+fn a_short_vehicle_file_names_the_unknown_key_and_the_missing_one_that_is_meant() {
     let text = "name = \"s\"\n[gear_train]\nratios = [4.17, 2.34]\n[engine]\nmax_torque_n_m = 1e9\n[driveline]\nfinal_ratio = 3.2\n\
                 [vehicle]\nmas_kg = 1650.0\nwheel_radius_m = 0.32\n";
     let found = errors(text, &vehicle);
-    assert_eq!(found.len(), 3, "{found:#?}");
-    assert!(found.iter().any(|error| error.contains("`vehicle.mass_kg`: is missing")), "{found:#?}");
-    assert!(has(&found, text, "mas_kg", "unknown field `mas_kg`"), "{found:#?}");
+    assert_eq!(found.len(), 2, "{found:#?}");
+    let named = "unknown field `mas_kg`\nhint: did you mean `mass_kg`, which is missing?";
+    assert!(has(&found, text, "mas_kg", named), "{found:#?}");
     assert!(has(&found, text, "max_torque_n_m", "`engine.max_torque_n_m` is 1000000000"), "{found:#?}");
 }
 
@@ -138,4 +139,120 @@ fn files_with_any_damage_have_errors_at_their_lines() {
             }
         }
     }
+}
+
+/// Reads a file of any kind, and the vehicle that an experiment names.
+fn any_kind(source: Source) -> Result<(), ConfigError> {
+    match source.kind()? {
+        Kind::Vehicle => VehicleFile::from_source(source).map(drop),
+        Kind::Car => CarFile::from_source(source).map(drop),
+        Kind::Experiment => ExperimentFile::from_source(source)?.read_vehicle().map(drop),
+        Kind::Drive => DriveFile::from_source(source).map(drop),
+        Kind::Study => Study::from_source(source).map(drop),
+        Kind::CarStudy => CarStudy::from_source(source).map(drop),
+        Kind::Overlay => VehicleFile::check_overlay(&source),
+        Kind::Sensors => config::sensors_of(&source).map(drop),
+        Kind::Gearbox => GearboxFile::from_source(source).map(drop),
+        Kind::Learnt => check_learnt(&source),
+        Kind::ChannelMap => unreachable!("no file of this crate"),
+    }
+}
+
+/// The keys of a text that stand before `=` or in the name of a table, with their places; those of a few letters are names.
+fn keys(text: &str) -> Vec<std::ops::Range<usize>> {
+    let is_of_key = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let mut found = Vec::new();
+    let mut begin = 0;
+    for line in text.split_inclusive('\n') {
+        let code = line.split('#').next().unwrap_or_default();
+        let is_header = code.starts_with('[');
+        for (at, _) in code.match_indices(is_of_key) {
+            let rest = &code[at..];
+            let key = &rest[..rest.find(|c| !is_of_key(c)).unwrap_or(rest.len())];
+            let is_begun = at > 0 && code[..at].ends_with(is_of_key);
+            let is_named = if is_header { !key.is_empty() } else { rest[key.len()..].trim_start().starts_with('=') };
+            if !is_begun && is_named && key.len() > 3 && key.starts_with(|c: char| c.is_ascii_lowercase()) {
+                found.push(begin + at..begin + at + key.len());
+            }
+        }
+        begin += line.len();
+    }
+    found
+}
+
+/// A key with two of its letters in each other's place.
+fn misspelt(key: &str) -> String {
+    let letters = key.as_bytes();
+    let at = (0..letters.len() - 1).rev().find(|&at| {
+        let pair = &letters[at..at + 2];
+        pair[0] != pair[1] && pair.iter().all(u8::is_ascii_lowercase) && at <= letters.len() / 2
+    });
+    let at = at.unwrap();
+    let mut letters = letters.to_vec();
+    letters.swap(at, at + 1);
+    String::from_utf8(letters).unwrap()
+}
+
+/// A reader that misses the key that is meant, or takes the file for one of another kind, is not believed first.
+#[test]
+fn a_misspelt_key_is_the_only_error_of_a_file_of_any_kind() {
+    let short = "name = \"s\"\n[gear_train]\nratios = [4.17, 2.34]\n[engine]\nmax_torque_n_m = 250.0\n[driveline]\nfinal_ratio = 3.2\n\
+                 [vehicle]\nmass_kg = 1650.0\nwheel_radius_m = 0.32\n";
+    let learnt = "gearbox = \"x\"\nelements = []\nshifts = 1\nrefused = 0\nmean = []\ncovariance = []\n";
+    let sensors = &BENCH[BENCH.find("[sensors]").unwrap()..BENCH.find("[[observer]]").unwrap()];
+    let over = "[design.error_bounds]\nmass_kg = 5.0\n[design.torque_phase]\nmodel_error_max_rad_s2 = 5.0\n";
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../");
+    let file = |name: &str| (format!("{root}{name}"), std::fs::read_to_string(format!("{root}{name}")).unwrap());
+    let texts = [("short.toml", short), ("learnt.toml", learnt), ("sensors.toml", sensors), ("over.toml", over)];
+    let files = [
+        "vehicles/two_speed_at.toml",
+        "vehicles/eight_speed.toml",
+        "gearboxes/8hp.toml",
+        "drives/city.toml",
+        "experiments/e1.toml",
+        "experiments/settings.toml",
+        "experiments/eight_speed_ftp_75.toml",
+    ];
+    let texts = texts.map(|(name, text)| (name.to_owned(), text.to_owned()));
+    for (path, text) in texts.into_iter().chain(files.map(file)) {
+        assert_eq!(errors_of(&path, &text), Vec::<String>::new(), "{path}");
+        for place in keys(&text) {
+            let key = &text[place.clone()];
+            let wrong = misspelt(key);
+            let line = 1 + text[..place.start].matches('\n').count();
+            let found = errors_of(&path, &format!("{}{wrong}{}", &text[..place.start], &text[place.end..]));
+            let is_named = |error: &String| {
+                let is_unknown = |what: &str| error.starts_with(&format!("{path}:{line}: unknown {what} `{wrong}`"));
+                is_unknown("field") || is_unknown("key")
+            };
+            assert!(found.first().is_some_and(is_named), "{path}: {wrong}: {found:#?}");
+            let has_hint = found[0].contains(&format!("hint: did you mean `{key}`"));
+            assert!(found.len() == 1 || !has_hint, "{path}: {wrong}: {found:#?}");
+        }
+    }
+}
+
+fn errors_of(path: &str, text: &str) -> Vec<String> {
+    all_errors(&Source::built_in(path, text), &any_kind).iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn all_errors_of_a_file_that_another_one_names_are_said() {
+    let folder = super::Folder::new("named");
+    let wrong =
+        VEHICLE.replacen("mass_kg = ", "mas_kg = ", 1).replacen("wheel_radius_m = ", "wheel_radius_m = 1000", 1);
+    folder.with("v.toml", &wrong);
+    let named = EXPERIMENT.replacen("../vehicles/two_speed_at.toml", "v.toml", 1);
+    let path = folder.with("e.toml", &named);
+    let found = errors_of(path.to_str().unwrap(), &named);
+    assert_eq!(found.len(), 2, "{found:#?}");
+    assert!(found[0].contains("v.toml:") && found[0].contains("unknown field `mas_kg`"), "{found:#?}");
+    assert!(found[1].contains("v.toml:") && found[1].contains("`vehicle.wheel_radius_m` is 1000"), "{found:#?}");
+    // Two files that name each other end.
+    let car = include_str!("../../../../vehicles/eight_speed.toml");
+    let circle = car.replacen("../gearboxes/8hp.toml", "other.toml", 1);
+    let path = folder.with("car.toml", &circle);
+    folder.with("other.toml", &car.replacen("../gearboxes/8hp.toml", "car.toml", 1));
+    let found = errors_of(path.to_str().unwrap(), &circle);
+    assert!(found.len() == 1 && found[0].contains("other.toml:1: this looks like"), "{found:#?}");
 }

@@ -21,7 +21,7 @@ use toml::de::DeValue;
 
 use super::budget;
 use crate::check::Check;
-use crate::source::{Layers, toml_number};
+use crate::source::{Layers, misspelt, toml_number};
 use crate::{ConfigError, Source, VehicleFile};
 pub use car::{CarFacts, short_car_file, sized_gearbox};
 pub(super) use car::{car_defaults, car_defaults_taken};
@@ -106,8 +106,14 @@ pub(super) fn of_default(error: ConfigError, defaults: &Source, source: &Source)
     Check::of(source).meaning(key, torque.unwrap_or(0), message, Some(hint))
 }
 
+/// Whether a file is short. A misspelt `ratios` is an error before all that a complete file would need.
 fn has_ratios(source: &Source) -> Result<bool, ConfigError> {
-    Ok(complete::find(source.table()?.get_ref(), &["gear_train", "ratios"]).is_some())
+    let table = source.table()?;
+    let Some(DeValue::Table(train)) = complete::find(table.get_ref(), &["gear_train"]) else { return Ok(false) };
+    match misspelt(train.keys().map(|key| key.get_ref().as_ref()), &["ratios"]) {
+        Some((key, known)) => Err(source.unknown_key(key, known)),
+        None => Ok(train.contains_key("ratios")),
+    }
 }
 
 /// One number, or several as an array.

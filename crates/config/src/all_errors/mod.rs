@@ -1,0 +1,147 @@
+//! All errors of a file, where its reader ends at the first one.
+//!
+//! The reader gets a draft of the text in which what it has refused is mended, again and again: an unknown key is taken out, a missing one is put
+//! in, and a value of another type or outside its range is replaced. What is put in is never reported. What a value means beside others is
+//! reported as long as all of them are those of the file.
+//!
+//! A key that is misspelt is corrected in the text itself, and all begins anew: a reader may take a file without this key for another one, and what
+//! it then misses is no error of the file.
+
+mod draft;
+mod misspelt;
+mod wrong;
+
+use std::path::PathBuf;
+
+use crate::{ConfigError, Source};
+use draft::Draft;
+use misspelt::Misspelt;
+use wrong::Wrong;
+
+pub(crate) use misspelt::is_near;
+
+/// Most times that a file is read.
+const READINGS: usize = 100;
+/// Most times that one place is mended.
+const MENDED_MAX: usize = 6;
+
+/// Reads a file of a kind, or of any.
+type Reader<'r> = dyn Fn(Source) -> Result<(), ConfigError> + 'r;
+
+/// What is put in place of what is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Guess {
+    /// One, or the nearest number within the range.
+    Near,
+    /// Two, or the middle of the range.
+    Middle,
+}
+
+/// The errors of a file by its reader, and those of a file that it names and that the reader can read: unknown keys first, then in the order of
+/// their lines; empty for a file without any.
+///
+/// A range may follow from another value. So the file is read with two guesses of what is wrong, and a value that is outside its range with one
+/// of them alone is none of the errors.
+pub fn all_errors(source: &Source, read: &Reader<'_>) -> Vec<ConfigError> {
+    errors_of(source, read, &mut Vec::new())
+}
+
+/// The same, of none of the files that were read `before`.
+fn errors_of(source: &Source, read: &Reader<'_>, before: &mut Vec<PathBuf>) -> Vec<ConfigError> {
+    before.push(source.path.clone());
+    let (mut errors, _) = errors_with(Guess::Near, source, read);
+    if errors.len() > 1 {
+        let (others, is_whole) = errors_with(Guess::Middle, source, read);
+        let is_in_both = |error: &ConfigError| {
+            let ConfigError::Range { line, key, .. } = error else { return true };
+            let is_same_place = |other: &&ConfigError| matches!(other, ConfigError::Range { line: at, key: of, .. } if (at, of) == (line, key));
+            let other = others.iter().find(is_same_place);
+            other.map_or(!is_whole, |other| other.to_string() == error.to_string())
+        };
+        errors.retain(is_in_both);
+    }
+    errors.sort_by_key(|error| (!Wrong::of(error).is_unknown_key(), error.line().is_none(), error.line()));
+    errors.dedup_by(|one, other| one.to_string() == other.to_string());
+    errors.into_iter().flat_map(|error| with_others_of_its_file(error, source, read, before)).collect()
+}
+
+/// The errors of the file that an error is of, where another file names it.
+fn with_others_of_its_file(
+    error: ConfigError,
+    source: &Source,
+    read: &Reader<'_>,
+    before: &mut Vec<PathBuf>,
+) -> Vec<ConfigError> {
+    if error.path() == source.path || before.iter().any(|path| path == error.path()) {
+        return vec![error];
+    }
+    let Ok(named) = Source::read(error.path()) else { return vec![error] };
+    // A list of speeds is no TOML, and what is expected to be of another kind has no error by itself.
+    if named.table().is_err() || matches!(Wrong::of(&error), Wrong::Kind) {
+        return vec![error];
+    }
+    let errors = errors_of(&named, read, before);
+    if errors.is_empty() { vec![error] } else { errors }
+}
+
+/// The errors with one guess, and whether the reader came to the end.
+fn errors_with(guess: Guess, source: &Source, read: &Reader<'_>) -> (Vec<ConfigError>, bool) {
+    let mut source = source.clone();
+    let mut errors = Vec::new();
+    for _ in 0..READINGS {
+        match search(guess, &source, read) {
+            Found::Errors { found, is_whole } => {
+                errors.extend(found);
+                return (errors, is_whole);
+            }
+            Found::Misspelt { key, error } => {
+                errors.push(error);
+                let Some(text) = key.corrected(&source.text) else { break };
+                source.text = text;
+            }
+        }
+    }
+    (errors, false)
+}
+
+/// What is found in a text.
+enum Found {
+    /// A key that is to be corrected before all else, with the error that names it.
+    Misspelt { key: Misspelt, error: ConfigError },
+    /// The errors of a text without such a key, and whether the reader came to the end.
+    Errors { found: Vec<ConfigError>, is_whole: bool },
+}
+
+/// Reads the drafts of a text.
+fn search(guess: Guess, source: &Source, read: &Reader<'_>) -> Found {
+    let mut draft = Draft::of(&source.text, guess);
+    let mut found: Vec<ConfigError> = Vec::new();
+    let mut mended: Vec<String> = Vec::new();
+    for _ in 0..READINGS {
+        let Err(error) = read(Source { path: source.path.clone(), text: draft.text.clone() }) else {
+            return Found::Errors { found, is_whole: true };
+        };
+        let place = error.line().filter(|_| error.path() == source.path);
+        let Some(line) = place else {
+            // The error of another file, which this one names.
+            found.push(error);
+            break;
+        };
+        let wrong = Wrong::of(&error);
+        if let Some(key) = Misspelt::of(&draft, line, &wrong) {
+            let error = key.named_by(error);
+            return Found::Misspelt { key, error };
+        }
+        let is_own = !draft.is_guessed(line, &wrong);
+        if is_own && (draft.is_unchanged() || !matches!(wrong, Wrong::Other)) {
+            found.push(error.with_line(draft.line_of_file(line)));
+        }
+        let attempt = format!("{line} {wrong:?}");
+        let attempts = mended.iter().filter(|other| **other == attempt).count();
+        if attempts >= MENDED_MAX || !draft.mend(line, &wrong) {
+            break;
+        }
+        mended.push(attempt);
+    }
+    Found::Errors { found, is_whole: false }
+}
