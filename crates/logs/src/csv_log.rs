@@ -86,7 +86,8 @@ impl CsvLog {
         let whole = beginning.lines().count().saturating_sub(usize::from(!beginning.ends_with('\n')));
         let lines = beginning.lines().enumerate().take(whole).skip(dialect.first);
         let size_s = if let TimeForm::Numbers(size) = time.1 { size } else { 1.0 };
-        one_clock(path, &names, (column, size_s), lines.map(|(line, text)| (line, cells(text, dialect.delimiter))))?;
+        let rows = lines.map(|(line, text)| (line, cells(text, dialect.delimiter)));
+        one_clock(path, &names, (column, size_s), "line", rows)?;
         let named = |i: &usize| *i != time.0 && !names[*i].0.is_empty();
         let columns: Vec<usize> = (0..titles.len()).filter(named).collect();
         let (path, width) = (path.to_owned(), titles.len());

@@ -1,5 +1,6 @@
 //! Parquet files: a table of numbers, read by row group and in it some thousand rows at a time.
 
+mod clock;
 mod pages;
 mod text;
 
@@ -78,6 +79,7 @@ impl ParquetLog {
             ));
         };
         let size_s = time_unit(path, &names[time], wanted, &mut notes)?;
+        clock::check(path, &reader, &names, (time, size_s))?;
         let is_of_day = matches!(leaves[time].logical_type_ref(), Some(LogicalType::Time(_)));
         let others = || (0..leaves.len()).filter(|&i| i != time);
         let form = |i: usize| Form::of(&leaves[i]).or_else(|| text::holds_numbers(&reader, i).then_some(Form::Text));

@@ -67,11 +67,13 @@ fn base_name(name: &str) -> Option<String> {
 }
 
 /// Refuses a table with a time for each signal: another column has the name of the time and other values, or is named as a time and rises
-/// at another rate. `size_s` is that of the unit of the time, and `rows` are some of its first rows, with their lines.
+/// at another rate. `size_s` is that of the unit of the time, and `rows` are some of its first rows, with their places in the file, which are called
+/// `place`.
 pub(crate) fn one_clock<'c>(
     path: &Path,
     names: &[(String, String)],
     (time, size_s): (usize, f64),
+    place: &str,
     rows: impl Iterator<Item = (usize, Vec<Cow<'c, str>>)>,
 ) -> Result<(), LogError> {
     let others: Vec<(usize, bool)> = (0..names.len()).filter_map(|i| Some((i, may_be_time(names, time, i)?))).collect();
@@ -110,7 +112,7 @@ pub(crate) fn one_clock<'c>(
     let [own, text] = [time, other].map(|column| error::shown(cell(row, column)));
     Err(LogError::damaged(
         path,
-        format!("line {}", rows[row].0 + 1),
+        format!("{place} {}", rows[row].0 + 1),
         format!(
             "columns {} `{}` and {} `{}` are both a time, and differ (`{own}` and `{text}`): a table is read over one time\n\
              hint: write a table for each of them, or all signals over one time",
@@ -123,7 +125,7 @@ pub(crate) fn one_clock<'c>(
 }
 
 /// Whether another column may be a time as well by its name and unit, and then whether it has the name of the time.
-fn may_be_time(names: &[(String, String)], time: usize, other: usize) -> Option<bool> {
+pub(crate) fn may_be_time(names: &[(String, String)], time: usize, other: usize) -> Option<bool> {
     let (name, unit) = &names[other];
     let in_time = unit.is_empty() || Unit::parse(unit).is_none_or(|unit| unit.quantity == Quantity::Time);
     if other == time || !in_time {

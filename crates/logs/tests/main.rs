@@ -10,5 +10,6 @@ mod formats;
 mod hostile;
 mod mdf;
 mod mdf_conversions;
+mod parquet_times;
 mod readings;
 mod shifts;
