@@ -315,8 +315,8 @@ fn unit_hint(key: &str, value: f64, range: &RangeInclusive<f64>) -> Option<Strin
     )
 }
 
-/// A number with at most six significant digits and no trailing zeros.
-pub(crate) fn significant(value: f64) -> f64 {
+/// The nearest number with at most six significant digits: 0.89 for 0.8900000000000001.
+pub fn significant(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 

@@ -22,6 +22,7 @@ pub mod vehicle;
 
 pub use all_errors::all_errors;
 pub use car_study::{CarStudy, CarStudyRuns, SampledErrors};
+pub use check::significant;
 pub use drive::DriveFile;
 pub use error::ConfigError;
 pub use experiment::{ExperimentFile, read_sensors, sensors_of};

@@ -99,11 +99,12 @@ pub fn toml_number(value: f64) -> String {
 const VEHICLE_TABLES: [&str; 10] =
     ["engine", "converter", "gear_train", "clutch", "driveline", "tyre", "vehicle", "oil", "observer", "design"];
 
-/// Keys by which the kinds of files are known, and `shaft`, which is no `shift`.
-const KINDS_KEYS: [&str; 12] = [
+/// Keys by which the kinds of files are known, and `shifts` and `shaft`, which are no `shift`.
+const KINDS_KEYS: [&str; 13] = [
     "gearbox",
     "gear_train",
     "shift",
+    "shifts",
     "shaft",
     "segment",
     "trace",
@@ -371,6 +372,32 @@ mod tests {
             let quoted = toml_string(text);
             let table: toml::Table = toml::from_str(&format!("# {quoted}\ntext = {quoted}\n")).unwrap();
             assert_eq!(table["text"].as_str(), Some(text), "{quoted}");
+        }
+    }
+
+    /// The keys that each reader names where it does not know one.
+    #[test]
+    fn no_key_of_a_file_is_taken_for_a_misspelt_one_of_another_kind() {
+        use crate::{CarFile, CarStudy, DriveFile, ExperimentFile, GearboxFile, Study, VehicleFile, check_learnt};
+        let readers: [&dyn Fn(Source) -> Result<(), ConfigError>; 8] = [
+            &|source| VehicleFile::from_source(source).map(drop),
+            &|source| CarFile::from_source(source).map(drop),
+            &|source| ExperimentFile::from_source(source).map(drop),
+            &|source| DriveFile::from_source(source).map(drop),
+            &|source| Study::from_source(source).map(drop),
+            &|source| CarStudy::from_source(source).map(drop),
+            // A gearbox is read by its level.
+            &|source| {
+                let text = format!("level = \"stick-diagram\"\n{}", source.text);
+                GearboxFile::from_source(Source { text, ..source }).map(drop)
+            },
+            &|source| check_learnt(&source),
+        ];
+        for read in readers {
+            let error = read(Source::built_in("x.toml", "unknown_to_all = 1\n")).unwrap_err().to_string();
+            let keys: Vec<&str> = error.split('`').skip(3).step_by(2).collect();
+            assert!(error.contains("unknown field `unknown_to_all`") && keys.len() > 2, "{error}");
+            assert_eq!(misspelt(keys.into_iter(), &KINDS_KEYS), None);
         }
     }
 
