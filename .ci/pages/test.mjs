@@ -9,7 +9,8 @@ const folder = process.env.PAGES;
 const SHIFT = join(folder, "shift/report.html");
 const DRIVE = join(folder, "drive/report.html");
 const LOG = join(folder, "<img src=x onerror=alert(1)>_report.html");
-const PAGES = [SHIFT, DRIVE, LOG];
+const HOUR = join(folder, "hour_report.html");
+const PAGES = [SHIFT, DRIVE, LOG, HOUR, ...["check", "check_maps", "design", "fit"].map((name) => join(folder, `${name}.html`))];
 
 const { browser, end } = await launch();
 test.after(end);
@@ -238,5 +239,14 @@ for (const file of PAGES) {
     }
   });
 }
+
+test("a page of an hour has 320 shifts in five megabytes, and is there within a second", () => on(HOUR, async (page) => {
+  assert(statSync(HOUR).size <= 5_000_000, String(statSync(HOUR).size));
+  assert.equal(await page.$$eval("details.shift", (shifts) => shifts.length), 320);
+  // Figures of closed shifts are not made.
+  assert((await page.$$(".uplot")).length < 20);
+  const interactive = await page.evaluate(() => performance.timing.domInteractive - performance.timing.navigationStart);
+  assert(interactive <= 1000, `${interactive} ms`);
+}));
 
 test("a page of a shift takes at most 350 kB", () => assert(statSync(SHIFT).size <= 350_000, String(statSync(SHIFT).size)));

@@ -37,7 +37,7 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let known =
         ["A", "B", "C", "D", "E"].map(|name| format!("[clutch.{name}.error_bounds]\nvalve_hysteresis_pa = 0\n"));
     let given = folder.write("given.toml", format!("{text}\n{}", known.concat()));
-    let output = wetclutch(&["fit", &log, "--vehicle", &given, "-o", &fitted]);
+    let output = wetclutch(&["fit", &log, "--vehicle", &given, "-o", &fitted, "--page", &folder.path("fit.html")]);
     let (table, notes) = (printed(&output), stderr(&output));
     let [clutch_e, clutch_c] = ["E", "C"].map(|name| factor(&table, &format!("{name}: friction x valve gain")));
     for ([_, least, most], truth) in [(clutch_e, 1.15), (clutch_c, 1.0)] {
@@ -47,6 +47,8 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let ratio = clutch_e[0] / clutch_c[0];
     assert!((ratio / 1.15 - 1.0).abs() < 0.12, "{ratio}: {table}");
     assert!(!table.contains("they do not ask for another file"), "{table}");
+    let page = folder.read("fit.html");
+    assert!(page.matches("class=\"interval\"").count() > 10 && page.contains("E: friction x valve gain"));
     for words in [
         "converter capacity",
         "M11 of 1-2",

@@ -33,6 +33,7 @@ mod measured_pressures;
 mod open_page;
 mod other_cars;
 mod own_car;
+mod pages;
 mod pressure_commands;
 mod same_bits;
 mod studies;

@@ -13,12 +13,12 @@ const POINTS: u32 = 200;
 const SLIP_RAD_S: f64 = 150.0;
 
 /// The figures by file name.
-pub fn map_figures(vehicle: &Vehicle, model: &RigidModel<f64>) -> Vec<(&'static str, String)> {
+pub fn map_figures(vehicle: &Vehicle, model: &RigidModel<f64>) -> Vec<(&'static str, Figure)> {
     vec![
-        ("map_engine.svg", engine(vehicle).svg()),
-        ("map_converter.svg", converter(vehicle).svg()),
-        ("map_friction.svg", friction(vehicle).svg()),
-        ("map_f1_f2.svg", observer_maps(vehicle, model).svg()),
+        ("map_engine.svg", engine(vehicle)),
+        ("map_converter.svg", converter(vehicle)),
+        ("map_friction.svg", friction(vehicle)),
+        ("map_f1_f2.svg", observer_maps(vehicle, model)),
     ]
 }
 

@@ -39,6 +39,7 @@ fn templates() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_template("log.html", include_str!("../templates/log.html"))?;
     environment.add_template("matrix.html", include_str!("../templates/matrix.html"))?;
     environment.add_template("car_sensitivity.html", include_str!("../templates/car_sensitivity.html"))?;
+    environment.add_template("sheet.html", include_str!("../templates/sheet.html"))?;
     environment.add_template("sensitivity.html", include_str!("../templates/sensitivity.html"))?;
     environment.add_template("speeds.html", include_str!("../templates/speeds.html"))?;
     environment.add_template("study.html", include_str!("../templates/study.html"))?;
@@ -59,14 +60,17 @@ const SCRIPT: &str = concat!(
     "})();\n"
 );
 
-/// A page from its template, with the scripts of its figures.
+/// A page from its template, with the scripts of its figures and tables.
 pub(crate) fn render(template: &str, context: Value) -> Result<String, PageError> {
     let html = templates()?.get_template(template)?.render(context)?;
-    if !html.contains("<div class=\"figure\">") {
+    let has_figures = html.contains("<div class=\"figure\">");
+    let plots =
+        if has_figures { format!("<style>{PLOTS_STYLE}</style>\n<script>{PLOTS}</script>\n") } else { String::new() };
+    let html = html.replacen("</head>", &format!("{plots}</head>"), 1);
+    if !has_figures && !html.contains("sortable\"") {
         return Ok(html);
     }
-    let head = format!("<style>{PLOTS_STYLE}</style>\n<script>{PLOTS}</script>\n</head>");
-    Ok(html.replacen("</head>", &head, 1).replacen("</body>", &format!("<script>\n{SCRIPT}</script>\n</body>"), 1))
+    Ok(html.replacen("</body>", &format!("<script>\n{SCRIPT}</script>\n</body>"), 1))
 }
 
 /// The files that a page follows from, for the end of the page.

@@ -15,7 +15,7 @@ const GREY: &str = "#767676";
 pub(crate) const RANGE: &str = "#0072B2";
 
 /// A family of curves over one parameter, from low to high: dark to light of the map viridis.
-pub(crate) const FAMILY: [Stroke; 6] = [
+pub const FAMILY: [Stroke; 6] = [
     Stroke { colour: "#440154", weight: Weight::Equal, dash: None },
     Stroke { colour: "#414487", weight: Weight::Equal, dash: Some("8 3") },
     Stroke { colour: "#2A788E", weight: Weight::Equal, dash: Some("3 2") },

@@ -10,7 +10,7 @@ use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::map_figures::map_figures;
-use crate::page::{PageError, inline, render};
+use crate::page::{PageError, render};
 use crate::shift_figure::{observers_figure, shift_figure};
 use crate::tables::{phase_name, quality_rows, score_rows};
 
@@ -36,23 +36,23 @@ impl Reproduction {
         experiments: &[ExperimentFile; 4],
         study: &Study,
     ) -> Result<Self, PageError> {
-        let mut figures: Vec<(String, String)> = (chapter.experiments.iter())
+        let mut figures: Vec<(String, crate::figure::Figure)> = (chapter.experiments.iter())
             .map(|comparison| {
                 // E1 and E2 show the whole shift, E3 and E4 their observers.
                 let figure = match comparison.experiment.name.as_str() {
                     "E1" | "E2" => shift_figure(comparison),
                     _ => observers_figure(comparison),
                 };
-                (format!("{}.svg", comparison.experiment.name.to_lowercase()), figure.svg())
+                (format!("{}.svg", comparison.experiment.name.to_lowercase()), figure)
             })
             .collect();
         let maps = map_figures(vehicle, &design::rigid_model(vehicle));
         let experiments: Vec<_> = (chapter.experiments.iter().zip(&figures).zip(experiments))
-            .map(|((comparison, (_, svg)), file)| {
+            .map(|((comparison, (_, figure)), file)| {
                 context! {
                     name => &comparison.experiment.name,
                     title => &comparison.experiment.title,
-                    figure => inline(svg),
+                    figure => figure.html(),
                     scores => score_rows(comparison),
                     quality => comparison.quality.as_ref().map(quality_rows),
                     seed => comparison.experiment.sensors.map(|sensors| sensors.seed),
@@ -80,10 +80,11 @@ impl Reproduction {
                 study_source => study.source.path.shown().to_string(),
                 study_sha256 => study.source.sha256(),
                 study_seed => study.seed,
-                maps => maps.iter().map(|(_, svg)| inline(svg)).collect::<Vec<_>>(),
+                maps => maps.iter().map(|(_, figure)| figure.html()).collect::<Vec<_>>(),
             },
         )?;
-        figures.extend(maps.into_iter().map(|(name, svg)| (name.to_owned(), svg)));
+        figures.extend(maps.into_iter().map(|(name, figure)| (name.to_owned(), figure)));
+        let figures = figures.into_iter().map(|(name, figure)| (name, figure.svg())).collect();
         Ok(Self { html, markdown: markdown(chapter), figures })
     }
 }

@@ -24,7 +24,7 @@ pub fn shift_figure(comparison: &Comparison) -> Figure {
     let t = Curves::of(comparison);
     let mut panels = vec![t.speeds(130.0)];
     panels.extend(t.observers());
-    panels.push(t.commands(110.0));
+    panels.extend(t.commands());
     t.around_shift(panels)
 }
 
@@ -201,23 +201,19 @@ impl<'a> Curves<'a> {
     }
 
     /// What the valves and the engine are commanded.
-    fn commands(&self, height: f64) -> Panel {
-        let (title, name, [oncoming, offgoing], unit) = if self.trace.get(signal::ONCOMING_DUTY).is_some() {
-            ("duty cycle, throttle", "duty cycle (0 to 1)", [signal::ONCOMING_DUTY, signal::OFFGOING_DUTY], 0.01)
+    fn commands(&self) -> [Panel; 2] {
+        let (title, [oncoming, offgoing]) = if self.trace.get(signal::ONCOMING_DUTY).is_some() {
+            ("duty cycle (%)", [signal::ONCOMING_DUTY, signal::OFFGOING_DUTY])
         } else {
-            ("current (A), throttle", "current", [signal::ONCOMING_CURRENT, signal::OFFGOING_CURRENT], 1.0)
+            ("current (A)", [signal::ONCOMING_CURRENT, signal::OFFGOING_CURRENT])
         };
-        let command =
-            |clutch, stroke, column| self.signal(&format!("{name}, {clutch} clutch"), stroke, column, |x| unit * x);
-        panel(
-            title,
-            height,
-            vec![
-                command("oncoming", Stroke::SIGNAL, oncoming),
-                command("offgoing", Stroke::SECOND, offgoing),
-                self.signal("throttle (0 to 1)", Stroke::THIRD, signal::THROTTLE, |x| x),
-            ],
-        )
+        let command = |label, stroke, column| self.signal(label, stroke, column, |x| x);
+        let valves = vec![
+            command("oncoming clutch", Stroke::SIGNAL, oncoming),
+            command("offgoing clutch", Stroke::SECOND, offgoing),
+        ];
+        let throttle = vec![command("throttle", Stroke::SIGNAL, signal::THROTTLE)];
+        [panel(title, 80.0, valves), panel("throttle (0\u{a0}to\u{a0}1)", 60.0, throttle)]
     }
 
     /// Torque times slip of both clutches.

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use design::Quantity;
 use observer::Phase;
 
-use super::within;
+use super::{PageChoice, within};
 
 /// Default sample time of a design, s: the usual period of a transmission controller.
 pub(crate) const SAMPLE_TIME_S: f64 = 0.01;
@@ -52,6 +52,8 @@ pub(crate) struct Design {
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) page: PageChoice,
 }
 
 impl Design {
@@ -83,6 +85,17 @@ pub(crate) enum DesignChoice {
     Compliant,
     /// Full-order sliding mode: gains from the sliding condition, without a certificate
     Sliding,
+}
+
+impl DesignChoice {
+    /// Its name.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid",
+            Self::Compliant => "compliant",
+            Self::Sliding => "sliding",
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

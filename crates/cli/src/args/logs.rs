@@ -7,7 +7,7 @@ use config::vehicle::short::ValveKind;
 use trace::TableFormat;
 use wetclutch::estimate::{GearPair, ShiftChoice};
 
-use super::{MethodChoice, ObserverChoice, Threads, within};
+use super::{MethodChoice, ObserverChoice, PageChoice, Threads, within};
 
 /// Which channels of a log are which signals.
 #[derive(Debug, Args)]
@@ -240,4 +240,6 @@ pub(crate) struct Fit {
     /// The fitted vehicle file
     #[arg(short, long, value_name = "FITTED.toml")]
     pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) page: PageChoice,
 }

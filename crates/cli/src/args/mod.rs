@@ -320,6 +320,19 @@ pub(crate) struct Check {
     /// Show every default of a vehicle file
     #[arg(long)]
     pub(crate) all: bool,
+    #[command(flatten)]
+    pub(crate) page: PageChoice,
+}
+
+/// A page of what a command prints.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct PageChoice {
+    /// Page of the result, with figures
+    #[arg(long, value_name = "PAGE.html")]
+    pub(crate) page: Option<PathBuf>,
+    /// Open the page in the browser
+    #[arg(long, requires = "page")]
+    pub(crate) open: bool,
 }
 
 /// A number in this range, as a vehicle file has it.

@@ -14,8 +14,10 @@ use trace::ShownPath as _;
 
 use super::car::{describe_car, describe_gearbox};
 use super::check_defaults::{describe_car_values, describe_defaults};
+use super::check_page;
 use super::gearbox;
 use super::matrix::sensors_or_bench;
+use super::page::{check_page as page_is_free, write_page};
 use super::simulate_drive::describe_drive;
 use crate::args::Check;
 use crate::failure::Failure;
@@ -24,10 +26,15 @@ use crate::output;
 /// Checks the files one after the other: one with errors does not stop the others.
 pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     let [file] = options.files.as_slice() else { return several(options) };
+    page_is_free(&options.page, &options.files)?;
     check_file(options, file)
 }
 
 fn several(options: &Check) -> Result<(), Failure> {
+    if options.page.page.is_some() {
+        let message = "--page takes one file\nhint: check the files one by one";
+        return Err(Failure::Input(message.to_owned()));
+    }
     if options.output.is_some() {
         let message = "-o takes the diagrams of one gearbox\nhint: check the files of gearboxes one by one";
         return Err(Failure::Input(message.to_owned()));
@@ -62,6 +69,10 @@ fn check_file(options: &Check, file: &Path) -> Result<(), Failure> {
     if options.output.is_some() && !matches!(kind, Kind::Gearbox | Kind::Car) {
         let what = "only a gearbox is drawn, of a gearbox file or of a vehicle file that names one";
         let message = format!("{}: {what}\nhint: leave -o out", file.shown());
+        return Err(Failure::Input(message));
+    }
+    if options.page.page.is_some() && !matches!(kind, Kind::Gearbox | Kind::Car | Kind::Vehicle) {
+        let message = format!("{}: only gearboxes and vehicles have a page\nhint: leave --page out", file.shown());
         return Err(Failure::Input(message));
     }
     if options.sensors.is_some() && kind != Kind::Car {
@@ -123,7 +134,11 @@ fn read_map(source: &Source) -> Result<(), ConfigError> {
 /// Says what a file without errors describes.
 fn describe_file(options: &Check, file: &Path, (source, kind): (Source, Kind)) -> Result<(), Failure> {
     match kind {
-        Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
+        Kind::Gearbox => {
+            let gearbox = GearboxFile::from_source(source)?;
+            gearbox::describe(&gearbox, options.output.as_deref())?;
+            write_page(&options.page, || check_page::of_gearbox(&gearbox))
+        }
         Kind::Car => describe_whole_car(options, &CarFile::from_source(source)?),
         Kind::CarStudy => super::study::describe_cars(file),
         Kind::Drive => describe_drive(&DriveFile::from_source(source)?, file),
@@ -131,7 +146,8 @@ fn describe_file(options: &Check, file: &Path, (source, kind): (Source, Kind)) -
             let vehicle = VehicleFile::from_source(source)?;
             describe(&vehicle)?;
             warn(&vehicle.implausible());
-            describe_defaults(&vehicle, options.all)
+            describe_defaults(&vehicle, options.all)?;
+            write_page(&options.page, || check_page::of_vehicle(&vehicle))
         }
         Kind::Experiment => {
             let experiment = ExperimentFile::from_source(source)?;
@@ -181,7 +197,8 @@ fn describe_whole_car(options: &Check, car: &CarFile) -> Result<(), Failure> {
         let why = "no value of this file is varied in a simulated drive";
         super::warn_without_effect("--sensors", why);
     }
-    describe_car_values(car, &sensors, options.all)
+    describe_car_values(car, &sensors, options.all)?;
+    write_page(&options.page, || check_page::of_car(car))
 }
 
 /// Says what a file holds that belongs to a command.

@@ -15,11 +15,13 @@ use serde_json::{Map, Value, json};
 use trace::{ShownPath as _, units};
 
 use super::design_car::of_car;
+use super::page::{check_page, write_page};
 use crate::args::{Design, DesignChoice, MethodChoice, SAMPLE_TIME_S};
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn design(options: &Design) -> Result<(), Failure> {
+    check_page(&options.page, options.bounds.iter().chain([&options.vehicle]))?;
     if Source::read(&options.vehicle)?.kind().is_ok_and(|kind| kind == Kind::Car) {
         return of_car(options);
     }
@@ -67,6 +69,7 @@ pub(super) fn of_vehicle(
         }
         output::line(&format!("vehicle file sha256 {}", source.sha256()))?;
     }
+    write_page(&options.page, || super::design_page::sheet(vehicle, source, options, (about, &text)))?;
     Ok(all_missed)
 }
 
@@ -141,7 +144,7 @@ pub(super) fn options_apply(options: &Design) -> Result<(), Failure> {
 }
 
 /// The requirement of the vehicle file, with the values of the options.
-fn replaced(required: IssRequirement, options: &Design) -> IssRequirement {
+pub(super) fn replaced(required: IssRequirement, options: &Design) -> IssRequirement {
     IssRequirement {
         kappa1_per_s: options.kappa1.or(required.kappa1_per_s),
         kappa2_per_s: options.kappa2.unwrap_or(required.kappa2_per_s),
@@ -150,7 +153,7 @@ fn replaced(required: IssRequirement, options: &Design) -> IssRequirement {
     }
 }
 
-fn replaced_compliant(required: CompliantRequirement, options: &Design) -> CompliantRequirement {
+pub(super) fn replaced_compliant(required: CompliantRequirement, options: &Design) -> CompliantRequirement {
     CompliantRequirement {
         kappa1_per_s: options.kappa1.or(required.kappa1_per_s),
         kappa2_per_s: options.kappa2.unwrap_or(required.kappa2_per_s),

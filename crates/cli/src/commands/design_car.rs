@@ -48,6 +48,9 @@ pub(super) fn of_car(options: &Design) -> Result<(), Failure> {
             }
             Ok(())
         }
+        None if options.page.page.is_some() => Err(Failure::Input(
+            "--page is for the gains of one shift\nhint: name it with --shift, such as --shift 1-2".to_owned(),
+        )),
         None => table(&car, options).map_err(|error| match error {
             TableError::Shift(error) => named(error),
             TableError::Other(failure) => failure,

@@ -31,7 +31,7 @@ pub(super) fn describe(file: &GearboxFile, folder: Option<&Path>) -> Result<(), 
 }
 
 /// What the file describes, and on which level.
-fn head(gearbox: &Gearbox) -> String {
+pub(super) fn head(gearbox: &Gearbox) -> String {
     let known = match (&gearbox.train, gearbox.has_ratios_alone()) {
         (Some(train), _) => {
             let parts = [
@@ -57,8 +57,8 @@ fn short(value: f64, decimals: usize) -> String {
     text.strip_prefix('-').filter(|digits| digits.chars().all(|c| "0.".contains(c))).map(str::to_owned).unwrap_or(text)
 }
 
-/// Prints the gears with their ratios and holding torques.
-pub(super) fn gears(gearbox: &Gearbox) -> Result<(), Failure> {
+/// The gears with their ratios and holding torques, after a row of titles.
+pub(super) fn gear_rows(gearbox: &Gearbox) -> Vec<Vec<String>> {
     let forward = gearbox.forward_gears();
     let mut rows = vec![["gear", "ratio", "step"].map(str::to_owned).to_vec()];
     rows[0].extend(gearbox.elements.iter().map(|element| element.name.clone()));
@@ -73,13 +73,18 @@ pub(super) fn gears(gearbox: &Gearbox) -> Result<(), Failure> {
         }));
         rows.push(row);
     }
+    rows
+}
+
+/// Prints the gears with their ratios and holding torques.
+pub(super) fn gears(gearbox: &Gearbox) -> Result<(), Failure> {
     let what = if gearbox.has_ratios_alone() {
         ""
     } else {
         ", holding torque of each engaged element per N m of turbine torque"
     };
     output::line(&format!("\ngears{what}"))?;
-    output::table(1, &rows)?;
+    output::table(1, &gear_rows(gearbox))?;
     let loose: Vec<&str> =
         gearbox.gears.iter().filter(|gear| !gear.holding_is_unique).map(|gear| gear.name.as_str()).collect();
     if !loose.is_empty() {
@@ -221,6 +226,14 @@ fn remarks(gearbox: &Gearbox) -> Vec<String> {
         );
     }
     remarks
+}
+
+/// Drawings of the train and of each gear, with what they show; none without a stick diagram.
+pub(super) fn drawings(gearbox: &Gearbox) -> Option<Vec<(String, String)>> {
+    let mut drawings = vec![("Train".to_owned(), train_figure(gearbox)?)];
+    let gears = gearbox.gears.iter().enumerate();
+    drawings.extend(gears.filter_map(|(at, gear)| Some((format!("Gear {}", gear.name), gear_figure(gearbox, at)?))));
+    Some(drawings)
 }
 
 /// Writes the diagrams of the train and of each gear.

@@ -28,6 +28,8 @@ function decoded(element) {
     const [, quantity, unit] = panel.name.match(/^(.*?)(?: \(([^()]*)\))?$/) ?? [null, panel.name, ""];
     Object.assign(panel, { quantity, unit: /^0\s*to\s*1$/.test(unit ?? "") ? "" : (unit ?? "") });
     panel.lines = panel.curves.map((curve) => line(curve, curve));
+    const isWhole = ({ values }) => values.every((value) => Number.isNaN(value) || Math.abs(value - Math.round(value)) < 1e-3);
+    panel.isWhole = panel.marked && panel.lines.every(isWhole) && panel.high - panel.low < 100;
     panel.drawn = [...panel.lines].reverse().sort((a, b) => a.layer - b.layer);
     if (panel.range) {
       const { name, colour, lower, upper } = panel.range;
@@ -62,6 +64,12 @@ function shown(value, size) {
   if (Math.abs(value) >= 1e6) return value.toExponential(2);
   const decimals = Math.min(Math.max(3 - Math.ceil(Math.log10(size || 1)), 0), 6);
   return value.toFixed(decimals).replace(/^-(0(\.0*)?)$/, "$1");
+}
+
+// A value at an axis.
+function tickText(tick) {
+  const value = +tick.toPrecision(6);
+  return Math.abs(value) >= 1e5 ? value.toExponential().replace("e+", "e") : String(value);
 }
 
 // The ends of the visible values of lines between two times, or null.

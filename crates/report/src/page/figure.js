@@ -113,7 +113,7 @@ class Figure {
     }));
     const made = new uPlot({
       width: Math.max(plot.clientWidth, 200),
-      height: panel.height + (isLast ? 34 : 10),
+      height: panel.height + (isLast ? 54 : 10),
       padding: [6, 12, 0, 0],
       legend: { show: false },
       cursor: { y: false, drag: { x: true, y: false, setScale: false }, points: { size: 6 }, bind: { dblclick: () => () => this.setView(...this.whole) } },
@@ -121,8 +121,10 @@ class Figure {
       series: [{}, ...series],
       bands: panel.ends ? [{ series: [ends + 2, ends + 1], fill: ink(panel.range.colour, 0.18) }] : [],
       axes: [
-        { ...axis, size: isLast ? 34 : 6, values: isLast ? undefined : (_, ticks) => ticks.map(() => "") },
-        { ...axis, size: LEFT, values: panel.marked ? (_, ticks) => ticks.map((tick) => String(+tick.toPrecision(6))) : () => [] },
+        isLast
+          ? { ...axis, size: 34, label: this.data.x, labelSize: 20, labelFont: axis.font }
+          : { ...axis, size: 6, values: (_, ticks) => ticks.map(() => "") },
+        { ...axis, size: LEFT, incrs: panel.isWhole ? [1, 2, 5, 10, 20] : undefined, space: panel.isWhole ? 20 : 30, values: panel.marked ? (_, ticks) => ticks.map(tickText) : () => [] },
       ],
       hooks: {
         drawClear: [(u) => this.shade(u)],
@@ -213,7 +215,7 @@ class Figure {
   // What a line reads at the cursor, with its unit.
   reading(panel, { line, isRange }) {
     if (!panel.marked) return Number.isNaN(valueAt(line, this.time)) ? "" : "yes";
-    const size = panel.high - panel.low;
+    const size = panel.isWhole ? 1000 : panel.high - panel.low;
     const values = (isRange ? panel.ends : [line]).map((line) => shown(valueAt(line, this.time), size));
     return `${values.join(" to ")} ${panel.unit}`;
   }

@@ -56,11 +56,11 @@ function svgOf(figure) {
     parts.push("</g>");
     parts.push(`<rect x="${LEFT}" y="${top}" width="${WIDTH - LEFT - RIGHT}" height="${height}" fill="none" stroke="#888" stroke-width=".6"/>`);
     if (panel.marked) {
-      for (const tick of ticksOf(low, high, height / 34)) parts.push(text(LEFT - 5, up(tick) + 4, "end", tick));
+      for (const tick of ticksOf(low, high, height / 34)) parts.push(text(LEFT - 5, up(tick) + 4, "end", tickText(tick)));
     }
     y = top + height + 8;
   });
-  for (const tick of ticksOf(from, to, 8)) parts.push(text(x(tick), y + 8, "middle", tick));
+  for (const tick of ticksOf(from, to, 8)) parts.push(text(x(tick), y + 8, "middle", tickText(tick)));
   parts.push(text((LEFT + WIDTH - RIGHT) / 2, y + 26, "middle", figure.data.x));
   return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${y + 34}" font-size="12" fill="#222" ${FONT}>` +
     `<rect width="100%" height="100%" fill="#fff"/>${parts.join("")}</svg>`;

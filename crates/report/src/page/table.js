@@ -50,7 +50,8 @@ function filterable(table, body, titles) {
       row.hidden = choices.some(({ select, wordOf }) => select.selectedIndex > 0 && wordOf(row) !== select.value);
     }
     const left = [...body.rows].filter((row) => !row.hidden).length;
-    count.textContent = left === body.rows.length ? `${left} shifts` : `${left} of ${body.rows.length} shifts`;
+    const what = table.dataset.rows ?? "rows";
+    count.textContent = left === body.rows.length ? `${left} ${what}` : `${left} of ${body.rows.length} ${what}`;
   };
   for (const { select } of choices) select.addEventListener("change", apply);
   apply();

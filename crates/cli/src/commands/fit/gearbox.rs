@@ -16,7 +16,7 @@ use wetclutch::estimate::gearbox::check_ratios;
 use wetclutch::estimate::gearbox::source::{CarReading, CarSource};
 use wetclutch::read_sensors as sensors;
 
-use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, progress, reasons, said_of_file, table};
+use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, page, progress, reasons, said_of_file, table};
 use crate::args::Fit;
 use crate::commands::{channel_map_of_car, shell_quoted, write_text};
 use crate::failure::Failure;
@@ -76,8 +76,11 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
         output::line(&statement)?;
     }
     output::line(&checked.as_ref().map_or_else(nothing_held_out, said_of))?;
-    said_of_file(options, found.shifts, against);
-    Ok(())
+    said_of_file(options, found.shifts, against.as_deref());
+    let mut sentences = found.statements();
+    sentences.push(checked.as_ref().map_or_else(nothing_held_out, said_of));
+    let intervals = report::fit_page::gearbox_intervals(&found);
+    page(options, &car.name, (intervals, sentences), against, &[&car.source, &written.source])
 }
 
 /// The shifts of all logs.

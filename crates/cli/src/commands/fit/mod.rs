@@ -8,9 +8,11 @@ use car::Vehicle;
 use config::{Kind, Source, VehicleFile};
 use fit::{Collected, FitError, HeldOut, ReadingAges, ReportRow, SHIFTS_MAX, ShiftRecord};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use report::sheet::{Part, Sheet};
 use trace::ShownPath as _;
 
 use crate::args::Fit;
+use crate::commands::page::{check_page, write_page};
 use crate::commands::written::replaces_only;
 use crate::commands::{channel_map_of_car, check_output, not_an_input, shell_quoted, write_text};
 use crate::failure::Failure;
@@ -26,8 +28,12 @@ const REASONS_MAX: usize = 10;
 
 pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
-    let inputs = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]).chain(options.mapping.files());
-    not_an_input(Some(&options.output), inputs)?;
+    let inputs = || {
+        let files = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]);
+        files.chain(options.mapping.files())
+    };
+    not_an_input(Some(&options.output), inputs())?;
+    check_page(&options.page, inputs())?;
     replaces_only("vehicle file", &options.output, is_vehicle_file)?;
     let source = Source::read(&options.vehicle)?;
     if source.kind()? == Kind::Car {
@@ -70,12 +76,42 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     print(&found)?;
     output::line(&kinds)?;
     output::line(&said_of(checked.as_ref()))?;
-    said_of_file(options, found.shifts, against);
-    Ok(())
+    said_of_file(options, found.shifts, against.as_deref());
+    let sentences = [found.statements(), vec![kinds, said_of(checked.as_ref())]].concat();
+    page(
+        options,
+        &vehicle.name,
+        (report::fit_page::intervals(&found), sentences),
+        against,
+        &[&vehicle.source, &written.source],
+    )
+}
+
+/// Writes the page, if one is wanted: intervals, and what was found.
+fn page(
+    options: &Fit,
+    name: &str,
+    (intervals, mut sentences): (Part, Vec<String>),
+    against: Option<String>,
+    sources: &[&Source],
+) -> Result<(), Failure> {
+    let kept = against.map(|reason| format!("warning: the given values are kept: {reason}"));
+    sentences.extend(kept);
+    write_page(&options.page, || Sheet {
+        name,
+        title: "fit",
+        lead: format!(
+            "fitted to {}",
+            options.logs.iter().map(|log| log.shown().to_string()).collect::<Vec<_>>().join(", ")
+        ),
+        sentences,
+        parts: vec![intervals],
+        sources: sources.to_vec(),
+    })
 }
 
 /// Says what the file has, and of how many shifts, or why it has the given values.
-fn said_of_file(options: &Fit, shifts: usize, against: Option<String>) {
+fn said_of_file(options: &Fit, shifts: usize, against: Option<&str>) {
     let output = options.output.shown();
     let shifts = if shifts == 1 { "1 shift".to_owned() } else { format!("{shifts} shifts") };
     output::note(&match against {
