@@ -10,7 +10,7 @@ const SHIFT = join(folder, "shift/report.html");
 const DRIVE = join(folder, "drive/report.html");
 const LOG = join(folder, "<img src=x onerror=alert(1)>_report.html");
 const HOUR = join(folder, "hour_report.html");
-const PAGES = [SHIFT, DRIVE, LOG, HOUR, ...["check", "check_maps", "design", "fit"].map((name) => join(folder, `${name}.html`))];
+const PAGES = [SHIFT, DRIVE, LOG, HOUR, ...["check", "check_maps", "design", "fit", "study/study"].map((name) => join(folder, `${name}.html`))];
 
 const { browser, end } = await launch();
 test.after(end);

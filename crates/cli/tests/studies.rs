@@ -435,7 +435,7 @@ fn printed_commands_work_as_they_are_whatever_the_paths_and_titles_hold() {
     in_a_shell(searched.lines().find_map(|line| line.strip_prefix("to repeat: ")).unwrap());
     done(&["study", &study.file(), "-o", &out]);
     let page = String::from_utf8(bytes(Path::new(&out).join("study.html"))).unwrap();
-    assert!(!page.contains("</script"));
+    assert_eq!(page.matches("</script").count(), page.matches("<script").count());
     let command = page.split("<code>").find(|code| code.starts_with("wetclutch")).unwrap().split('<').next().unwrap();
     in_a_shell(&command.replace("&#x27;", "'").replace("&#x2f;", "/").replace("&amp;", "&"));
     let bounds = study.path("bounds.toml");

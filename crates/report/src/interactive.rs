@@ -128,6 +128,8 @@ impl Figure {
 
     fn data(&self) -> Data<'_> {
         let (from, to) = self.x_range;
+        // An axis has a length.
+        let to = if to > from { to } else { from + 1.0 };
         let mut times = TimesOfCurves::default();
         let panels = self.panels.iter().map(|panel| self.panel_data(panel, &mut times)).collect();
         let spans = self.spans.iter().filter(|span| span.end >= from && span.start <= to);
@@ -337,6 +339,8 @@ mod tests {
         let nothing = figure("a", vec![(0.0, f64::NAN), (1.0, f64::NEG_INFINITY)]).markup(false);
         assert!(!nothing.contains("NaN") && !nothing.contains("inf") && !nothing.contains("null,\"step"), "{nothing}");
         assert!(figure("a", Vec::new()).markup(false).contains("\"count\":0"));
+        let one_time = Figure { x_range: (3.0, 3.0), ..figure("a", vec![(3.0, 1.0)]) };
+        assert!(one_time.markup(false).contains("\"from\":3.0,\"to\":4.0"));
     }
 
     #[test]

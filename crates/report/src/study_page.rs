@@ -9,7 +9,7 @@ use study::{Row, Summary};
 use trace::units::mpa;
 
 use crate::figure::{Axis, Figure, Panel, Series};
-use crate::page::{PageError, inline, origin, render};
+use crate::page::{PageError, origin, render};
 use crate::palette::{FAMILY, observer_strokes};
 use crate::shift_figure::observers_of;
 use crate::tables::{COMPARED_NAMES, number, phase_name};
@@ -40,15 +40,15 @@ impl StudyPage {
     /// None in a released program; the tests render the template.
     pub fn of(summary: &Summary, study: &Study, worst: &[Run], command: &str) -> Result<Self, PageError> {
         let layout = &summary.layout;
-        let mut figures = vec![("errors.svg".to_owned(), distributions(summary, study).svg())];
+        let mut figures = vec![("errors.svg".to_owned(), distributions(summary, study))];
         for (i, phase) in PHASES.into_iter().enumerate() {
-            figures.push((format!("effects_{}.svg", phase.name()), effects_figure(summary, i).svg()));
+            figures.push((format!("effects_{}.svg", phase.name()), effects_figure(summary, i)));
         }
         let worst_runs: Vec<Value> = (summary.worst.iter().zip(worst))
             .map(|(row, run)| {
-                let svg = observers_of(&run.observers, &run.trace, run.quality.as_ref()).svg();
-                let shown = worst_run(row, summary, &svg, command);
-                figures.push((format!("run_{}.svg", row.run), svg));
+                let figure = observers_of(&run.observers, &run.trace, run.quality.as_ref());
+                let shown = worst_run(row, summary, &figure, command);
+                figures.push((format!("run_{}.svg", row.run), figure));
                 shown
             })
             .collect();
@@ -78,8 +78,8 @@ impl StudyPage {
                 scores => scores(summary),
                 diverged => diverged(summary),
                 relative => relative(summary),
-                errors_figure => inline(&figures[0].1),
-                effects_figures => figures[1..3].iter().map(|(_, svg)| inline(svg)).collect::<Vec<_>>(),
+                errors_figure => figures[0].1.html(),
+                effects_figures => figures[1..3].iter().map(|(_, figure)| figure.html()).collect::<Vec<_>>(),
                 observers => &layout.observers,
                 effects => (0..PHASES.len()).map(|phase| context! {
                     phase => phase_name(PHASES[phase]),
@@ -93,6 +93,7 @@ impl StudyPage {
                 inputs => origin(&[&study.source, &study.experiment.source, &study.vehicle.source]),
             },
         )?;
+        let figures = figures.into_iter().map(|(name, figure)| (name, figure.svg())).collect();
         Ok(Self { html, figures })
     }
 }
@@ -276,7 +277,7 @@ fn effect_rows(summary: &Summary, phase: usize) -> Vec<Value> {
         .collect()
 }
 
-fn worst_run(row: &Row, summary: &Summary, svg: &str, command: &str) -> Value {
+fn worst_run(row: &Row, summary: &Summary, figure: &Figure, command: &str) -> Value {
     let layout = &summary.layout;
     let rms = |observer, phase| row.numbers[layout.score(observer, phase, study::campaign::Metric::PressureRms)];
     let errors = layout.observers.iter().enumerate().map(|(observer, name)| {
@@ -292,6 +293,6 @@ fn worst_run(row: &Row, summary: &Summary, svg: &str, command: &str) -> Value {
         factors => factors.map(|(name, &value)| context! { name, value => short(value) }).collect::<Vec<_>>(),
         errors => errors.collect::<Vec<_>>(),
         command => format!("{command} --run {}", row.run),
-        figure => inline(svg),
+        figure => figure.html(),
     }
 }

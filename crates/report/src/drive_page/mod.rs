@@ -50,11 +50,13 @@ impl DrivePage<'_> {
     pub fn html(&self) -> Result<String, PageError> {
         let (car, drive) = (self.car, self.drive);
         let worst = worst_first(&drive.shifts);
-        let mut drawn: Vec<&ScoredShift> =
-            worst.iter().filter(|shift| shift.is_drawn).take(MOST_DRAWN).copied().collect();
-        drawn.sort_by_key(|shift| shift.number);
-        let figures = within_room(drawn.iter().map(|shift| shift_figure(shift, drive, car)));
-        let figures = drawn.iter().zip(figures).map(|(shift, figure)| {
+        let mut drawn: Vec<&ScoredShift> = drive.shifts.iter().filter(|shift| shift.is_drawn).collect();
+        drawn.sort_by(|a, b| by_need(a, b));
+        let figures = within_room(drawn.iter().take(MOST_DRAWN).map(|shift| shift_figure(shift, drive, car)));
+        let mut figures: Vec<(&ScoredShift, Value)> = drawn.iter().copied().zip(figures).collect();
+        drawn.truncate(figures.len());
+        figures.sort_by_key(|(shift, _)| shift.number);
+        let figures = figures.into_iter().map(|(shift, figure)| {
             context! {
                 number => shift.number,
                 title => title(shift, car),
@@ -64,7 +66,6 @@ impl DrivePage<'_> {
             }
         });
         let figures: Vec<Value> = figures.collect();
-        drawn.truncate(figures.len());
         let (columns, (_, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
         let mut rows: Vec<_> = rows.into_iter().zip(&drive.shifts).collect();
         rows.sort_by(|(_, a), (_, b)| by_need(a, b));
@@ -97,6 +98,7 @@ impl DrivePage<'_> {
                 opened => first,
                 worst => named.collect::<Vec<_>>(),
                 undrawn => drive.shifts.len() - drawn.len(),
+                chosen => drive.shifts.len() > MOST_DRAWN,
                 by_each => BY_EACH,
                 draw => self.draw.map(|(draw, _)| draw_rows(draw, car)),
                 converter => self.draw.filter(|_| car.converter.is_some()).map(|(draw, _)| number(draw.converter, 3)),

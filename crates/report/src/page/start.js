@@ -122,6 +122,6 @@ for (const table of document.querySelectorAll("table.sortable")) {
   linked(table);
 }
 for (const scroll of document.querySelectorAll(".scroll")) scroll.tabIndex = 0;
-for (const shift of shifts()) shift.addEventListener("toggle", update);
+for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", update);
 update();
 openHash();
