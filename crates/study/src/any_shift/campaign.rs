@@ -145,6 +145,7 @@ impl CarCampaign {
                 if from >= low && to <= high {
                     continue;
                 }
+                let [from, to, low, high] = [from, to, low, high].map(config::significant);
                 let figures = format!("{what} {from} to {to} (bounds {low} to {high})");
                 match groups.iter_mut().find(|(other, _)| *other == figures) {
                     Some((_, names)) => names.push(&element.name),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use car::ElementErrors;
-use config::{CarStudy, CarStudyRuns, Source};
+use config::{CarStudy, CarStudyRuns, Source, significant};
 use report::matrix_page::kind_rows;
 use study::StudyError;
 use study::any_shift::campaign::{CarCampaign, CarRow, CarSummary};
@@ -141,9 +141,9 @@ pub(crate) fn describe(path: &Path) -> Result<(), Failure> {
         study.name,
         study.title,
         study.runs,
-        100.0 * sampled.widest(ElementErrors::friction),
-        100.0 * sampled.widest(ElementErrors::valve_gain),
-        100.0 * sampled.converter,
+        significant(100.0 * sampled.widest(ElementErrors::friction)),
+        significant(100.0 * sampled.widest(ElementErrors::valve_gain)),
+        significant(100.0 * sampled.converter),
     ))?;
     describe_car(&study.car)?;
     warn_of_slipping(&study.car);
