@@ -22,7 +22,12 @@ use failure::Failure;
 
 fn main() -> ExitCode {
     let command = match Arguments::try_parse() {
-        Ok(arguments) => arguments.command,
+        Ok(arguments) => {
+            if arguments.quiet {
+                output::be_quiet();
+            }
+            arguments.command
+        }
         // The message repeats what was typed, and a shell may have completed the name of a file.
         Err(error) if error.use_stderr() => {
             let shown = std::env::args_os().map(|of| printable(&of.to_string_lossy()).into_owned());
@@ -65,5 +70,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Sensitivity(options) => commands::sensitivity(&options),
         Command::WorstCase(options) => commands::worst_case(&options),
         Command::Check(options) => commands::check(&options),
+        Command::Completions(options) => commands::completions(&options),
+        Command::Man(options) => commands::man(&options),
     }
 }

@@ -6,8 +6,10 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anstyle::{AnsiColor, Style};
+use indicatif::ProgressDrawTarget;
 use serde::Serialize;
 use trace::{is_unprintable, printable};
 
@@ -23,8 +25,33 @@ pub(crate) fn error(message: &str) {
     let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", coloured_hints(&printable_lines(message)));
 }
 
-/// A message on standard error.
+/// Whether messages are errors and warnings alone.
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Shows errors and warnings alone from now on.
+pub(crate) fn be_quiet() {
+    IS_QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether a message is shown: each, or only a warning.
+pub(crate) fn is_shown(message: &str) -> bool {
+    !IS_QUIET.load(Ordering::Relaxed) || message.starts_with("warning: ")
+}
+
+/// Where progress is shown.
+pub(crate) fn progress_target() -> ProgressDrawTarget {
+    if IS_QUIET.load(Ordering::Relaxed) { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() }
+}
+
+/// A message on standard error, if it is shown.
 pub(crate) fn note(message: &str) {
+    if is_shown(message) {
+        say(message);
+    }
+}
+
+/// A message on standard error.
+pub(crate) fn say(message: &str) {
     let _ = writeln!(anstream::stderr().lock(), "{}", printable_lines(message));
 }
 
@@ -124,9 +151,19 @@ pub(crate) fn toml(text: &str) -> io::Result<()> {
     raw_line(text)
 }
 
-/// A value in JSON on standard output.
-pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
-    Ok(raw_line(&escaped_json(&serde_json::to_string_pretty(value)?))?)
+/// Version of the JSON on standard output: it rises when a key goes or gets another meaning, and not with a new key.
+const JSON_VERSION: u32 = 1;
+
+/// A result in JSON on standard output: an object, with the version of its keys.
+pub(crate) fn json(result: &impl Serialize) -> Result<(), Failure> {
+    #[derive(Serialize)]
+    struct Versioned<'a, R> {
+        json_version: u32,
+        #[serde(flatten)]
+        result: &'a R,
+    }
+    let versioned = Versioned { json_version: JSON_VERSION, result };
+    Ok(raw_line(&escaped_json(&serde_json::to_string_pretty(&versioned)?))?)
 }
 
 /// JSON without characters that are not printed: they stand in strings alone.
@@ -145,7 +182,7 @@ fn escaped_json(json: &str) -> String {
     escaped
 }
 
-fn raw_line(text: &str) -> io::Result<()> {
+pub(crate) fn raw_line(text: &str) -> io::Result<()> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         written => written,

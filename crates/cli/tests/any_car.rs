@@ -103,7 +103,8 @@ fn the_bench_of_a_gearbox_has_every_shift_in_every_kind_on_any_number_of_threads
     assert_eq!(table.lines().count(), 13);
     assert!(numbers(&table, "failed_runs").iter().all(|&failed| failed == 0.0));
     let json = printed(&run("three", &["--threads", "3", "--json"]));
-    let objects: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let objects = json["shifts"].as_array().unwrap();
     let name = "inertia_phase_controlling_torque_rms_n_m";
     let in_json: Vec<f64> = objects.iter().map(|object| object[name].as_f64().unwrap()).collect();
     assert_eq!(in_json, numbers(&table, name));

@@ -26,7 +26,8 @@ fn the_gains_of_a_shift_are_printed_with_their_certificate() {
     for observer in ["rigid", "compliant", "sliding"] {
         let json = printed(&design(&["--observer", observer, "--json", "--phase", "inertia"]));
         let json: serde_json::Value = serde_json::from_str(&json).unwrap();
-        assert_eq!(json.as_object().unwrap().len(), 1);
+        assert_eq!(json.as_object().unwrap().len(), 2);
+        assert_eq!(json["json_version"], 1);
         let has_certificate = json["inertia_phase"]["vertices"].as_array().is_some_and(|vertices| vertices.len() == 2);
         assert_eq!(has_certificate, observer != "sliding", "{json}");
     }
@@ -59,7 +60,7 @@ fn without_a_shift_the_upshifts_that_hide_their_pressure_are_in_a_table() {
         assert!(text.contains(words), "{words}: {text}");
     }
     let json: serde_json::Value = serde_json::from_str(&table(&["--json"])).unwrap();
-    let rows = json.as_array().unwrap();
+    let rows = json["shifts"].as_array().unwrap();
     assert_eq!(rows.len(), 7);
     for row in rows {
         let name = format!("{}-{}", row["from_gear"].as_str().unwrap(), row["to_gear"].as_str().unwrap());
@@ -78,7 +79,8 @@ fn without_a_shift_the_upshifts_that_hide_their_pressure_are_in_a_table() {
         assert!(row["torque_phase"]["uses_open_loop"].as_bool().unwrap() && hidden == 1, "{row}");
     }
     let phase: serde_json::Value = serde_json::from_str(&table(&["--json", "--phase", "torque"])).unwrap();
-    assert!(phase[0]["inertia_phase"].is_null() && phase[0]["torque_phase"].is_object(), "{phase}");
+    let shift = &phase["shifts"][0];
+    assert!(shift["inertia_phase"].is_null() && shift["torque_phase"].is_object(), "{phase}");
 }
 
 #[test]

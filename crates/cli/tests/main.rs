@@ -35,6 +35,7 @@ mod other_cars;
 mod own_car;
 mod pages;
 mod pressure_commands;
+mod results;
 mod same_bits;
 mod studies;
 mod support;

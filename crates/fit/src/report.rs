@@ -7,22 +7,7 @@ use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, OFFSET_UNIT_PA};
-use crate::{BacklashFit, Channel, Fit, Known, Parameter, Verdict, correlated};
-
-/// A row of the table of parameters.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReportRow {
-    /// The parameter or combination.
-    pub name: String,
-    /// Its value, `x 1.042` or `+3.1 ms`.
-    pub value: String,
-    /// Its interval of 95 %.
-    pub interval: String,
-    /// Standard deviation after the fit over that before.
-    pub share: String,
-    /// What the logs tell of it.
-    pub verdict: Verdict,
-}
+use crate::{BacklashFit, Channel, Fit, Known, Measure, Parameter, ReportRow, Verdict, correlated};
 
 /// A one-step gain of the turbine speed above this says that the model does not fit.
 const MISFIT_GAIN: f64 = 0.6;
@@ -42,18 +27,18 @@ impl Fit {
         let combination = |(name, powers): (&str, Vec<(Parameter, f64)>)| {
             let value = powers.iter().map(|(p, power)| power * self.unknown(*p)).sum::<f64>();
             let [before, after] = self.combination_sd(&powers);
-            row(name, value, after, before, Verdict::of(after, before), Kind::Factor)
+            row(name, value, after, before, Verdict::of(after, before), Measure::Factor)
         };
         let single = |(i, prior): (usize, &crate::Prior)| {
             let sd = self.precision.stated[(i, i)].sqrt();
-            let kind = match prior.parameter {
-                p if p.is_delay() => Kind::Delay,
-                p if p.is_shape() => Kind::Share,
-                Parameter::Hysteresis => Kind::HalfWidth,
-                Parameter::PressureOffset => Kind::Offset,
-                _ => Kind::Factor,
+            let measure = match prior.parameter {
+                p if p.is_delay() => Measure::Delay,
+                p if p.is_shape() => Measure::Fraction,
+                Parameter::Hysteresis => Measure::Width,
+                Parameter::PressureOffset => Measure::Offset,
+                _ => Measure::Factor,
             };
-            row(&prior.name, self.unknowns[i], sd, prior.sd, self.verdict(prior.parameter), kind)
+            row(&prior.name, self.unknowns[i], sd, prior.sd, self.verdict(prior.parameter), measure)
         };
         let mut rows: Vec<ReportRow> = combinations.into_iter().map(combination).collect();
         rows.extend(self.priors.iter().enumerate().map(single));
@@ -259,18 +244,10 @@ impl Fit {
     }
 }
 
-enum Kind {
-    Factor,
-    Delay,
-    Share,
-    HalfWidth,
-    Offset,
-}
-
 /// The row of a zero offset, Pa.
 pub(crate) fn offset_row(name: String, offset: Known) -> ReportRow {
     let [value, sd, before] = [offset.value, offset.sd, offset.before].map(|pa| pa / OFFSET_UNIT_PA);
-    row(&name, value, sd, before, offset.verdict(), Kind::Offset)
+    row(&name, value, sd, before, offset.verdict(), Measure::Offset)
 }
 
 /// What a fit says of the zero offset of the channel of a pressure, Pa, between the ends of its interval, where that is not about zero.
@@ -287,32 +264,21 @@ pub(crate) fn said_of_offset(channel: &str, offset_pa: [f64; 3]) -> Option<Strin
 
 /// The row of a fill volume.
 pub(crate) fn fill_row(name: &str, fill: &FillFit) -> ReportRow {
-    row(name, fill.log_volume, fill.sd[0], fill.sd[1], fill.verdict(), Kind::Factor)
+    row(name, fill.log_volume, fill.sd[0], fill.sd[1], fill.verdict(), Measure::Factor)
 }
 
-fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -> ReportRow {
-    let half = SIDES * sd;
-    let (value, interval) = match kind {
-        Kind::Factor => {
-            (format!("x {:.3}", Real::exp(x)), format!("{:.3} to {:.3}", Real::exp(x - half), Real::exp(x + half)))
-        }
-        Kind::Delay => {
-            let ms = |x: f64| 1e3 * DELAY_UNIT_S * x;
-            (format!("{:+.1} ms", ms(x)), format!("{:+.1} to {:+.1} ms", ms(x - half), ms(x + half)))
-        }
-        Kind::Offset => {
-            let kpa = |x: f64| 1e-3 * OFFSET_UNIT_PA * x;
-            (format!("{:+.1} kPa", kpa(x)), format!("{:+.1} to {:+.1} kPa", kpa(x - half), kpa(x + half)))
-        }
-        Kind::HalfWidth => {
-            let kpa = |x: f64| 1e-3 * HYSTERESIS_UNIT_PA * x;
-            (format!("{:.1} kPa", kpa(x)), format!("{:.1} to {:.1} kPa", kpa((x - half).max(0.0)), kpa(x + half)))
-        }
-        Kind::Share => {
-            (format!("{:+.1} %", 100.0 * x), format!("{:+.1} to {:+.1} %", 100.0 * (x - half), 100.0 * (x + half)))
-        }
+/// The row of an unknown of a fit, with its standard deviations after and before.
+fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, measure: Measure) -> ReportRow {
+    let si = |x: f64| match measure {
+        Measure::Factor => Real::exp(x),
+        Measure::Delay => DELAY_UNIT_S * x,
+        Measure::Offset => OFFSET_UNIT_PA * x,
+        Measure::Width => HYSTERESIS_UNIT_PA * x.max(0.0),
+        Measure::Fraction | Measure::Torque => x,
     };
-    ReportRow { name: name.to_owned(), value, interval, share: format!("{:.2}", sd / before), verdict }
+    let half = SIDES * sd;
+    let interval = [si(x - half), si(x + half)];
+    ReportRow { name: name.to_owned(), measure, value: si(x), interval, share: sd / before, verdict }
 }
 
 /// Why intervals may be too small.

@@ -36,7 +36,7 @@ pub fn gearbox_intervals(found: &GearboxFit) -> Part {
 fn part(rows: &[ReportRow], bars: &Bars) -> Part {
     let interval = |row: &ReportRow| Interval {
         name: row.name.clone(),
-        cells: [row.value.clone(), row.interval.clone()],
+        cells: [row.value_text(), row.interval_text()],
         bar: bars.get(&row.name).copied(),
         verdict: row.verdict.name(),
         rank: match row.verdict {

@@ -51,6 +51,9 @@ pub(crate) struct Inspect {
     /// Ratios of the forward gears, 1st first; they replace those of the map
     #[arg(long, value_name = "R1,R2,...", value_delimiter = ',', requires = "shifts")]
     pub(crate) ratios: Vec<f64>,
+    /// Print the channels, or with --shifts the shifts, as JSON
+    #[arg(long, conflicts_with_all = ["suggest", "output"])]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -99,6 +102,9 @@ pub(crate) struct Estimate {
     /// Format of files in a folder [default: csv]; the ending of a file after -o says its format
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatChoice>,
+    /// Print the shifts of each log as JSON, in place of the table; needs -o
+    #[arg(long, requires = "output", conflicts_with = "follow")]
+    pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) threads: Threads,
 }
@@ -242,4 +248,7 @@ pub(crate) struct Fit {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) page: PageChoice,
+    /// Print what was found as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }

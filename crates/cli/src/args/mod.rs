@@ -35,13 +35,19 @@ All files use SI units, which are part of keys and column names. Column names of
 end in _rpm, _bar, _mpa, _ma, _ms, _km_h; these columns are converted when they are read.
 Exit codes: 0 done, 1 the work failed (infeasible, diverged), 2 wrong usage or input.";
 
+/// The version, and the commit that a release is made of.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("WETCLUTCH_OF_COMMIT"));
+
 /// A virtual pressure sensor for the wet clutches of automatic transmissions.
 ///
 /// Estimates the hydraulic pressure in an engaging clutch from the speeds and the valve command that
 /// a car already has, with a bound on the error.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "wetclutch", version = VERSION, about, after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Arguments {
+    /// Messages are errors and warnings alone; results are printed as without it
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
     #[command(subcommand)]
     pub(crate) command: Command,
 }
@@ -268,6 +274,25 @@ pub(crate) enum Command {
     ///   gear_NAME.svg  the same in a gear: engaged elements, shaft speeds, levers of the sets
     #[command(verbatim_doc_comment)]
     Check(Check),
+    /// Print completions for a shell
+    #[command(hide = true)]
+    Completions(Completions),
+    /// Write the manual pages into a folder
+    #[command(hide = true)]
+    Man(Man),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    pub(crate) shell: clap_complete::Shell,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Man {
+    /// Folder for the pages: `wetclutch.1`, and one of each command
+    pub(crate) folder: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -322,6 +347,9 @@ pub(crate) struct Check {
     pub(crate) all: bool,
     #[command(flatten)]
     pub(crate) page: PageChoice,
+    /// Print kind, errors, warnings and defaults of each file as JSON
+    #[arg(long, conflicts_with_all = ["sensors", "output", "all", "page"])]
+    pub(crate) json: bool,
 }
 
 /// A page of what a command prints.

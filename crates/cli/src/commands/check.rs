@@ -25,6 +25,9 @@ use crate::output;
 
 /// Checks the files one after the other: one with errors does not stop the others.
 pub(crate) fn check(options: &Check) -> Result<(), Failure> {
+    if options.json {
+        return super::check_json::check(options);
+    }
     let [file] = options.files.as_slice() else { return several(options) };
     page_is_free(&options.page, &options.files)?;
     check_file(options, file)
@@ -65,6 +68,11 @@ fn several(options: &Check) -> Result<(), Failure> {
 
 fn check_file(options: &Check, file: &Path) -> Result<(), Failure> {
     let source = Source::read(file)?;
+    let errors = errors_of(&source);
+    if !errors.is_empty() {
+        let messages = errors.iter().map(ToString::to_string);
+        return Err(Failure::Input(messages.collect::<Vec<_>>().join("\nerror: ")));
+    }
     let kind = source.kind()?;
     if options.output.is_some() && !matches!(kind, Kind::Gearbox | Kind::Car) {
         let what = "only a gearbox is drawn, of a gearbox file or of a vehicle file that names one";
@@ -84,12 +92,12 @@ fn check_file(options: &Check, file: &Path) -> Result<(), Failure> {
             &format!("{} is {}, which has no defaults to show", file.shown(), kind.words()),
         );
     }
-    let errors = all_errors(&source, &|source| read(kind, source));
-    if !errors.is_empty() {
-        let messages = errors.iter().map(ToString::to_string);
-        return Err(Failure::Input(messages.collect::<Vec<_>>().join("\nerror: ")));
-    }
     describe_file(options, file, (source, kind))
+}
+
+/// All errors of a file and of those that it names.
+pub(super) fn errors_of(source: &Source) -> Vec<ConfigError> {
+    all_errors(source, &|source| read(source.kind()?, source))
 }
 
 /// Reads a file of a kind, and the files that it names.
@@ -98,7 +106,7 @@ fn read(kind: Kind, source: Source) -> Result<(), ConfigError> {
         Kind::Gearbox => GearboxFile::from_source(source).map(drop),
         Kind::Car => CarFile::from_source(source).map(drop),
         Kind::CarStudy => CarStudy::from_source(source).map(drop),
-        Kind::Drive => DriveFile::from_source(source).map(drop),
+        Kind::Drive => read_drive(source),
         Kind::Vehicle => VehicleFile::from_source(source).map(drop),
         Kind::Experiment => ExperimentFile::from_source(source)?.read_vehicle().map(drop),
         Kind::Overlay => VehicleFile::check_overlay(&source),
@@ -107,6 +115,12 @@ fn read(kind: Kind, source: Source) -> Result<(), ConfigError> {
         Kind::Learnt => check_learnt(&source),
         Kind::ChannelMap => read_map(&source),
     }
+}
+
+/// Reads a drive file, and the vehicle file if it names one.
+fn read_drive(source: Source) -> Result<(), ConfigError> {
+    let drive = DriveFile::from_source(source)?;
+    drive.vehicle.as_ref().map_or(Ok(()), |_| drive.read_vehicle().map(drop))
 }
 
 /// Reads a channel map; its errors have the form of those of the other files.

@@ -14,6 +14,7 @@ use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
 use crate::browser;
+use crate::commands::inspect_json;
 use crate::commands::written::{is_page, replaces_only};
 use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, write_text};
 use crate::failure::Failure;
@@ -57,6 +58,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     let inspection = logs::inspect(&mut log)?;
     if inspection.channels.iter().all(|summary| summary.counts.total() == 0) {
         return Err(nothing_in(&options.log, "samples"));
+    }
+    if options.json {
+        return inspect_json::channels(options, &log, &inspection);
     }
     output::line(&format!("{}: {}, {} channels", options.log.shown(), log.format(), log.channels().len()))?;
     channels(&log, &inspection)?;
@@ -240,13 +244,16 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
         }
     }
     readings.check()?;
-    let origin_s = origin_s.unwrap_or(0.0);
+    let origin_s = origin_s.filter(|_| !options.json).unwrap_or(0.0);
     let mut notes = notes(&readings);
     notes.extend(wrong_time(rates.step_s(), last_s - first_s));
     // The log ends here.
     finder.restart();
     let found: Vec<Shift> = finder.take_settled(f64::INFINITY).iter().map(|shift| shift.earlier_by(origin_s)).collect();
     notes.extend(finder.notes());
+    if options.json {
+        return inspect_json::shifts(options, [first_s, last_s], &found, &notes);
+    }
     remarks(&notes);
     say_origin(origin_s)?;
     output::line(&format!("{} shifts from {:.2} to {:.2} s", found.len(), first_s - origin_s, last_s - origin_s))?;

@@ -5,6 +5,7 @@ use std::path::Path;
 use car::{Car, Sensors};
 use config::ExperimentFile;
 use report::matrix_page::{failures, kind_rows, matrix_page, shift_cells, shift_rows, without_tables};
+use serde_json::json;
 use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::{Cell, ShownPath as _};
 
@@ -40,7 +41,7 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
     }
     if options.json {
         let objects: Vec<_> = cells.into_iter().map(JsonObject::of).collect();
-        output::json(&objects)?;
+        output::json(&json!({ "shifts": objects }))?;
         return Ok(());
     }
     print(&result, &car)?;

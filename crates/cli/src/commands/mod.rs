@@ -4,6 +4,7 @@ mod bench;
 mod car;
 mod check;
 mod check_defaults;
+mod check_json;
 mod check_page;
 mod demo;
 mod demo_drive;
@@ -16,10 +17,12 @@ mod fit;
 mod gearbox;
 mod init;
 mod inspect;
+mod inspect_json;
 mod matrix;
 mod page;
 mod reproduce;
 mod sensitivity;
+mod shell;
 mod simulate;
 mod simulate_drive;
 mod study;
@@ -39,6 +42,7 @@ pub(crate) use init::init;
 pub(crate) use inspect::inspect;
 pub(crate) use reproduce::reproduce;
 pub(crate) use sensitivity::sensitivity;
+pub(crate) use shell::{completions, man};
 pub(crate) use simulate::simulate;
 pub(crate) use study::{merge, study};
 pub(crate) use worst_case::worst_case;
@@ -47,7 +51,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use config::{Kind, Source};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressStyle};
 use logs::ChannelMap;
 use serde::{Serialize, Serializer};
 use trace::{Cell, CsvWriter, ShownPath as _, Trace, WholeFile};
@@ -210,7 +214,7 @@ fn check_output(path: Option<&PathBuf>) -> Result<(), Failure> {
 
 /// A bar on standard error with rate and time left; nothing if standard error is not a terminal.
 fn progress(length: u64, done: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
+    let bar = ProgressBar::with_draw_target(Some(length), output::progress_target());
     // The template is a constant.
     if let Ok(style) = ProgressStyle::with_template("{bar:32} {pos}/{len} runs  {per_sec}  {eta} left") {
         bar.set_style(style);

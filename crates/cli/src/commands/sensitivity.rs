@@ -93,7 +93,7 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     }
     if options.json {
         let objects: Vec<_> = shifts.iter().map(|shift| json_of(shift, &car)).collect();
-        output::json(&objects)?;
+        output::json(&json!({ "shifts": objects }))?;
         return Ok(());
     }
     output::line(

@@ -9,7 +9,7 @@ use crate::driving::{Balance, DRAG_UNIT_N_M, LEAST_DELAY_S, said_of_delay};
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::report::{MEAN_GRADE, cautions, fill_row, offset_row, said_of_offset};
-use crate::{BacklashFit, Known, ReportRow, Verdict, WheelFit, correlated};
+use crate::{BacklashFit, Known, Measure, ReportRow, Verdict, WheelFit, correlated};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
@@ -51,24 +51,22 @@ impl GearboxFit {
         let by_driving = if quantity == Quantity::EngineDelay { self.channels.late_s()[1] / DELAY_UNIT_S } else { 0.0 };
         let (x, sd) = (self.unknowns[place] + by_driving, self.sd(quantity));
         let half = SIDES * sd;
-        let plain = |unit: f64, name: &str| {
-            (
-                format!("{:+.1} {name}", unit * x),
-                format!("{:+.1} to {:+.1} {name}", unit * (x - half), unit * (x + half)),
-            )
-        };
-        let (value, interval) = match quantity {
+        let (measure, si): (_, &dyn Fn(f64) -> f64) = match quantity {
             Quantity::Delay(_) | Quantity::InputDelay | Quantity::EngineDelay | Quantity::ReportedDelay => {
-                plain(1e3 * DELAY_UNIT_S, "ms")
+                (Measure::Delay, &|x| DELAY_UNIT_S * x)
             }
-            Quantity::Kiss(_) => plain(1e-3 * KISS_UNIT_PA, "kPa"),
-            Quantity::Drag(_) => plain(DRAG_UNIT_N_M, "N m"),
-            _ => {
-                (format!("x {:.3}", Real::exp(x)), format!("{:.3} to {:.3}", Real::exp(x - half), Real::exp(x + half)))
-            }
+            Quantity::Kiss(_) => (Measure::Offset, &|x| KISS_UNIT_PA * x),
+            Quantity::Drag(_) => (Measure::Torque, &|x| DRAG_UNIT_N_M * x),
+            _ => (Measure::Factor, &Real::exp),
         };
-        let share = format!("{:.2}", sd / self.quantities.sd_before(place));
-        ReportRow { name: self.quantities.name(quantity), value, interval, share, verdict: self.verdict(quantity) }
+        ReportRow {
+            name: self.quantities.name(quantity),
+            measure,
+            value: si(x),
+            interval: [si(x - half), si(x + half)],
+            share: sd / self.quantities.sd_before(place),
+            verdict: self.verdict(quantity),
+        }
     }
 
     /// Whether a fitted shift depends on a quantity.

@@ -205,7 +205,7 @@ fn the_zero_offset_of_a_pressure_sensor_is_not_taken_for_the_gain_of_its_valve()
                 let found = fit.zero_offset_pa(place).unwrap();
                 assert!((found.value - offset_pa).abs() < 2.0 * found.sd, "{case} {offset_pa}: {found:?}");
                 let row = fit.report().into_iter().find(|row| row.name == "C: pressure sensor, zero offset").unwrap();
-                assert!(row.value.ends_with(" kPa") && row.interval.contains(" to "), "{row:?}");
+                assert!(row.value_text().ends_with(" kPa") && row.interval_text().contains(" to "), "{row:?}");
                 let said = fit.statements().join("\n");
                 assert!(said.contains("the pressure of C reads ") || found.value.abs() < 2.0 * found.sd, "{said}");
             }

@@ -42,27 +42,28 @@ pub(super) fn estimate(
     let prepared = gearbox::Setup::new(file, &options)?;
     let found = gearbox::estimate(&prepared, setup.log(path), destination(output), &mut |note| say.note(note))?;
     let places = output.and_then(beside).filter(|_| !found.drive.shifts.is_empty());
+    let shifts = found.drive.shifts.iter();
+    let cells: Vec<Vec<(String, Cell<'_>)>> = shifts.map(|shift| shift_cells(shift, file)).collect();
+    say.result = setup.result((path, output), &cells);
     if let Some([csv, json, _]) = &places {
-        let shifts = found.drive.shifts.iter();
-        let cells: Vec<Vec<(String, Cell<'_>)>> = shifts.map(|shift| shift_cells(shift, file)).collect();
         write_cells(csv, &cells)?;
         write_json_list(json, cells.into_iter().map(JsonObject::of))?;
     }
     let found = found.with_times_from_origin();
-    report(&found, file, output.is_some(), say)?;
+    report(&found, file, setup.is_output_free(output), say)?;
     found.said_of_sensors().into_iter().for_each(|sentence| say.note(sentence));
     finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open, say)?;
     learnt_file.map_or(Ok(()), |path| Kept::of(path, file, &found.learnt).write(say))
 }
 
-/// The shifts as a table, and what was found; `has_file` says whether standard output is free for the table.
-fn report(found: &DriveEstimates, file: &CarFile, has_file: bool, say: &mut Messages) -> Result<(), Failure> {
+/// The shifts as a table, and what was found.
+fn report(found: &DriveEstimates, file: &CarFile, is_output_free: bool, say: &mut Messages) -> Result<(), Failure> {
     let (titles, mut rows) = shift_rows(&found.drive, file);
     let more = rows.len().saturating_sub(SHOWN);
     rows.truncate(SHOWN);
     let titles: Vec<String> = titles.into_iter().map(str::to_owned).collect();
     if !rows.is_empty() {
-        say.table(&shift_lines(&titles, &rows, more), has_file)?;
+        say.table(&shift_lines(&titles, &rows, more), is_output_free)?;
     }
     shift_words(&found.drive, file).iter().for_each(|(word, meaning)| say.note(&format!("{word}: {meaning}")));
     findings(&found.drive).iter().for_each(|sentence| say.note(sentence));

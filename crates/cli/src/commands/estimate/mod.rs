@@ -14,7 +14,8 @@ use std::sync::{Mutex, PoisonError};
 
 use config::{Kind, Source};
 use logs::ChannelMap;
-use trace::ShownPath as _;
+use serde_json::{Value, json};
+use trace::{Cell, ShownPath as _};
 use wetclutch::estimate::LogInput;
 use wetclutch::{Destination, EstimateOptions, VehicleFile};
 
@@ -22,7 +23,7 @@ use self::earlier::replaces_only_estimates;
 use self::outputs::{beside, remove_old};
 use crate::args::{Estimate, FormatChoice};
 use crate::browser;
-use crate::commands::{channel_map_of_car, check_output, not_an_input, write_text};
+use crate::commands::{JsonObject, channel_map_of_car, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
 use crate::signals::stop_then_end;
@@ -41,6 +42,23 @@ struct Setup<'a> {
 impl Setup<'_> {
     fn log<'l>(&'l self, path: &'l Path) -> LogInput<'l> {
         LogInput { path, table: None, map: &self.map }
+    }
+
+    /// Whether the table of shifts goes to standard output.
+    fn is_output_free(&self, output: Option<&Path>) -> bool {
+        output.is_some() && !self.arguments.json
+    }
+
+    /// The shifts of a log in JSON, where they are wanted.
+    fn result(&self, (log, output): (&Path, Option<&Path>), shifts: &[Vec<(String, Cell<'_>)>]) -> Option<Value> {
+        let objects = || shifts.iter().map(|cells| JsonObject::of(cells.iter().cloned())).collect::<Vec<_>>();
+        self.arguments.json.then(|| {
+            json!({
+                "log": log.shown().to_string(),
+                "estimate": output.map(|output| output.shown().to_string()),
+                "shifts": objects(),
+            })
+        })
     }
 
     /// How a log is estimated whose estimates go there.
@@ -96,6 +114,8 @@ fn finish(
 /// Messages of one log: shown as they come, or together when it is done.
 pub(super) struct Messages {
     held: Option<Held>,
+    /// Its shifts, where they are wanted in JSON.
+    result: Option<Value>,
 }
 
 /// What is shown when a log is done.
@@ -110,20 +130,26 @@ struct Held {
 impl Messages {
     /// That are shown as they come.
     pub(super) fn at_once() -> Self {
-        Self { held: None }
+        Self { held: None, result: None }
+    }
+
+    /// That are shown together.
+    fn held() -> Self {
+        Self { held: Some(Held::default()), result: None }
     }
 
     pub(super) fn note(&mut self, message: &str) {
         match &mut self.held {
             None => output::note(message),
-            Some(held) => held.notes.push(message.to_owned()),
+            Some(held) if output::is_shown(message) => held.notes.push(message.to_owned()),
+            Some(_) => {}
         }
     }
 
-    /// Lines of a table: on standard output where the estimates go into a file, else a message.
-    fn table(&mut self, lines: &[String], has_file: bool) -> Result<(), Failure> {
+    /// Lines of a table: on standard output where nothing else goes there, else a message.
+    fn table(&mut self, lines: &[String], is_output_free: bool) -> Result<(), Failure> {
         match &mut self.held {
-            _ if !has_file => lines.iter().for_each(|line| self.note(line)),
+            _ if !is_output_free => lines.iter().for_each(|line| self.note(line)),
             None => lines.iter().try_for_each(|line| output::line(line))?,
             Some(held) => held.lines.extend_from_slice(lines),
         }
@@ -133,7 +159,9 @@ impl Messages {
     /// Shows what was held, of the log with this name.
     fn show(self, log: &Path) -> Result<(), Failure> {
         let Held { notes, lines } = self.held.unwrap_or_default();
-        output::note(&format!("log: {}\n{}\n", log.shown(), notes.join("\n")));
+        if !notes.is_empty() {
+            output::say(&format!("log: {}\n{}\n", log.shown(), notes.join("\n")));
+        }
         if !lines.is_empty() {
             output::line(&format!("{}:\n{}\n", log.shown(), lines.join("\n")))?;
         }
@@ -175,7 +203,14 @@ fn each_log<S: Sync>(
     }
     not_the_learnt(options, output.as_slice())?;
     output.as_deref().map(replaces_only_estimates).transpose()?;
-    estimate(&prepare()?, log, output.as_deref(), &mut Messages::at_once())
+    let mut messages = Messages::at_once();
+    estimate(&prepare()?, log, output.as_deref(), &mut messages)?;
+    print_json(options, messages.result.into_iter().collect())
+}
+
+/// Prints what is known of the logs, where it is wanted.
+fn print_json(options: &Estimate, logs: Vec<Value>) -> Result<(), Failure> {
+    if options.json { output::json(&json!({ "logs": logs })) } else { Ok(()) }
 }
 
 /// The ending of files in a folder.
@@ -254,12 +289,15 @@ fn several<S: Sync>(
     let setup = prepare()?;
     let next = AtomicUsize::new(0);
     let failures: Mutex<Vec<(usize, Failure)>> = Mutex::new(Vec::new());
+    let results: Mutex<Vec<(usize, Value)>> = Mutex::new(Vec::new());
     let work = || {
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let (Some(log), Some(output)) = (logs.get(at), outputs.get(at)) else { return };
-            let mut messages = Messages { held: Some(Held::default()) };
+            let mut messages = Messages::held();
             let result = estimate(&setup, log, Some(output), &mut messages);
+            let found = messages.result.take().map(|found| (at, found));
+            results.lock().unwrap_or_else(PoisonError::into_inner).extend(found);
             if let Err(failure) = result.and(messages.show(log)) {
                 output::error(&failure.to_string());
                 failures.lock().unwrap_or_else(PoisonError::into_inner).push((at, failure));
@@ -272,6 +310,9 @@ fn several<S: Sync>(
         }
         work();
     });
+    let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+    results.sort_by_key(|(at, _)| *at);
+    print_json(options, results.into_iter().map(|(_, found)| found).collect())?;
     let mut failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
     if failures.is_empty() {
         return Ok(());

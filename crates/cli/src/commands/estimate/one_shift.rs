@@ -24,14 +24,15 @@ pub(super) fn estimate(
     let prepared = one_shift::Setup::new(file, &options)?;
     let found = one_shift::estimate(&prepared, setup.log(path), destination(output), &mut |note| say.note(note))?;
     let places = output.and_then(beside).filter(|_| !found.shifts.is_empty());
+    let cells = found.shift_cells();
+    say.result = setup.result((path, output), &cells);
     if let Some([csv, json, _]) = &places {
-        let cells = found.shift_cells();
         write_cells(csv, &cells)?;
         write_json_list(json, cells.into_iter().map(JsonObject::of))?;
     }
     let found = found.with_times_from_origin();
     found.findings.iter().for_each(|sentence| say.note(sentence));
-    report(&found, output.is_some(), say)?;
+    report(&found, setup.is_output_free(output), say)?;
     if options.sensors.is_none() {
         say.note(WITHOUT_SENSORS);
     }
@@ -45,13 +46,13 @@ pub(super) fn estimate(
     finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open, say)
 }
 
-/// The shifts as a table, if there are any; `has_file` says whether standard output is free for it.
-fn report(found: &ShiftEstimates, has_file: bool, say: &mut Messages) -> Result<(), Failure> {
+/// The shifts as a table, if there are any.
+fn report(found: &ShiftEstimates, is_output_free: bool, say: &mut Messages) -> Result<(), Failure> {
     if found.shifts.is_empty() {
         return Ok(());
     }
     let (titles, rows) = shift_rows(&found.shifts, SHOWN);
-    say.table(&shift_lines(&titles, &rows, found.shifts.len() - rows.len()), has_file)?;
+    say.table(&shift_lines(&titles, &rows, found.shifts.len() - rows.len()), is_output_free)?;
     let others = || found.shifts.iter().filter(|shift| !shift.of_vehicle);
     if let Some(first) = others().next() {
         say.note(&format!(

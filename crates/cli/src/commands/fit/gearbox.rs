@@ -16,7 +16,9 @@ use wetclutch::estimate::gearbox::check_ratios;
 use wetclutch::estimate::gearbox::source::{CarReading, CarSource};
 use wetclutch::read_sensors as sensors;
 
-use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, page, progress, reasons, said_of_file, table};
+use super::{
+    HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, page, print_json, progress, reasons, said_of_file, table,
+};
 use crate::args::Fit;
 use crate::commands::{channel_map_of_car, shell_quoted, write_text};
 use crate::failure::Failure;
@@ -69,18 +71,21 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
     };
     // Nobody has to read the report to its end.
     write_text(&options.output, &written.source.text)?;
-    table(&found.report())?;
     let [scale, gain] = found.scale_and_gain;
-    output::line(&format!("turbine speed: one-step error {scale:.3} rad/s, g {gain:.2}"))?;
-    for statement in found.statements() {
-        output::line(&statement)?;
+    let statements: Vec<String> = [format!("turbine speed: one-step error {scale:.3} rad/s, g {gain:.2}")]
+        .into_iter()
+        .chain(found.statements())
+        .chain([checked.as_ref().map_or_else(nothing_held_out, said_of)])
+        .collect();
+    if options.json {
+        print_json(options, &found.report(), &statements, found.shifts, against.as_deref())?;
+    } else {
+        table(&found.report())?;
+        statements.iter().try_for_each(|statement| output::line(statement))?;
     }
-    output::line(&checked.as_ref().map_or_else(nothing_held_out, said_of))?;
     said_of_file(options, found.shifts, against.as_deref());
-    let mut sentences = found.statements();
-    sentences.push(checked.as_ref().map_or_else(nothing_held_out, said_of));
     let intervals = report::fit_page::gearbox_intervals(&found);
-    page(options, &car.name, (intervals, sentences), against, &[&car.source, &written.source])
+    page(options, &car.name, (intervals, statements), against, &[&car.source, &written.source])
 }
 
 /// The shifts of all logs.

@@ -7,8 +7,9 @@ use std::path::Path;
 use car::Vehicle;
 use config::{Kind, Source, VehicleFile};
 use fit::{Collected, FitError, HeldOut, ReadingAges, ReportRow, SHIFTS_MAX, ShiftRecord};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressStyle};
 use report::sheet::{Part, Sheet};
+use serde_json::json;
 use trace::ShownPath as _;
 
 use crate::args::Fit;
@@ -73,11 +74,16 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     };
     // Nobody has to read the report to its end.
     write_text(&options.output, &written.source.text)?;
-    print(&found)?;
-    output::line(&kinds)?;
-    output::line(&said_of(checked.as_ref()))?;
+    let checked = said_of(checked.as_ref());
+    let sentences = [found.statements(), vec![kinds.clone(), checked.clone()]].concat();
+    if options.json {
+        print_json(options, &found.report(), &sentences, found.shifts, against.as_deref())?;
+    } else {
+        print(&found)?;
+        output::line(&kinds)?;
+        output::line(&checked)?;
+    }
     said_of_file(options, found.shifts, against.as_deref());
-    let sentences = [found.statements(), vec![kinds, said_of(checked.as_ref())]].concat();
     page(
         options,
         &vehicle.name,
@@ -108,6 +114,35 @@ fn page(
         parts: vec![intervals],
         sources: sources.to_vec(),
     })
+}
+
+/// Prints what was found in JSON: numbers in SI units.
+fn print_json(
+    options: &Fit,
+    rows: &[ReportRow],
+    statements: &[String],
+    shifts: usize,
+    against: Option<&str>,
+) -> Result<(), Failure> {
+    let parameter = |row: &ReportRow| {
+        json!({
+            "name": row.name,
+            "unit": row.measure.unit(),
+            "value": row.value,
+            "lower": row.interval[0],
+            "upper": row.interval[1],
+            "deviation_after_over_before": row.share,
+            "verdict": row.verdict.name(),
+        })
+    };
+    output::json(&json!({
+        "vehicle": options.vehicle.shown().to_string(),
+        "fitted": options.output.shown().to_string(),
+        "shifts": shifts,
+        "given_values_kept_because": against,
+        "parameters": rows.iter().map(parameter).collect::<Vec<_>>(),
+        "statements": statements,
+    }))
 }
 
 /// Says what the file has, and of how many shifts, or why it has the given values.
@@ -187,7 +222,7 @@ fn table(rows: &[ReportRow]) -> Result<(), Failure> {
     let titles = ["", "value", "95 %", "after / before", ""].map(str::to_owned).to_vec();
     let cells = rows.iter().map(|row| {
         let verdict = format!(" {}", row.verdict.name());
-        vec![row.name.clone(), row.value.clone(), row.interval.clone(), row.share.clone(), verdict]
+        vec![row.name.clone(), row.value_text(), row.interval_text(), format!("{:.2}", row.share), verdict]
     });
     Ok(output::table(1, &[titles].into_iter().chain(cells).collect::<Vec<_>>())?)
 }
@@ -215,7 +250,7 @@ fn nothing_held_out() -> String {
 
 /// A line on standard error that says what is being done; nothing if standard error is not a terminal.
 fn progress() -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    let bar = ProgressBar::with_draw_target(None, output::progress_target());
     // The template is a constant.
     if let Ok(style) = ProgressStyle::with_template("{spinner} fit: {msg}  {elapsed}") {
         bar.set_style(style);
