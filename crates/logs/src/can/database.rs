@@ -45,8 +45,8 @@ struct Signal {
 
 #[derive(Debug, Clone)]
 struct Multiplexed {
-    /// Place of the multiplexor among the signals of the message.
-    by: usize,
+    /// Place of the multiplexor among the signals of the message; none where the message has none.
+    by: Option<usize>,
     values: Vec<(u64, u64)>,
 }
 
@@ -260,7 +260,7 @@ fn in_force(signals: &[Signal], signal: &Signal, data: &[u8], depth: u32) -> boo
     // A multiplexor may be multiplexed itself; a circle of them is never in force.
     const DEEPEST: u32 = 8;
     let Some(multiplexed) = &signal.multiplexed else { return true };
-    let Some(by) = signals.get(multiplexed.by) else { return false };
+    let Some(by) = multiplexed.by.and_then(|by| signals.get(by)) else { return false };
     depth < DEEPEST
         && by
             .bits
@@ -324,14 +324,14 @@ impl<'d> Multiplexors<'d> {
         if let Some(extended) = self.entries.ranges.get(&(self.message, &*signal.name)) {
             let by = self.places.get(&*extended.multiplexor_signal_name).copied();
             let values = extended.mappings.iter().map(|mapping| (mapping.min_value, mapping.max_value)).collect();
-            return Some(Multiplexed { by: by.unwrap_or(usize::MAX), values });
+            return Some(Multiplexed { by, values });
         }
         let value = match signal.multiplexer_indicator {
             MultiplexIndicator::Plain | MultiplexIndicator::Multiplexor => return None,
             MultiplexIndicator::MultiplexedSignal(value)
             | MultiplexIndicator::MultiplexorAndMultiplexedSignal(value) => value,
         };
-        Some(Multiplexed { by: self.main.unwrap_or(usize::MAX), values: vec![(value, value)] })
+        Some(Multiplexed { by: self.main, values: vec![(value, value)] })
     }
 }
 
