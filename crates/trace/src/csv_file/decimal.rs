@@ -155,22 +155,17 @@ fn divided(high: u64, low: u64, by: u64, reciprocal: u64) -> (u64, u64) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use rand_pcg::Pcg64Mcg;
+    use rand_pcg::rand_core::Rng as _;
 
-    /// Random bits.
-    fn bits(state: &mut u64) -> u64 {
-        *state ^= *state << 13;
-        *state ^= *state >> 7;
-        *state ^= *state << 17;
-        state.wrapping_mul(0x2545_f491_4f6c_dd1d)
-    }
+    use super::*;
 
     #[test]
     fn a_number_is_that_of_the_library_to_the_last_bit() {
-        let mut state = 0x9e37_79b9_7f4a_7c15;
+        let mut random_bits = Pcg64Mcg::new(1);
         let mut plain_ones = 0;
         for i in 0..400_000_u64 {
-            let random = bits(&mut state);
+            let random = random_bits.next_u64();
             let number = f64::from_bits(random >> 12 | 0x3ff0_0000_0000_0000) - 1.0;
             let size = [0.001, 0.1, 1.0, 70.0, 5e3, 1e6][(random % 6) as usize];
             let places = (random >> 8) as usize % 18;
@@ -185,10 +180,10 @@ mod tests {
     #[test]
     fn all_digits_near_the_middle_between_two_numbers_round_to_the_right_one() {
         // Numbers from 2^53 times a power of ten on: the digits of a middle between two of them, more, and less.
-        let mut state = 1;
+        let mut random_bits = Pcg64Mcg::new(1);
         for _ in 0..100_000 {
-            let places = bits(&mut state) % 11 + 1;
-            let number = 4096.0 * f64::from_bits(bits(&mut state) >> 12 | 0x3ff0_0000_0000_0000);
+            let places = random_bits.next_u64() % 11 + 1;
+            let number = 4096.0 * f64::from_bits(random_bits.next_u64() >> 12 | 0x3ff0_0000_0000_0000);
             let middle = format!("{:.1$}", number + 0.5 * f64::EPSILON * 4096.0, 3 + places as usize);
             for digit in ["", "1", "9"] {
                 let text = format!("{middle}{digit}");
@@ -211,14 +206,14 @@ mod tests {
 
     #[test]
     fn a_quotient_by_a_reciprocal_is_that_of_a_division() {
-        let mut state = 3;
+        let mut random_bits = Pcg64Mcg::new(3);
         for i in 0..400_000 {
             let at = i % MOST_DIGITS;
             let by = POWERS[at] << POWERS[at].leading_zeros();
-            let random = bits(&mut state);
+            let random = random_bits.next_u64();
             // Near the ends and near multiples too.
             let high = [0, by - 1, random % by, (by - 1) & random][i / MOST_DIGITS % 4];
-            let low = [0, u64::MAX, bits(&mut state), random << 62][i / 7 % 4];
+            let low = [0, u64::MAX, random_bits.next_u64(), random << 62][i / 7 % 4];
             let number = u128::from(high) << 64 | u128::from(low);
             let expected = (number / u128::from(by), number % u128::from(by));
             let (whole, rest) = divided(high, low, by, RECIPROCALS[at]);
@@ -289,14 +284,14 @@ mod tests {
     #[test]
     fn whatever_is_taken_has_only_digits_a_sign_and_a_point() {
         const LETTERS: &[u8] = b"0123456789.-+e,/: \x00\x7f\x80\xff";
-        let mut state = 7;
+        let mut random_bits = Pcg64Mcg::new(7);
         for _ in 0..300_000 {
             let mut cell = *b"-12.345678901234567";
-            for _ in 0..bits(&mut state) % 3 {
-                let random = bits(&mut state);
+            for _ in 0..random_bits.next_u64() % 3 {
+                let random = random_bits.next_u64();
                 cell[random as usize % 19] = LETTERS[(random >> 32) as usize % LETTERS.len()];
             }
-            let random = bits(&mut state) as usize;
+            let random = random_bits.next_u64() as usize;
             let cell = &cell[random % 2..19 - random / 2 % 18];
             if let Some(found) = plain(cell) {
                 let text = std::str::from_utf8(cell).unwrap();

@@ -305,6 +305,9 @@ fn signs(eight: u64, delimiter: u8) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use rand_pcg::Pcg64Mcg;
+    use rand_pcg::rand_core::Rng as _;
+
     use super::*;
     use crate::slow::Slow;
 
@@ -331,13 +334,8 @@ mod tests {
     #[test]
     fn any_text_has_the_records_of_another_reader_however_it_comes() {
         const LETTERS: &[u8] = b"12.-e+,,,;;\t\"\"\n\n\n\r\r x\xe4|";
-        let mut bits = 0x9e37_79b9_7f4a_7c15_u64;
-        let mut random = |below: usize| {
-            bits ^= bits << 13;
-            bits ^= bits >> 7;
-            bits ^= bits << 17;
-            (bits >> 33) as usize % below
-        };
+        let mut bits = Pcg64Mcg::new(1);
+        let mut random = |below: usize| (bits.next_u64() >> 33) as usize % below;
         for length in 0..800 {
             let text: Vec<u8> = (0..length % 97).map(|_| LETTERS[random(LETTERS.len())]).collect();
             for delimiter in [b',', b';', b'\t', b'|'] {

@@ -1,5 +1,8 @@
 use std::path::PathBuf;
 
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::Rng as _;
+
 use super::records::READ_AT_ONCE;
 use super::writer::put_number;
 use super::*;
@@ -61,12 +64,10 @@ fn numbers_are_as_short_as_those_of_display_and_read_back_the_same() {
         String::from_utf8(row[..end].to_vec()).unwrap()
     };
     let some = [0.0, -0.0, 1.0, -1.5, 1e-5, 1.2e-5, 9e15, 1e16, 1.5e300, -5e-324, f64::INFINITY, f64::MIN_POSITIVE];
-    // All sizes, by a generator that needs no crate.
-    let mut bits = 0x9e37_79b9_7f4a_7c15_u64;
+    // All sizes.
+    let mut random = Pcg64Mcg::new(1);
     let random = std::iter::repeat_with(|| {
-        bits ^= bits << 13;
-        bits ^= bits >> 7;
-        bits ^= bits << 17;
+        let bits = random.next_u64();
         [f64::from_bits(bits), f64::from_bits(bits >> 12 | 0x3ff0_0000_0000_0000) * 1000.0]
     });
     for number in some.into_iter().chain(random.take(100_000).flatten()).filter(|number| !number.is_nan()) {
@@ -105,13 +106,8 @@ fn cells_that_repeat_those_of_the_row_before_are_written_as_all_others() {
     // Some hundred kilobytes: many times what is handed on at once.
     let words = ["good", "", "a, b", "say \"x\""];
     let numbers = [0.5, f64::NAN, -0.0, 0.0, 1.0 / 3.0];
-    let mut bits = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = |below: usize| {
-        bits ^= bits << 13;
-        bits ^= bits >> 7;
-        bits ^= bits << 17;
-        (bits >> 33) as usize % below
-    };
+    let mut bits = Pcg64Mcg::new(1);
+    let mut random = |below: usize| (bits.next_u64() >> 33) as usize % below;
     let names = ["w0", "x", "w1", "w2", "n", "w3"];
     let mut plain = CsvWriter::new(Vec::new(), names).unwrap();
     let mut repeating = CsvWriter::new(Vec::new(), names).unwrap();
