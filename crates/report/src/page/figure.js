@@ -28,7 +28,7 @@ class Figure {
   }
 
   build() {
-    const name = this.element.closest("details")?.querySelector("h2")?.textContent ?? "the whole";
+    const name = this.element.closest("details")?.querySelector("h2")?.textContent ?? document.title;
     this.root = make("div", { class: "plots", tabindex: "0", role: "group", "aria-label": `Figure of ${name}. Press ? for its keys.` });
     const button = (text, label, click) => {
       const made = make("button", { type: "button", "aria-label": label, title: label }, text);

@@ -51,7 +51,7 @@ function nextShift(by) {
 }
 
 function openHash() {
-  const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  const target = document.getElementById(location.hash.slice(1));
   if (target?.matches("details.shift")) openShift(target);
 }
 
