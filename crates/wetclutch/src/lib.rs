@@ -9,6 +9,7 @@
 
 mod error;
 pub mod estimate;
+pub mod gains;
 mod score;
 pub mod simulate;
 mod table;
@@ -16,10 +17,13 @@ mod table_text;
 mod text;
 mod vehicle;
 
-pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors, ShiftCommand, Step};
+pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors, ShiftCommand, ShiftId, Step};
 pub use error::Error;
 pub use estimate::{Destination, EstimateOptions, Estimates, LogInput, estimate};
 pub use evaluate::Estimator;
+pub use gains::{DesignObserver, DesignOptions, Designed, design};
+pub use observer::Health;
+pub use observer::any_shift::{ClutchEstimate, ShiftEstimate, ShiftPhase};
 pub use score::{PhaseScore, Scores, score};
 pub use simulate::{Simulation, simulate};
 pub use table::{Column, Table, Values, Words};

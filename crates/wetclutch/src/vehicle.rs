@@ -138,12 +138,17 @@ impl VehicleFile {
         }
     }
 
+    /// The file.
+    pub fn source(&self) -> &Source {
+        match self {
+            Self::Gearbox(file) => &file.source,
+            Self::OneShift(file) => &file.source,
+        }
+    }
+
     /// The text of the file.
     pub fn text(&self) -> &str {
-        match self {
-            Self::Gearbox(file) => &file.source.text,
-            Self::OneShift(file) => &file.source.text,
-        }
+        &self.source().text
     }
 
     /// The text of its gearbox file; `None` of a file of one shift.
@@ -220,6 +225,6 @@ pub fn method_named(name: &str) -> Result<GainMethod, Error> {
     found.ok_or_else(|| unknown("method", name, &GainMethod::ALL.map(GainMethod::name)))
 }
 
-fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
+pub(crate) fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
     Error::Input(format!("{what}: there is no `{}`\nhint: expected one of {}", name.escape_debug(), known.join(", ")))
 }

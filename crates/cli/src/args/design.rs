@@ -6,11 +6,11 @@ use car::{GainMethod, SAMPLE_TIMES_S};
 use clap::{Args, ValueEnum};
 use design::Quantity;
 use observer::Phase;
+use wetclutch::gains::{
+    DESIGN_PHASES, DesignObserver, DesignOptions, ERROR_BOUND, KAPPA1_PER_S, KAPPA2_PER_S, OFFSET_MAX_PA, SAMPLE_TIME_S,
+};
 
 use super::{PageChoice, within};
-
-/// Default sample time of a design, s: the usual period of a transmission controller.
-pub(crate) const SAMPLE_TIME_S: f64 = 0.01;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Design {
@@ -35,16 +35,16 @@ pub(crate) struct Design {
     #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
     pub(crate) phase: PhaseChoice,
     /// kappa1 in 1/s; if it is neither here nor in the file, it is increased step by step
-    #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(0.01..=1e4))]
+    #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(KAPPA1_PER_S))]
     pub(crate) kappa1: Option<f64>,
     /// kappa2 in 1/s: decay rate of the error; the settling time is 4/kappa2
-    #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(0.4..=800.0))]
+    #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(KAPPA2_PER_S))]
     pub(crate) kappa2: Option<f64>,
     /// Bound on the model error |w|: in rad/s^2 for the rigid observer, normalised for the compliant one
-    #[arg(long, value_name = "BOUND", allow_negative_numbers = true, value_parser = within(0.0..=1e6))]
+    #[arg(long, value_name = "BOUND", allow_negative_numbers = true, value_parser = within(ERROR_BOUND))]
     pub(crate) error_bound: Option<f64>,
     /// Largest acceptable offset of the estimate in Pa
-    #[arg(long, value_name = "PA", allow_negative_numbers = true, value_parser = within(1e3..=10e6))]
+    #[arg(long, value_name = "PA", allow_negative_numbers = true, value_parser = within(OFFSET_MAX_PA))]
     pub(crate) offset_max: Option<f64>,
     /// Sample time in s, for the discrete-time methods [default: 0.01]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = within(SAMPLE_TIMES_S))]
@@ -62,6 +62,20 @@ impl Design {
         self.method.unwrap_or(MethodChoice::Iss)
     }
 
+    /// The same as the library takes it.
+    pub(crate) fn library(&self) -> DesignOptions {
+        DesignOptions {
+            observer: self.observer.into(),
+            method: self.method.map(GainMethod::from),
+            quantity: self.bound_on.map(Quantity::from),
+            sample_time_s: self.sample_time,
+            kappa1_per_s: self.kappa1,
+            kappa2_per_s: self.kappa2,
+            error_bound: self.error_bound,
+            offset_max_pa: self.offset_max,
+        }
+    }
+
     /// Sample time of a design in discrete time, s.
     pub(crate) fn sample_time_s(&self) -> f64 {
         self.sample_time.unwrap_or(SAMPLE_TIME_S)
@@ -70,7 +84,7 @@ impl Design {
     /// The phases to design for.
     pub(crate) fn phases(&self) -> &'static [Phase] {
         match self.phase {
-            PhaseChoice::Both => &[Phase::TorquePhase, Phase::InertiaPhase],
+            PhaseChoice::Both => &DESIGN_PHASES,
             PhaseChoice::Torque => &[Phase::TorquePhase],
             PhaseChoice::Inertia => &[Phase::InertiaPhase],
         }
@@ -119,6 +133,16 @@ pub(crate) enum QuantityChoice {
     ClutchTorque,
     /// The pressure, which follows from the speeds only with the friction coefficient
     Pressure,
+}
+
+impl From<DesignChoice> for DesignObserver {
+    fn from(choice: DesignChoice) -> Self {
+        match choice {
+            DesignChoice::Rigid => Self::Rigid,
+            DesignChoice::Compliant => Self::Compliant,
+            DesignChoice::Sliding => Self::Sliding,
+        }
+    }
 }
 
 impl From<QuantityChoice> for Quantity {

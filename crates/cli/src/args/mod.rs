@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice, SAMPLE_TIME_S};
+pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
 pub(crate) use logs::{Estimate, Fit, FormatChoice, Init, Inspect, LaunchChoice, Mapping};
 pub(crate) use studies::{
     Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,

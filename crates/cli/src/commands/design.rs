@@ -2,21 +2,15 @@
 
 use car::{GainMethod, Vehicle};
 use config::{Kind, Source, VehicleFile};
-use design::compliant::{CompliantRequirement, best_compliant_phase, compliant_requirement, physical_gains};
-use design::open_loop::is_open_loop;
-use design::rigid::best_phase;
-use design::{
-    Certificate, CompliantCertificate, DiscreteCertificate, IssRequirement, Model, OffsetMissed, Quantity,
-    SolverRecord, design_discrete_phase, design_sliding, open_loop_bound_pa, requirement,
-};
-use observer::{Discretisation, Phase};
+use design::{Certificate, CompliantCertificate, DiscreteCertificate, Model, OffsetMissed, Quantity, SolverRecord};
+use observer::Phase;
 use report::tables::phase_name;
-use serde_json::{Map, Value, json};
 use trace::{ShownPath as _, units};
+use wetclutch::gains::{GainUse, PhaseDesign, design_shift};
 
 use super::design_car::of_car;
 use super::page::{check_page, write_page};
-use crate::args::{Design, DesignChoice, MethodChoice, SAMPLE_TIME_S};
+use crate::args::Design;
 use crate::failure::Failure;
 use crate::output;
 
@@ -45,19 +39,10 @@ pub(super) fn of_vehicle(
     about: &[String],
 ) -> Result<Vec<OffsetMissed>, Failure> {
     options_apply(options)?;
-    let mut object = Map::new();
-    let mut text = Vec::new();
-    let mut all_missed = Vec::new();
-    for &phase in options.phases() {
-        let (mut json, lines) = of_phase(vehicle, phase, options, &mut all_missed)?;
-        if options.observer != DesignChoice::Sliding {
-            json["vehicle_sha256"] = json!(source.sha256());
-        }
-        object.insert(phase.name().to_owned(), json);
-        text.extend(lines);
-    }
+    let designed = design_shift(vehicle, options.phases(), &options.library())?;
+    let text: Vec<String> = designed.phases.iter().flat_map(|(phase, design)| lines(*phase, design)).collect();
     if options.json {
-        output::json(&object)?;
+        output::json(&designed.json(source)?)?;
     } else {
         output::line(&format!("{} ({})", vehicle.name, source.path.shown()))?;
         for line in about {
@@ -70,7 +55,7 @@ pub(super) fn of_vehicle(
         output::line(&format!("vehicle file sha256 {}", source.sha256()))?;
     }
     write_page(&options.page, || super::design_page::sheet(vehicle, source, options, (about, &text)))?;
-    Ok(all_missed)
+    Ok(designed.missed)
 }
 
 /// The certified gain is printed, but a requirement that it does not meet is a failure.
@@ -86,144 +71,57 @@ pub(super) fn not_met(missed: Vec<OffsetMissed>, options: &Design) -> Result<(),
     Err(Failure::Work(messages.collect::<Vec<_>>().join("\n")))
 }
 
-/// The design for a phase, as JSON and as text; adds the requirements that it does not meet.
-fn of_phase(
-    vehicle: &Vehicle,
-    phase: Phase,
-    options: &Design,
-    missed_requirements: &mut Vec<OffsetMissed>,
-) -> Result<(Value, Vec<String>), Failure> {
-    let sample_time_s = options.sample_time_s();
-    Ok(match (options.observer, options.method()) {
-        (DesignChoice::Rigid, MethodChoice::Iss) => {
-            let required = replaced(requirement(vehicle, phase).into(), options);
-            let (certificate, missed) = best_phase(vehicle, phase, &required)?;
-            missed_requirements.extend(missed);
-            let use_of = UseOf::rigid(vehicle, phase, &certificate);
-            (use_of.added_to(serde_json::to_value(&certificate)?), rigid_lines(phase, &certificate, &use_of))
-        }
-        (DesignChoice::Compliant, MethodChoice::Iss) => {
-            let required = replaced_compliant(compliant_requirement(vehicle, phase), options);
-            let (certificate, missed) = best_compliant_phase(vehicle, phase, &required)?;
-            missed_requirements.extend(missed);
-            let use_of = UseOf::compliant(vehicle, phase, &certificate);
-            (use_of.added_to(serde_json::to_value(&certificate)?), compliant_lines(phase, &certificate, &use_of))
-        }
-        (DesignChoice::Rigid | DesignChoice::Compliant, method) => {
-            let model = if options.observer == DesignChoice::Rigid { Model::Rigid } else { Model::Compliant };
-            let quantity = options.bound_on.map_or(Quantity::ClutchTorque, Quantity::from);
-            let certificate = design_discrete_phase(vehicle, model, method.into(), quantity, phase, sample_time_s)?;
-            (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
-        }
-        (DesignChoice::Sliding, _) => sliding(vehicle, phase),
-    })
+/// The design for a phase, as text.
+fn lines(phase: Phase, design: &PhaseDesign) -> Vec<String> {
+    match design {
+        PhaseDesign::Rigid(certificate, use_of) => rigid_lines(phase, certificate, use_of),
+        PhaseDesign::Compliant(certificate, use_of) => compliant_lines(phase, certificate, use_of),
+        PhaseDesign::Discrete(certificate) => discrete_lines(phase, certificate),
+        PhaseDesign::Sliding { speed_rad_s2, pressure_pa_s } => sliding_lines(phase, speed_rad_s2, pressure_pa_s),
+    }
 }
 
 /// Refuses an option that the method does not use.
 pub(super) fn options_apply(options: &Design) -> Result<(), Failure> {
-    let sliding = options.observer == DesignChoice::Sliding;
-    let discrete = options.method() != MethodChoice::Iss;
-    let required = [
-        ("--kappa1", options.kappa1.is_some()),
-        ("--kappa2", options.kappa2.is_some()),
-        ("--error-bound", options.error_bound.is_some()),
-        ("--offset-max", options.offset_max.is_some()),
-    ];
-    let sampled = [("--bound-on", options.bound_on.is_some()), ("--sample-time", options.sample_time.is_some())];
-    let unused = [(required.as_slice(), discrete || sliding), (sampled.as_slice(), !discrete || sliding)];
-    let unused = unused.iter().filter(|(_, not)| *not).flat_map(|(options, _)| *options);
-    let mut unused = unused.copied().chain([("--method", discrete && sliding)]);
-    match unused.find(|(_, given)| *given) {
-        None => Ok(()),
-        Some((option, _)) => Err(Failure::Input(format!(
-            "{option} has no effect with this observer and method\n\
-             hint: --kappa1, --kappa2, --error-bound and --offset-max are for `--method iss`; --bound-on and --sample-time are \
-             for the other methods; `--observer sliding` uses none of them"
-        ))),
-    }
+    let Some(unused) = options.library().without_effect() else { return Ok(()) };
+    let option = match unused {
+        "kappa1_per_s" => "kappa1",
+        "kappa2_per_s" => "kappa2",
+        "offset_max_pa" => "offset-max",
+        "error_bound" => "error-bound",
+        "quantity" => "bound-on",
+        "sample_time_s" => "sample-time",
+        other => other,
+    };
+    Err(Failure::Input(format!(
+        "--{option} has no effect with this observer and method\n\
+         hint: --kappa1, --kappa2, --error-bound and --offset-max are for `--method iss`; --bound-on and --sample-time are \
+         for the other methods; `--observer sliding` uses none of them"
+    )))
 }
 
-/// The requirement of the vehicle file, with the values of the options.
-pub(super) fn replaced(required: IssRequirement, options: &Design) -> IssRequirement {
-    IssRequirement {
-        kappa1_per_s: options.kappa1.or(required.kappa1_per_s),
-        kappa2_per_s: options.kappa2.unwrap_or(required.kappa2_per_s),
-        model_error_max_rad_s2: options.error_bound.unwrap_or(required.model_error_max_rad_s2),
-        offset_max_pa: options.offset_max.unwrap_or(required.offset_max_pa),
+/// In place of a bound on the offset, which leaves out the errors of the valve, if they are all that there is.
+fn offset_line(use_of: &GainUse, offset: String) -> String {
+    if use_of.is_open_loop {
+        return format!(
+            "  the gain is the open loop: the valve alone has the required decay; steady-state bound {:.4} MPa, by the \
+             valve errors of the budget",
+            units::mpa(use_of.open_loop_bound_pa)
+        );
     }
+    offset
 }
 
-pub(super) fn replaced_compliant(required: CompliantRequirement, options: &Design) -> CompliantRequirement {
-    CompliantRequirement {
-        kappa1_per_s: options.kappa1.or(required.kappa1_per_s),
-        kappa2_per_s: options.kappa2.unwrap_or(required.kappa2_per_s),
-        w_max: options.error_bound.unwrap_or(required.w_max),
-        offset_max_pa: options.offset_max.unwrap_or(required.offset_max_pa),
-        ..required
+/// How long a gain may correct, and whether the open loop is better by its bound.
+fn use_lines(use_of: &GainUse, offset_pa: f64) -> Vec<String> {
+    let mut lines = vec![step_line(use_of.longest_step_s)];
+    if !use_of.is_open_loop && offset_pa > use_of.open_loop_bound_pa {
+        lines.push(format!(
+            "  open loop serves: its steady-state bound, with every error of the budget, is {:.4} MPa, less than the offset bound of this gain",
+            units::mpa(use_of.open_loop_bound_pa)
+        ));
     }
-}
-
-/// What a gain of continuous time is good for.
-struct UseOf {
-    /// Whether its corrections of the pressure leave the estimate that of the open loop.
-    is_open_loop: bool,
-    /// Steady-state bound of the open loop on the clutch torque, as a pressure, with every error of the budget, Pa.
-    open_loop_bound_pa: f64,
-    /// The longest step over which it may correct, s.
-    longest_step_s: f64,
-}
-
-impl UseOf {
-    fn rigid(vehicle: &Vehicle, phase: Phase, certificate: &Certificate) -> Self {
-        let gain = &certificate.gain_pa_s_rad;
-        Self {
-            is_open_loop: is_open_loop(vehicle, Model::Rigid, phase, gain, SAMPLE_TIME_S),
-            open_loop_bound_pa: open_loop_bound_pa(vehicle, Model::Rigid, phase, SAMPLE_TIME_S),
-            longest_step_s: certificate.longest_step_s(vehicle, phase, Discretisation::Exact),
-        }
-    }
-
-    fn compliant(vehicle: &Vehicle, phase: Phase, certificate: &CompliantCertificate) -> Self {
-        let rows = &certificate.gain_normalised;
-        let gains = physical_gains(rows, rows);
-        let [_, gain] = if phase == Phase::TorquePhase { gains.torque_phase } else { gains.inertia_phase };
-        Self {
-            is_open_loop: is_open_loop(vehicle, Model::Compliant, phase, &gain, SAMPLE_TIME_S),
-            open_loop_bound_pa: open_loop_bound_pa(vehicle, Model::Compliant, phase, SAMPLE_TIME_S),
-            longest_step_s: certificate.longest_step_s(vehicle, phase, Discretisation::Exact),
-        }
-    }
-
-    fn added_to(&self, mut certificate: Value) -> Value {
-        certificate["uses_open_loop"] = json!(self.is_open_loop);
-        certificate["longest_step_s"] = json!(self.longest_step_s);
-        certificate["open_loop_bound_pa"] = json!(self.open_loop_bound_pa);
-        certificate
-    }
-
-    /// In place of a bound on the offset, which leaves out the errors of the valve, if they are all that there is.
-    fn offset_line(&self, offset: String) -> String {
-        if self.is_open_loop {
-            return format!(
-                "  the gain is the open loop: the valve alone has the required decay; steady-state bound {:.4} MPa, by the \
-                 valve errors of the budget",
-                units::mpa(self.open_loop_bound_pa)
-            );
-        }
-        offset
-    }
-
-    /// How long it may correct, and whether the open loop is better by its bound.
-    fn use_lines(&self, offset_pa: f64) -> Vec<String> {
-        let mut lines = vec![step_line(self.longest_step_s)];
-        if !self.is_open_loop && offset_pa > self.open_loop_bound_pa {
-            lines.push(format!(
-                "  open loop serves: its steady-state bound, with every error of the budget, is {:.4} MPa, less than the offset bound of this gain",
-                units::mpa(self.open_loop_bound_pa)
-            ));
-        }
-        lines
-    }
+    lines
 }
 
 fn step_line(longest_step_s: f64) -> String {
@@ -233,7 +131,7 @@ fn step_line(longest_step_s: f64) -> String {
     )
 }
 
-fn rigid_lines(phase: Phase, certificate: &Certificate, use_of: &UseOf) -> Vec<String> {
+fn rigid_lines(phase: Phase, certificate: &Certificate, use_of: &GainUse) -> Vec<String> {
     let vertices = certificate.vertices.iter().map(|v| (v.vertex.label.as_str(), v.decay_per_s, v.margin_per_s));
     let offset = format!(
         "  offset bound {:.4} MPa ({}) for model errors up to {:.1} rad/s^2 and an exact valve model",
@@ -244,14 +142,14 @@ fn rigid_lines(phase: Phase, certificate: &Certificate, use_of: &UseOf) -> Vec<S
     let mut lines = vec![
         format!("{}: {}", phase_name(phase), certificate.gain_text(phase)),
         kappas(certificate.kappa1_per_s, certificate.kappa2_per_s),
-        use_of.offset_line(offset),
+        offset_line(use_of, offset),
     ];
-    lines.extend(use_of.use_lines(certificate.offset_pa));
+    lines.extend(use_lines(use_of, certificate.offset_pa));
     lines.extend(vertex_lines(vertices));
     lines
 }
 
-fn compliant_lines(phase: Phase, certificate: &CompliantCertificate, use_of: &UseOf) -> Vec<String> {
+fn compliant_lines(phase: Phase, certificate: &CompliantCertificate, use_of: &GainUse) -> Vec<String> {
     let outputs = if phase == Phase::TorquePhase { "(w_t, w_w)" } else { "(w_t, dw, w_w)" };
     let row = |row: &Vec<f64>| row.iter().map(|x| format!("{x:9.3}")).collect::<Vec<_>>().join(" ");
     let gain = &certificate.gain_normalised;
@@ -264,15 +162,18 @@ fn compliant_lines(phase: Phase, certificate: &CompliantCertificate, use_of: &Us
         format!("  shaft torque  {}", row(&gain[0])),
         format!("  pressure      {}", row(&gain[1])),
         kappas(certificate.kappa1_per_s, certificate.kappa2_per_s),
-        use_of.offset_line(format!(
-            "  offset bound {:.4} MPa ({}), {:.0} N m, for |w| up to {:.2} and an exact valve model",
-            units::mpa(certificate.offset_pa),
-            required_words(certificate.offset_pa, certificate.offset_max_pa),
-            certificate.offset_n_m,
-            certificate.w_max,
-        )),
+        offset_line(
+            use_of,
+            format!(
+                "  offset bound {:.4} MPa ({}), {:.0} N m, for |w| up to {:.2} and an exact valve model",
+                units::mpa(certificate.offset_pa),
+                required_words(certificate.offset_pa, certificate.offset_max_pa),
+                certificate.offset_n_m,
+                certificate.w_max,
+            ),
+        ),
     ];
-    lines.extend(use_of.use_lines(certificate.offset_pa));
+    lines.extend(use_lines(use_of, certificate.offset_pa));
     lines.extend(vertex_lines(vertices));
     lines
 }
@@ -298,20 +199,14 @@ fn vertex_lines<'a>(vertices: impl Iterator<Item = (&'a str, f64, f64)>) -> Vec<
 }
 
 /// Gains of the sliding-mode observer in a phase.
-fn sliding(vehicle: &Vehicle, phase: Phase) -> (Value, Vec<String>) {
-    let gains = design_sliding(vehicle);
-    let (speed, pressure) = match phase {
-        Phase::TorquePhase => (vec![gains.torque_speed_rad_s2], vec![gains.torque_pressure_pa_s]),
-        _ => (gains.inertia_speed_rad_s2.to_vec(), gains.inertia_pressure_pa_s.to_vec()),
-    };
+fn sliding_lines(phase: Phase, speed: &[f64], pressure: &[f64]) -> Vec<String> {
     let list = |values: &[f64]| values.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ");
     let rounded = speed.iter().map(|x| format!("{x:.0}")).collect::<Vec<_>>().join(", ");
-    let lines = vec![
+    vec![
         format!("{}: sliding on the speeds with {rounded} rad/s^2", phase_name(phase)),
-        format!("  pressure gains {} Pa/s", list(&pressure)),
+        format!("  pressure gains {} Pa/s", list(pressure)),
         String::new(),
-    ];
-    (json!({ "speed_rad_s2": speed, "pressure_pa_s": pressure }), lines)
+    ]
 }
 
 fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String> {

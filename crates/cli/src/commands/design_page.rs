@@ -11,9 +11,9 @@ use report::palette::FAMILY;
 use report::sheet::{Content, Part, Sheet};
 use report::tables::phase_name;
 use trace::units::mpa;
+use wetclutch::gains::SAMPLE_TIME_S;
 
-use super::design::{replaced, replaced_compliant};
-use crate::args::{Design, DesignChoice, MethodChoice, SAMPLE_TIME_S};
+use crate::args::{Design, DesignChoice, MethodChoice};
 
 /// Settling times of the curves, over that of the design.
 const FACTORS: [f64; 11] = [0.25, 0.35, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0];
@@ -54,7 +54,7 @@ pub(super) fn sheet<'a>(
 }
 
 fn phase_part(vehicle: &Vehicle, phase: Phase, options: &Design) -> Option<Part> {
-    let required = replaced(IssRequirement::from(requirement(vehicle, phase)), options);
+    let required = options.library().replaced(IssRequirement::from(requirement(vehicle, phase)));
     let model = if options.observer == DesignChoice::Rigid { Model::Rigid } else { Model::Compliant };
     let settling_s = 4.0 / required.kappa2_per_s;
     let points: Vec<Point> =
@@ -107,7 +107,7 @@ fn phase_part(vehicle: &Vehicle, phase: Phase, options: &Design) -> Option<Part>
 fn point(vehicle: &Vehicle, phase: Phase, options: &Design, settling_s: f64) -> Option<Point> {
     let kappa2_per_s = 4.0 / settling_s;
     if options.observer == DesignChoice::Rigid {
-        let required = replaced(IssRequirement::from(requirement(vehicle, phase)), options);
+        let required = options.library().replaced(IssRequirement::from(requirement(vehicle, phase)));
         let (certificate, _) = best_phase(vehicle, phase, &IssRequirement { kappa2_per_s, ..required }).ok()?;
         let names = ["turbine speed", "slip"].map(str::to_owned).into_iter().zip(certificate.gain_pa_s_rad);
         let outputs = if phase == Phase::TorquePhase { 1 } else { 2 };
@@ -119,7 +119,7 @@ fn point(vehicle: &Vehicle, phase: Phase, options: &Design, settling_s: f64) -> 
             decays: decays.collect(),
         });
     }
-    let mut required = replaced_compliant(compliant_requirement(vehicle, phase), options);
+    let mut required = options.library().replaced_compliant(compliant_requirement(vehicle, phase));
     required.kappa2_per_s = kappa2_per_s;
     let (certificate, _) = best_compliant_phase(vehicle, phase, &required).ok()?;
     let rows = ["shaft torque", "pressure"].iter().zip(&certificate.gain_normalised);
