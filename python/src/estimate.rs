@@ -77,7 +77,10 @@ impl Given {
     }
 }
 
-/// Estimates a log: rows, shifts, notes, what was learnt as text, and the page.
+/// Rows, shifts, notes, what was learnt as text, and the page.
+type Estimated = (Table, Table, Vec<String>, Option<String>, Option<String>);
+
+/// Estimates a log.
 #[pyfunction]
 pub(crate) fn estimate(
     py: Python<'_>,
@@ -86,7 +89,7 @@ pub(crate) fn estimate(
     table: Option<&Bound<'_, Table>>,
     mapping: Mapping,
     given: &Bound<'_, PyAny>,
-) -> PyResult<(Table, Table, Vec<String>, Option<String>, Option<String>)> {
+) -> PyResult<Estimated> {
     let (name, text, gearbox) = car;
     let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
     let given: Given = given.extract()?;

@@ -77,7 +77,7 @@ def test_strided_and_empty_columns() -> None:
 
 
 def test_times_of_day_are_seconds() -> None:
-    times = pd.to_datetime(["2026-01-01 00:00:00.250", "2026-01-01 00:00:01"])
+    times = pd.to_datetime(["2026-01-01 00:00:00.250", "2026-01-01 00:00:01.000"])
     expected = [1767225600.25, 1767225601.0]
     assert list(wc.Table(pd.DataFrame({"time_s": times}))["time_s"]) == expected
     assert list(wc.Table(pa.table({"time_s": pa.array(times)}))["time_s"]) == expected

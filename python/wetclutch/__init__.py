@@ -5,28 +5,36 @@ Quantities are in SI units, and names end in their unit. Tables are Arrow data: 
 >>> import wetclutch as wc
 >>> car = wc.Car.template("8hp", mass_kg=1900.0)
 >>> car.gears[:3]
-('1', '2', '3')
+('R', '1', '2')
 """
 
 from __future__ import annotations
 
 from ._car import Car, gearboxes
+from ._design import Certificate, Gains, PhaseCertificate, design
 from ._errors import InputError, WetclutchError, WorkError
 from ._estimate import Estimates, Log, estimate, read
 from ._simulate import Simulation, simulate
 from ._table import Table
-from ._wetclutch import __version__
+from ._wetclutch import ClutchStep, Observer, StepEstimate, __version__
 
 __all__ = [
     "Car",
+    "Certificate",
+    "ClutchStep",
     "Estimates",
+    "Gains",
     "InputError",
     "Log",
+    "Observer",
+    "PhaseCertificate",
     "Simulation",
+    "StepEstimate",
     "Table",
     "WetclutchError",
     "WorkError",
     "__version__",
+    "design",
     "estimate",
     "gearboxes",
     "read",

@@ -1,5 +1,24 @@
 from collections.abc import Mapping
-from typing import Any, final
+from os import PathLike
+from typing import Any, TypeAlias, final
+
+from ._car import Car
+
+__all__ = [
+    "ClutchStep",
+    "Numbers",
+    "Observer",
+    "StepEstimate",
+    "Table",
+    "__version__",
+    "check_car",
+    "design",
+    "estimate",
+    "gearboxes",
+    "read_car",
+    "simulate",
+    "template_car",
+]
 
 __version__: str
 
@@ -23,6 +42,86 @@ class Table:
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
     def __len__(self) -> int: ...
 
+_Reading: TypeAlias = float | tuple[float, float]
+
+@final
+class Observer:
+    def __new__(
+        cls,
+        car: Car,
+        *,
+        shift: str | None = None,
+        sensors: str | PathLike[str] | None = None,
+        learnt: str | None = None,
+    ) -> Observer: ...
+    def step(
+        self,
+        *,
+        dt_s: float,
+        engine_speed_rad_s: _Reading | None = None,
+        turbine_speed_rad_s: _Reading | None = None,
+        output_speed_rad_s: _Reading | None = None,
+        wheel_speed_rad_s: _Reading | None = None,
+        engine_torque_n_m: _Reading | None = None,
+        commands: Mapping[str, _Reading | None] | None = None,
+        gear: str | None = None,
+        target_gear: str | None = None,
+        lock_up_applied: bool = False,
+        oil_temperature_degc: float | None = None,
+    ) -> StepEstimate: ...
+    def pressure_range_pa(self, element: str) -> tuple[float, float] | None: ...
+    @property
+    def learnt(self) -> str: ...
+    def __copy__(self) -> Observer: ...
+    def __deepcopy__(self, memo: Any, /) -> Observer: ...
+
+@final
+class StepEstimate:
+    @property
+    def gear(self) -> str | None: ...
+    @property
+    def target_gear(self) -> str | None: ...
+    @property
+    def phase(self) -> str | None: ...
+    @property
+    def health(self) -> str: ...
+    @property
+    def offgoing(self) -> ClutchStep | None: ...
+    @property
+    def oncoming(self) -> ClutchStep | None: ...
+    @property
+    def turbine_torque_n_m(self) -> float | None: ...
+    @property
+    def shaft_torque_n_m(self) -> float | None: ...
+    @property
+    def flare_rad_s(self) -> float: ...
+    @property
+    def valve_model_pressures_pa(self) -> dict[str, float]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class ClutchStep:
+    @property
+    def element(self) -> str | None: ...
+    @property
+    def pressure_pa(self) -> float: ...
+    @property
+    def pressure_range_pa(self) -> tuple[float, float] | None: ...
+    @property
+    def torque_n_m(self) -> float: ...
+    @property
+    def torque_range_n_m(self) -> tuple[float, float] | None: ...
+    @property
+    def torque_deviation_n_m(self) -> float: ...
+    @property
+    def valve_model_pressure_pa(self) -> float: ...
+    @property
+    def valve_model_torque_n_m(self) -> float: ...
+    @property
+    def holds(self) -> bool: ...
+    @property
+    def hidden(self) -> bool: ...
+
 def read_car(path: str) -> tuple[str, str, str, str | None, list[str], list[str]]: ...
 def check_car(
     name: str, text: str, gearbox: str | None = None
@@ -41,6 +140,9 @@ def gearboxes() -> list[str]: ...
 def simulate(
     car: tuple[str, str, str | None], drive: str, seed: int | None
 ) -> tuple[Table, Table, tuple[float, int, float]]: ...
+def design(
+    car: tuple[str, str, str | None], shift: str | None, given: Mapping[str, Any]
+) -> tuple[str, list[str]]: ...
 def estimate(
     car: tuple[str, str, str | None],
     path: str,
