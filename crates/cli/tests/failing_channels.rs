@@ -142,6 +142,55 @@ fn a_speed_channel_that_shows_another_speed_is_refused() {
     }
 }
 
+/// Rows in which the speed given is further from that of the log than a sensor errs, and its reading is not refused.
+fn believed(case: &Case, given: &str, table: &str, speed: &str) -> Vec<f64> {
+    let name = format!("{speed}_rad_s");
+    let [times, right, wrong] =
+        [("time_s", &case.log), (&name, &case.log), (&name, &given.to_owned())].map(|(name, log)| numbers(log, name));
+    let readings = column(table, &speed.replace("speed", "reading"));
+    let rows = (0..times.len()).filter(|row| (right[*row] - wrong[*row]).abs() > 2.0 && readings[*row] != "refused");
+    rows.map(|row| times[row]).collect()
+}
+
+#[test]
+fn a_speed_that_sticks_or_shows_the_speed_next_to_it_is_refused_from_its_first_wrong_reading_on() {
+    for case in Case::both() {
+        let [in_shift_s, between_s] = case.times_s;
+        let map = case.folder.write("map.toml", case.map(""));
+        let (_, _, clean) = case.estimate(&case.log, &[]);
+        let times = numbers(&case.log, "time_s");
+        let stuck = |speed: &str, [from_s, to_s]: [f64; 2]| {
+            let name = format!("{speed}_rad_s");
+            let last = times.iter().rposition(|time_s| *time_s <= from_s).unwrap();
+            case.with(&name, [from_s, to_s], &column(&case.log, &name)[last])
+        };
+        let shows = |speed: &str, other: &str, [from_s, to_s]: [f64; 2]| {
+            let (values, mut row) = (column(&case.log, &format!("{other}_rad_s")), 0);
+            with_column(&case.log, &format!("{speed}_rad_s"), |cell| {
+                row += 1;
+                let is_wrong = times[row - 1] > from_s && times[row - 1] < to_s;
+                if is_wrong { values[row - 1].clone() } else { cell.to_owned() }
+            })
+        };
+        let (in_shift, between) = ([in_shift_s - 0.1, in_shift_s + 0.2], [between_s, between_s + 1.0]);
+        for (speed, log) in [
+            ("turbine_speed", stuck("turbine_speed", in_shift)),
+            ("turbine_speed", stuck("turbine_speed", between)),
+            ("output_speed", stuck("output_speed", between)),
+            ("wheel_speed", stuck("wheel_speed", between)),
+            ("engine_speed", shows("engine_speed", "turbine_speed", between)),
+            ("output_speed", shows("output_speed", "wheel_speed", between)),
+        ] {
+            for more in [&[][..], &["--map", &map]] {
+                let (note, table, shifts) = case.estimate(&log, more);
+                assert_eq!(believed(&case, &log, &table, speed), [0.0; 0], "{speed}: {note}");
+                assert!(note.contains(&format!("{speed} ")) && note.contains("not used"), "{speed}: {note}");
+                assert_eq!(shifts.lines().count(), clean.lines().count(), "{speed}: {note}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_channel_that_ends_in_the_drive_does_not_refuse_the_log() {
     for case in Case::both() {

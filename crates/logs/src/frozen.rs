@@ -7,7 +7,9 @@
 //! changed by [`FROZEN_QUANTA`] of its quanta from sample to sample stands for [`STOPPED_S`] and [`STOPPED_SAMPLES`] only, and the other
 //! changes by those quanta.
 //! Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from a turbine that is nearly as fast
-//! or faster: below that the idle control may hold the engine while the car comes to rest.
+//! or faster: below that the idle control may hold the engine while the car comes to rest. An engine that is faster than any idle control
+//! holds it, [`IDLE_RAD_S`], parts from the turbine by the slip of the converter, but does not stand still to the last digit while the turbine
+//! changes by [`FROZEN_CHANGE_CONVERTER`].
 
 use crate::Role;
 
@@ -28,6 +30,10 @@ pub const FROZEN_QUANTA: f64 = 3.0;
 const LATEST: f64 = 0.125;
 /// Fraction by which the other speed changes at least while one has stopped \[chosen\]: no noise.
 const STOPPED_CHANGE: f64 = 0.002;
+/// The same of an engine while the turbine changes behind a converter \[chosen\]: its load changes with the slip.
+pub const FROZEN_CHANGE_CONVERTER: f64 = 0.05;
+/// Greatest speed that an idle control holds, of a cold engine, rad/s \[chosen\]: 1500 rpm.
+pub const IDLE_RAD_S: f64 = 157.0;
 /// A turbine above this share of the engine's speed takes the engine along when it changes.
 pub const COUPLED: f64 = 0.95;
 
@@ -35,6 +41,9 @@ pub const COUPLED: f64 = 0.95;
 pub const STOPPED_S: f64 = 0.05;
 /// See [`STOPPED_S`].
 pub const STOPPED_SAMPLES: u32 = 5;
+
+/// Below this a shaft stands, rad/s.
+const STANDS_RAD_S: f64 = 1.0;
 
 /// Roles that are speeds: the first five.
 pub const SPEEDS: usize = 5;
@@ -75,6 +84,16 @@ impl FrozenSpeed {
         Self { role, still: None, longest_still: 0, quantum: f64::INFINITY, moves: 0.0 }
     }
 
+    /// Whether the speed is known to be frozen since an earlier value.
+    pub fn is_known(&self) -> bool {
+        self.still.is_some_and(|still| still.frozen)
+    }
+
+    /// The value at which the speed stands, rad/s, and when it came first, s.
+    pub fn still(&self) -> Option<[f64; 2]> {
+        self.still.map(|still| [still.value, still.since_s])
+    }
+
     /// Whether the speed is frozen, with its next value and the newest values of the others.
     pub fn is_frozen(&mut self, value: f64, time_s: f64, speeds: &Speeds) -> bool {
         let Some(still) = self.still.as_mut().filter(|still| still.value == value) else {
@@ -82,8 +101,9 @@ impl FrozenSpeed {
                 let change = (value - before.value).abs();
                 self.quantum = self.quantum.min(change);
                 self.moves += LATEST * (change / f64::from(before.samples) - self.moves);
-                // A car that stands says nothing of how coarse its speeds are.
-                if !before.frozen && before.value != 0.0 {
+                // A car that stands, and an engine that idles, say nothing of how coarse their speeds are.
+                let rests_rad_s = if self.role == Role::EngineSpeed { IDLE_RAD_S } else { STANDS_RAD_S };
+                if !before.frozen && before.value.abs() > rests_rad_s {
                     self.longest_still = self.longest_still.max(before.samples);
                 }
             }
@@ -110,8 +130,9 @@ impl FrozenSpeed {
             still.frozen = partners(self.role).iter().any(|partner| {
                 // Without one of both nothing has changed.
                 let (now, then) = (speeds[*partner as usize], still.others[*partner as usize]);
-                let takes_along = self.role != Role::EngineSpeed || then.max(now) > COUPLED * value;
-                takes_along && (now - then).abs() > limit * then.abs().max(now.abs())
+                let is_tied = self.role != Role::EngineSpeed || then.max(now) > COUPLED * value;
+                let limit = if is_tied { limit } else { limit.max(FROZEN_CHANGE_CONVERTER) };
+                (is_tied || value > IDLE_RAD_S) && (now - then).abs() > limit * then.abs().max(now.abs())
             });
         }
         still.frozen

@@ -56,6 +56,7 @@ pub struct Log {
     source: Source,
     /// Threads that read, with the one that asks.
     threads: usize,
+    is_followed: bool,
 }
 
 enum Source {
@@ -141,11 +142,16 @@ impl Log {
             Format::Csv => CsvLog::open(path, head, reader, options.time.as_ref(), is_followed)
                 .map(|(log, channels)| (Source::Csv(Box::new(log)), channels))?,
         };
-        let mut log = Self { path: path.to_owned(), channels, source, threads: 1 };
+        let mut log = Self { path: path.to_owned(), channels, source, threads: 1, is_followed };
         if options.dbc.is_some() && !log.has_frames() {
             log.note(NO_FRAMES);
         }
         Ok(log)
+    }
+
+    /// Whether it is still being written.
+    pub(crate) fn is_followed(&self) -> bool {
+        self.is_followed
     }
 
     /// Whether its signals are those of a CAN bus, and no DBC says which they are.

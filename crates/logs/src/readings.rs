@@ -4,17 +4,18 @@
 //!
 //! - a value outside `valid_range` of the map is not used;
 //! - several channels of one signal count where all of them have the same time stamp;
-//! - a speed that stands still while it cannot is not used until it changes, see [`crate::frozen`];
+//! - a speed that stands still while it cannot is not used until it changes, see [`crate::frozen`]; of a log that is not followed,
+//!   from when it began to stand, see [`crate::look_ahead`];
 //! - a speed that no shaft can have, as a zero while the car drives, is not used, see [`crate::speed_faults`];
 //! - the friction torque of the engine, where it is mapped, is taken off the engine torque.
 
-use crate::frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
-use crate::held::HeldSpeed;
 use crate::in_order::InOrder;
+use crate::look_ahead::{LOOK_AHEAD_S, LookAhead};
 use crate::map::Resolved;
 use crate::plausibility::{Extremes, Finding, Likely, Seen};
 use crate::samples::{Quality, QualityCounts};
-use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, SpeedFaults, plausibility};
+use crate::speed_watch::{SpeedReading, SpeedWatch, Withdrawn};
+use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, plausibility};
 
 /// A value of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,8 +60,14 @@ struct Channels {
     parts_s: f64,
     counts: QualityCounts,
     extremes: Extremes,
-    frozen: FrozenSpeed,
-    held: HeldSpeed,
+}
+
+/// A reading that waits, with the place of its entry in the map, the time of its sample, s, and the resets of clocks until then.
+struct Read {
+    entry: usize,
+    reading: Reading,
+    sample_s: f64,
+    resets: u32,
 }
 
 /// The readings of a log in the order of their time stamps.
@@ -72,12 +79,18 @@ pub struct Readings<'a> {
     /// Roles that the last sample still has to be given to.
     pending: Vec<(usize, usize)>,
     sample: Option<crate::Sample>,
+    /// What is held back until it is known whether it is right.
+    ahead: LookAhead<Read, LogError>,
+    /// Time of the newest sample that was not held back any more, s, and resets of clocks until then.
+    newest_s: f64,
+    resets: u32,
     /// What is held back where stamps are moved.
     in_order: Option<InOrder>,
     /// Place of the last reading's entry in the map.
     entry: usize,
-    speeds: Speeds,
-    faults: SpeedFaults,
+    speeds: SpeedWatch,
+    /// What the last speed that was judged shows of those before it.
+    withdrawn: Vec<Withdrawn>,
     /// Whether the newest gear is a negative number: reverse.
     is_reverse: bool,
     /// Newest friction torque of the engine, N m; zero where it is not mapped, none before its first value.
@@ -91,6 +104,7 @@ impl<'a> Readings<'a> {
     /// The map does not fit the log, or the log cannot be read.
     pub fn new(log: &'a mut Log, map: &ChannelMap) -> Result<Self, LogError> {
         let resolved = map.resolve(log)?;
+        let look_ahead_s = if log.is_followed() { 0.0 } else { LOOK_AHEAD_S };
         let mut users = vec![Vec::new(); log.channels().len()];
         for (i, resolved) in resolved.iter().enumerate() {
             for (part, &channel) in resolved.channels.iter().enumerate() {
@@ -102,8 +116,6 @@ impl<'a> Readings<'a> {
         let roles = resolved.into_iter().map(|resolved| Channels {
             parts: vec![None; resolved.channels.len()],
             parts_s: f64::NAN,
-            frozen: FrozenSpeed::new(resolved.entry.role),
-            held: HeldSpeed::new(),
             resolved,
             counts: QualityCounts::default(),
             extremes: Extremes::default(),
@@ -115,10 +127,13 @@ impl<'a> Readings<'a> {
             users,
             pending: Vec::new(),
             sample: None,
+            ahead: LookAhead::new(look_ahead_s),
+            newest_s: f64::NEG_INFINITY,
+            resets: 0,
             in_order,
             entry: 0,
-            speeds: NO_SPEEDS,
-            faults: SpeedFaults::new(),
+            speeds: SpeedWatch::new(),
+            withdrawn: Vec::new(),
             is_reverse: false,
             friction_n_m: (!map.has(Role::EngineFrictionTorque)).then_some(0.0),
         })
@@ -148,7 +163,7 @@ impl<'a> Readings<'a> {
 
     /// Resets of clocks so far.
     pub fn resets(&self) -> u32 {
-        self.samples.resets()
+        self.resets
     }
 
     /// Checks units against what the first values can be.
@@ -262,19 +277,10 @@ impl<'a> Readings<'a> {
         let stamp_s = sample.time_s - entry.late_s;
         let time_s = stamp_s - entry.delay_s;
         if quality == Quality::Good && kind.is_speed() {
-            quality = if self.faults.is_fault(kind, value, sample.time_s) {
-                Quality::Impossible
-            } else if channels.frozen.is_frozen(value, sample.time_s, &self.speeds) {
-                Quality::Frozen
-            } else {
-                Quality::Good
-            };
-            if quality != Quality::Impossible && channels.held.is_held(value) && quality == Quality::Good {
-                quality = Quality::Held;
-            }
-            if matches!(quality, Quality::Good | Quality::Held) {
-                self.speeds[kind as usize] = value;
-            }
+            let reading = SpeedReading { role: kind, value, time_s: sample.time_s, may_be_held: true };
+            let (judged, withdrawn) = self.speeds.judge(reading);
+            quality = judged;
+            self.withdrawn.extend(withdrawn);
         }
         channels.counts.push(quality);
         match quality {
@@ -308,32 +314,63 @@ impl Readings<'_> {
     /// reports its channel as refused.
     pub fn next_or_refused(&mut self) -> Option<Result<Reading, LogError>> {
         loop {
-            let newest_s = self.sample.map_or(f64::NEG_INFINITY, |sample| sample.time_s);
-            if let Some((entry, reading)) = self.in_order.as_mut().and_then(|waiting| waiting.next(newest_s)) {
+            if let Some((entry, reading)) = self.in_order.as_mut().and_then(|waiting| waiting.next(self.newest_s)) {
                 self.entry = entry;
                 return Some(Ok(reading));
             }
-            while let (Some(user), Some(sample)) = (self.pending.pop(), self.sample) {
-                let Some(reading) = self.take(user, &sample) else { continue };
-                match &mut self.in_order {
-                    Some(waiting) => waiting.push(user.0, reading),
-                    None => {
-                        self.entry = user.0;
-                        return Some(Ok(reading));
-                    }
-                }
-            }
-            match self.samples.next() {
-                None => {
+            match self.ahead.ready() {
+                None => self.read_ahead(),
+                Some(Err(error)) => return Some(Err(error)),
+                Some(Ok(None)) => {
                     let (entry, reading) = self.in_order.as_mut()?.next(f64::INFINITY)?;
                     self.entry = entry;
                     return Some(Ok(reading));
                 }
-                Some(Err(error)) => return Some(Err(error)),
-                Some(Ok(sample)) => {
-                    self.pending.extend_from_slice(&self.users[sample.channel]);
-                    self.sample = Some(sample);
+                Some(Ok(Some(Read { entry, reading, sample_s, resets }))) => {
+                    (self.newest_s, self.resets) = (sample_s, resets);
+                    match &mut self.in_order {
+                        Some(waiting) => waiting.push(entry, reading),
+                        None => {
+                            self.entry = entry;
+                            return Some(Ok(reading));
+                        }
+                    }
                 }
+            }
+        }
+    }
+
+    /// Reads one more reading, and refuses those before it that it shows to be wrong.
+    fn read_ahead(&mut self) {
+        while let (Some(user), Some(sample)) = (self.pending.pop(), self.sample) {
+            let reading = self.take(user, &sample);
+            let is_one = reading.is_some();
+            if let Some(reading) = reading {
+                let resets = self.samples.resets();
+                self.ahead.push(sample.time_s, Read { entry: user.0, reading, sample_s: sample.time_s, resets });
+            }
+            while let Some(withdrawn) = self.withdrawn.pop() {
+                self.withdraw(withdrawn);
+            }
+            if is_one {
+                return;
+            }
+        }
+        match self.samples.next() {
+            None => self.ahead.end(None),
+            Some(Err(error)) => self.ahead.end(Some(error)),
+            Some(Ok(sample)) => {
+                self.pending.extend_from_slice(&self.users[sample.channel]);
+                self.sample = Some(sample);
+            }
+        }
+    }
+
+    fn withdraw(&mut self, withdrawn: Withdrawn) {
+        for Read { entry, reading, sample_s, .. } in self.ahead.waiting() {
+            if reading.role == withdrawn.role && *sample_s > withdrawn.after_s && !reading.is_refused() {
+                reading.value = f64::NAN;
+                self.roles[*entry].counts.withdraw(withdrawn.quality);
             }
         }
     }

@@ -93,6 +93,10 @@ const TABLE: &[(Role, &str, Option<Quantity>, &str)] = &[
 ];
 
 impl Role {
+    /// The speeds of shafts, and that of the car.
+    pub const SPEEDS: [Self; 5] =
+        [Self::EngineSpeed, Self::TurbineSpeed, Self::OutputSpeed, Self::WheelSpeed, Self::VehicleSpeed];
+
     /// All of them, in their order.
     pub fn all() -> impl Iterator<Item = Self> {
         TABLE.iter().map(|(role, ..)| *role)

@@ -73,6 +73,12 @@ impl QualityCounts {
         self.0[quality as usize] += 1;
     }
 
+    /// One that counted as good is of another quality.
+    pub(crate) fn withdraw(&mut self, quality: Quality) {
+        self.0[Quality::Good as usize] -= 1;
+        self.push(quality);
+    }
+
     /// How many there are of this quality.
     pub fn of(&self, quality: Quality) -> u64 {
         self.0[quality as usize]

@@ -9,7 +9,8 @@
 //! - if it stays at zero while another speed shows for some time that the shaft turns fast, as where a sensor died at a standstill.
 //!
 //! A fault lasts until the readings are those of the shaft again, and for [`LONGEST_S`] at most: what lasts longer is how the log goes on,
-//! as where two recordings are joined. Only a zero stays a fault for as long as the other speeds contradict it. The accelerations are bounds
+//! as where two recordings are joined. A turbine that shows the output speed is believed again as soon as a shift into the direct gear may have
+//! brought it there. Only a zero stays a fault for as long as the other speeds contradict it. The accelerations are bounds
 //! for every car, and a fall at low speed, where sensors of toothed wheels rightly read zero, is none.
 
 use crate::Role;
@@ -25,11 +26,20 @@ const AT_ONCE_S: f64 = 0.15;
 /// Fraction of the last believed speed below which a speed fell, and size below which it is zero, rad/s.
 const FELL: f64 = 0.1;
 const ZERO_RAD_S: f64 = 1.0;
-/// Relative difference within which a reading is that of another speed: both channels may be one row apart.
+/// Differences within which a reading is that of another speed, relative and rad/s: both channels may be one row apart, and a sensor has noise.
 const ANOTHER: f64 = 0.01;
+const ANOTHER_RAD_S: f64 = 0.5;
+/// How many times as much they may differ as long as it lasts.
+const STILL_ANOTHER: f64 = 4.0;
+/// Engine and turbine that were one shaft not longer ago than this may be so again, s: behind a lock-up clutch, or without a converter.
+const TOGETHER_S: f64 = 5.0;
 /// Change by which a speed jumps to the value of another one: by rate, rad/s^2, and at once, rad/s \[chosen\]. A turbine that a clutch
 /// brings to the speed of the output does so by some 1000 rad/s^2.
 const TO_ANOTHER: (f64, f64) = (1000.0, 5.0);
+/// A shift brings the turbine to the speed of the output, where the new gear is the direct one: at the lowest rate of an inertia phase, rad/s^2,
+/// and the engine goes along by this fraction at least \[chosen\].
+const SHIFTS_RAD_S2: f64 = 300.0;
+const GOES_ALONG: f64 = 0.25;
 /// Factors beyond which output over wheel speed has parted from what it was: readings that are 50 ms apart differ by less.
 const PARTED: std::ops::Range<f64> = 0.6..1.6;
 /// Faster than any shaft of a car, rad/s: not taken as a speed at all.
@@ -60,6 +70,8 @@ pub struct SpeedFaults {
     faults: [Option<Fault>; WATCHED],
     /// Output over wheel speed when both were last believed; not a number before.
     output_over_wheel: f64,
+    /// When engine and turbine had the same speed last, s.
+    together_s: f64,
     /// Since when a speed stands at zero against the others, s.
     stands_since_s: [Option<f64>; WATCHED],
 }
@@ -70,6 +82,8 @@ struct Fault {
     since_s: f64,
     /// The speed whose value it began with, if it did.
     another: Option<usize>,
+    /// The engine speed then, rad/s.
+    engine_rad_s: Option<f64>,
 }
 
 /// The last reading of a speed that was believed.
@@ -88,6 +102,7 @@ impl SpeedFaults {
             believed: [None; WATCHED],
             faults: [None; WATCHED],
             output_over_wheel: f64::NAN,
+            together_s: f64::NEG_INFINITY,
             stands_since_s: [None; WATCHED],
         }
     }
@@ -111,11 +126,19 @@ impl SpeedFaults {
         });
         if is_fault {
             let another = self.another(at, rad_s, time_s);
-            self.faults[at].get_or_insert(Fault { since_s: time_s, another });
+            let engine_rad_s = self.turning(ENGINE, time_s);
+            self.faults[at].get_or_insert(Fault { since_s: time_s, another, engine_rad_s });
         } else {
             self.believe(at, rad_s, time_s);
         }
         is_fault
+    }
+
+    /// The readings of a speed after this one, which came at this time, s, turned out to be wrong.
+    pub fn disbelieve_after(&mut self, role: Role, rad_s: f64, time_s: f64) {
+        if let Some(believed) = self.believed.get_mut(role as usize) {
+            *believed = Some(Believed { rad_s, time_s, first_s: time_s });
+        }
     }
 
     fn believe(&mut self, at: usize, rad_s: f64, time_s: f64) {
@@ -123,6 +146,10 @@ impl SpeedFaults {
         let first_s = before.map_or(time_s, |before| before.first_s);
         self.believed[at] = Some(Believed { rad_s, time_s, first_s });
         self.faults[at] = None;
+        if (at == ENGINE && self.shows(TURBINE, rad_s, time_s)) || (at == TURBINE && self.shows(ENGINE, rad_s, time_s))
+        {
+            self.together_s = time_s;
+        }
         if let (OUTPUT | WHEEL, Some(output), Some(wheel)) =
             (at, self.turning(OUTPUT, time_s), self.turning(WHEEL, time_s))
         {
@@ -148,14 +175,19 @@ impl SpeedFaults {
     fn lasts(&self, at: usize, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
         let fell = rad_s.abs() <= FELL * before.rad_s.abs();
         let is_short = time_s - fault.since_s <= LONGEST_S;
-        let is_wrong = || {
-            jumps(at, before, rad_s, time_s)
-                || fell
-                || fault.another.is_some_and(|another| self.shows(another, rad_s, time_s))
-                || self.parts(at, rad_s, time_s)
-        };
+        let shows_another = fault.another.is_some_and(|another| self.is_near(STILL_ANOTHER, another, rad_s, time_s))
+            && !(at == TURBINE && self.may_have_shifted(before, rad_s, (fault, time_s)));
+        let is_wrong = || jumps(at, before, rad_s, time_s) || fell || shows_another || self.parts(at, rad_s, time_s);
         let is_dead = || rad_s.abs() <= ZERO_RAD_S && fell && self.is_contradicted(at, before, time_s);
         (is_short && is_wrong()) || is_dead()
+    }
+
+    /// Whether a shift may have brought the turbine to this speed since it was believed last: there was time for it, and the engine went along.
+    fn may_have_shifted(&self, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
+        let change = rad_s - before.rad_s;
+        let engine = fault.engine_rad_s.zip(self.turning(ENGINE, time_s)).map(|(then, now)| now - then);
+        let goes_along = engine.is_some_and(|engine| engine * change.signum() > GOES_ALONG * change.abs());
+        goes_along && SHIFTS_RAD_S2 * (time_s - before.time_s) > change.abs()
     }
 
     /// Whether a reading is zero, as those before it, while the others have shown for some time that the shaft turns.
@@ -196,14 +228,20 @@ impl SpeedFaults {
         }
     }
 
-    /// The speed next to it whose value a reading has.
+    /// The speed next to it whose value a reading has, if they are not one shaft.
     fn another(&self, at: usize, rad_s: f64, time_s: f64) -> Option<usize> {
-        NEXT_TO[at].iter().copied().find(|other| self.shows(*other, rad_s, time_s))
+        let is_one_shaft = |other: usize| at.max(other) == TURBINE && time_s - self.together_s <= TOGETHER_S;
+        NEXT_TO[at].iter().copied().find(|other| !is_one_shaft(*other) && self.shows(*other, rad_s, time_s))
     }
 
     /// Whether a reading has the value of this speed.
     fn shows(&self, other: usize, rad_s: f64, time_s: f64) -> bool {
-        self.turning(other, time_s).is_some_and(|other| (rad_s - other).abs() <= ANOTHER * other.abs())
+        self.is_near(1.0, other, rad_s, time_s)
+    }
+
+    fn is_near(&self, times: f64, other: usize, rad_s: f64, time_s: f64) -> bool {
+        let near = |other: f64| (rad_s - other).abs() <= times * ANOTHER_RAD_S.max(ANOTHER * other.abs());
+        self.turning(other, time_s).is_some_and(near)
     }
 
     /// Whether output and wheel speed part by a reading of one of them.
@@ -382,6 +420,38 @@ mod tests {
                 assert!((0..WATCHED).all(|speed| speed == at || found[speed].is_empty()), "{at} {other}: {found:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_turbine_that_shows_the_output_is_believed_once_a_shift_into_the_direct_gear_may_have_brought_it_there() {
+        let shift = |begin_s: f64, end_s: f64| {
+            faults(0.01, |time_s| {
+                let [_, _, output, wheel] = in_gear(time_s);
+                let slips = 1.0 - ((time_s - begin_s) / (end_s - begin_s)).clamp(0.0, 1.0);
+                let turbine = output * (1.0 + 1.5 * slips);
+                let is_wrong = time_s > 2.0 && time_s < 2.5;
+                [turbine + 30.0, if is_wrong { output } else { turbine }, output, wheel]
+            })
+        };
+        // The shift ends while the turbine is wrong: what it reads at the end and afterwards is right.
+        let [engine, turbine, output, wheel] = shift(1.9, 2.3);
+        assert!(engine.is_empty() && output.is_empty() && wheel.is_empty());
+        assert!(turbine.len() >= 30 && turbine.iter().all(|time_s| *time_s < 2.51), "{turbine:?}");
+        // No shift: the engine does not go along.
+        let [_, turbine, ..] = shift(5.0, 5.5);
+        assert!((48..=50).contains(&turbine.len()), "{turbine:?}");
+    }
+
+    #[test]
+    fn a_turbine_without_a_converter_that_shows_a_slow_output_is_a_fault_and_so_are_no_right_readings() {
+        let noise = |factor: f64, time_s: f64| 0.3 * (factor * time_s).sin();
+        let found = faults(0.01, |time_s| {
+            let [engine, turbine, output] = [731.0, 517.0, 977.0].map(|factor| noise(factor, time_s));
+            let shown = if time_s > 1.0 && time_s < 1.2 { 21.0 + output } else { 97.0 + turbine };
+            [97.0 + engine, shown, 21.0 + output, 21.0 / 3.5]
+        });
+        assert!((18..=20).contains(&found[TURBINE].len()), "{:?}", found[TURBINE]);
+        assert!([ENGINE, OUTPUT, WHEEL].iter().all(|at| found[*at].is_empty()), "{found:?}");
     }
 
     #[test]

@@ -83,8 +83,11 @@ fn a_speed_that_stands_still_while_another_moves_is_frozen() {
     let (read, summary, _) = readings(&text, &map).unwrap();
     let frozen = |role: Role| summary.iter().find(|entry| entry.role == role).unwrap().counts.of(Quality::Frozen);
     assert_eq!([Role::EngineSpeed, Role::OutputSpeed, Role::WheelSpeed].map(frozen), [0; 3]);
-    // Half a second is waited for, and the value before is the same.
-    assert_eq!(frozen(Role::TurbineSpeed), 50);
+    // The first of the equal values is right; the others are withdrawn when it is known that they stand.
+    assert_eq!(frozen(Role::TurbineSpeed), 99);
+    let between =
+        read.iter().filter(|reading| reading.role == Role::TurbineSpeed && (1.005..1.995).contains(&reading.stamp_s));
+    assert_eq!(between.count(), 0);
     let after = read.iter().filter(|reading| reading.role == Role::TurbineSpeed && reading.stamp_s > 1.995).count();
     assert_eq!(after, 100);
 }
@@ -430,7 +433,7 @@ fn a_sensor_that_fails_for_most_of_the_log_does_not_refuse_it() {
 }
 
 #[test]
-fn a_speed_that_moved_and_stops_is_frozen_after_five_samples() {
+fn a_speed_that_moved_and_stops_is_frozen_from_its_first_equal_sample_on() {
     let mut text = "time_s,t_rpm,o_rpm\n".to_owned();
     for row in 0..400 {
         // Slow at first, where the speeds show how fine they are.
@@ -440,5 +443,43 @@ fn a_speed_that_moved_and_stops_is_frozen_after_five_samples() {
     }
     let (_, summary, _) = readings(&text, &map(&["turbine_speed=t_rpm", "output_speed=o_rpm"])).unwrap();
     let frozen = count(&summary, Quality::Frozen);
-    assert!((23..=25).contains(&frozen), "{frozen}");
+    assert_eq!(frozen, 29);
+}
+
+#[test]
+fn a_fast_engine_that_stops_changing_behind_a_converter_is_frozen() {
+    let frozen = |idle_rpm: f64, stands: std::ops::Range<u32>| {
+        let mut text = "time_s,e_rpm,t_rpm,o_rpm\n".to_owned();
+        for row in 0..600 {
+            // It idles for a second, and goes on with a slip of a tenth.
+            let output = 800.0 + 2.0 * f64::from(row.max(100) - 100);
+            let engine = if row < 100 { idle_rpm } else { 2.2 * output };
+            let engine = if stands.contains(&row) { 1760.0 + 4.4 * f64::from(stands.start - 100) } else { engine };
+            writeln!(text, "{:.2},{engine:.2},{:.2},{output:.2}", 0.01 * f64::from(row), 1.98 * output).unwrap();
+        }
+        let roles = ["engine_speed=e_rpm", "turbine_speed=t_rpm", "output_speed=o_rpm"];
+        let (_, summary, _) = readings(&text, &map(&roles)).unwrap();
+        count(&summary, Quality::Frozen)
+    };
+    assert_eq!(frozen(800.0, 300..400), 99);
+    assert_eq!(frozen(800.0, 0..0), 0);
+}
+
+#[test]
+fn a_channel_that_shows_the_speed_next_to_it_is_refused_from_its_first_sample_on() {
+    let mut text = "time_s,e_rpm,t_rpm,o_rpm\n".to_owned();
+    for row in 0..400 {
+        let time = f64::from(row);
+        // The turbine shows the output, which is a little slower.
+        let output = 600.0 + 0.4 * time + 0.3 * (7.3 * time).sin();
+        let turbine = 700.0 + 0.4 * time + 0.3 * (5.1 * time).sin();
+        let shown = if (200..300).contains(&row) { output } else { turbine };
+        writeln!(text, "{:.2},{:.2},{shown:.2},{output:.2}", 0.01 * time, 900.0 + 0.3 * (3.9 * time).sin()).unwrap();
+    }
+    let roles = ["engine_speed=e_rpm", "turbine_speed=t_rpm", "output_speed=o_rpm"];
+    let (read, summary, _) = readings(&text, &map(&roles)).unwrap();
+    assert_eq!(count(&summary, Quality::Impossible), 100);
+    let wrong =
+        read.iter().filter(|reading| reading.role == Role::TurbineSpeed && (1.995..2.995).contains(&reading.stamp_s));
+    assert_eq!(wrong.count(), 0);
 }

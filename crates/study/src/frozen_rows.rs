@@ -1,27 +1,20 @@
 //! Speeds of the rows of a table that are no readings of their shaft: frozen and impossible ones, and those that the table holds.
 
-use logs::{FrozenSpeed, HeldSpeed, NO_SPEEDS, Role, SpeedFaults, Speeds};
+use logs::{Quality, Role, SpeedReading, SpeedWatch, Withdrawn};
 use observer::Reading;
 
 /// The speeds of a row, in the order of [`WATCHED`].
 pub(crate) type SpeedReadings<'a> = [&'a mut Option<Reading<f64>>; WATCHED.len()];
 
-/// The speeds of the rows, of which frozen and impossible ones are refused by the rules of [`logs::frozen`] and [`logs::speed_faults`], and
-/// held ones are left out by those of [`logs::held`].
-pub(crate) struct FrozenRows {
-    watched: [(FrozenSpeed, HeldSpeed); WATCHED.len()],
-    faults: SpeedFaults,
-    newest: Speeds,
-    /// The time at which the newest reading of each was measured, s, and whether it is refused.
-    newest_s: [(f64, Option<Refused>); WATCHED.len()],
-    counts: [Counts; WATCHED.len()],
-}
+/// Readings of earlier rows, and of the row itself, that a row shows to be wrong.
+pub(crate) type AllWithdrawn = [Option<Withdrawn>; WATCHED.len()];
 
-/// Why a reading is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Refused {
-    Frozen,
-    Impossible,
+/// The speeds of the rows, of which frozen and impossible ones are refused by the rules of [`logs::speed_watch`], and held ones are left out.
+pub(crate) struct FrozenRows {
+    speeds: SpeedWatch,
+    /// The time at which the newest reading of each was measured, s, and whether it is refused.
+    newest_s: [(f64, Option<Quality>); WATCHED.len()],
+    counts: [Counts; WATCHED.len()],
 }
 
 /// Readings of a speed, and those of them that are not used.
@@ -33,6 +26,24 @@ struct Counts {
     held: u64,
 }
 
+impl Counts {
+    fn push(&mut self, quality: Quality) {
+        self.readings += 1;
+        match quality {
+            Quality::Held => self.held += 1,
+            quality => self.refuse(quality),
+        }
+    }
+
+    fn refuse(&mut self, quality: Quality) {
+        match quality {
+            Quality::Frozen => self.frozen += 1,
+            Quality::Impossible => self.impossible += 1,
+            _ => {}
+        }
+    }
+}
+
 const WATCHED: [Role; 4] = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
 
 /// Times that differ by less are those of one reading, s: decimals of a table.
@@ -41,50 +52,50 @@ const SAME_S: f64 = 1e-6;
 impl FrozenRows {
     pub(crate) fn new() -> Self {
         Self {
-            watched: WATCHED.map(|role| (FrozenSpeed::new(role), HeldSpeed::new())),
-            faults: SpeedFaults::new(),
-            newest: NO_SPEEDS,
+            speeds: SpeedWatch::new(),
             newest_s: [(f64::NEG_INFINITY, None); WATCHED.len()],
             counts: [Counts::default(); WATCHED.len()],
         }
     }
 
     /// Refuses the readings of a row that are frozen or impossible, by a value that is not a number, and leaves out those of a row before
-    /// that a table holds.
-    pub(crate) fn take_out(&mut self, speeds: SpeedReadings<'_>, time_s: f64) {
+    /// that a table holds. Returns which readings up to this row are wrong, for [`Self::withdraw`].
+    pub(crate) fn take_out(&mut self, speeds: SpeedReadings<'_>, time_s: f64) -> AllWithdrawn {
+        let mut all_withdrawn = [None; WATCHED.len()];
         for (i, speed) in speeds.into_iter().enumerate() {
             let Some(Reading { value, age_s }) = *speed else { continue };
             let measured_s = time_s - age_s;
             let (newest_s, before) = self.newest_s[i];
             // With its age a reading that a table holds until the next one comes is one reading.
             let is_same = age_s > 0.0 && (measured_s - newest_s).abs() <= SAME_S;
-            let refused = if is_same { before } else { self.refused(i, value, measured_s) };
-            let held = age_s == 0.0 && refused != Some(Refused::Impossible) && self.watched[i].1.is_held(value);
+            let reading = SpeedReading { role: WATCHED[i], value, time_s: measured_s, may_be_held: age_s == 0.0 };
+            let (quality, withdrawn) = match before {
+                _ if !is_same => self.speeds.judge(reading),
+                before => (before.unwrap_or(Quality::Good), None),
+            };
+            let refused = Some(quality).filter(|quality| matches!(quality, Quality::Frozen | Quality::Impossible));
             self.newest_s[i] = (measured_s, refused);
-            let counts = &mut self.counts[i];
-            counts.readings += 1;
-            match refused {
-                Some(Refused::Frozen) => counts.frozen += 1,
-                Some(Refused::Impossible) => counts.impossible += 1,
-                None => {
-                    counts.held += u64::from(held);
-                    self.newest[WATCHED[i] as usize] = value;
-                }
-            }
+            self.counts[i].push(quality);
             if refused.is_some() {
                 *speed = Some(Reading { value: f64::NAN, age_s });
-            } else if held {
+            } else if quality == Quality::Held {
                 *speed = None;
             }
+            all_withdrawn[i] = withdrawn;
         }
+        all_withdrawn
     }
 
-    /// Why the next reading of a speed is refused, if it is.
-    fn refused(&mut self, i: usize, value: f64, measured_s: f64) -> Option<Refused> {
-        if self.faults.is_fault(WATCHED[i], value, measured_s) {
-            return Some(Refused::Impossible);
+    /// Refuses a reading of a row at this time, s, if it is one of those that are withdrawn.
+    pub(crate) fn withdraw(&mut self, withdrawn: Withdrawn, speeds: SpeedReadings<'_>, time_s: f64) {
+        let Some(i) = WATCHED.iter().position(|role| *role == withdrawn.role) else { return };
+        if let Some(Reading { value, age_s }) = speeds.into_iter().nth(i).and_then(Option::as_mut)
+            && time_s - *age_s > withdrawn.after_s + SAME_S
+            && !value.is_nan()
+        {
+            *value = f64::NAN;
+            self.counts[i].refuse(withdrawn.quality);
         }
-        self.watched[i].0.is_frozen(value, measured_s, &self.newest).then_some(Refused::Frozen)
     }
 
     /// What was met, in sentences.

@@ -5,13 +5,17 @@ use std::convert::Infallible;
 use std::path::Path;
 
 use car::Vehicle;
+use logs::{LOOK_AHEAD_S, LookAhead};
 use observer::{Input, Phase};
 use trace::{CsvRows, TraceError, signal};
 
 use crate::Signals;
-use crate::frozen_rows::FrozenRows;
+use crate::frozen_rows::{AllWithdrawn, FrozenRows, SpeedReadings};
 use crate::row_clock::{RowClock, RowTime};
 use crate::row_samples::{RowSamples, refuse_misnamed_engine};
+
+/// The input of an observer, and what comes along with it.
+type InputRow = (Input<f64>, LogRow);
 
 /// Rows that are looked at before the first estimate: gains are designed for the median time between them.
 pub const FIRST_LOOK: usize = 10_000;
@@ -26,7 +30,9 @@ pub struct Log {
     clock: RowClock,
     frozen: FrozenRows,
     samples: RowSamples,
-    looked_at: VecDeque<(Input<f64>, LogRow)>,
+    /// Rows that may still be shown to have a wrong speed.
+    ahead: LookAhead<InputRow, TraceError>,
+    looked_at: VecDeque<InputRow>,
     median_step_s: f64,
 }
 
@@ -51,6 +57,8 @@ impl TruthColumns {
 pub struct LogRow {
     /// Time, s.
     pub time_s: f64,
+    /// How often the clock had begun anew until then, or went on after stamps that were far too late.
+    pub resets: u32,
     /// The true values, if the log has them.
     pub truth: Option<Truth>,
     /// What else the row holds.
@@ -59,7 +67,7 @@ pub struct LogRow {
 
 impl LogRow {
     /// Before the first row.
-    pub const NONE: Self = Self { time_s: f64::NAN, truth: None, beside: Beside::NONE };
+    pub const NONE: Self = Self { time_s: f64::NAN, resets: 0, truth: None, beside: Beside::NONE };
 }
 
 /// Signals that no observer reads; NaN where the log has none. They tell how a shift was and how far an estimate is off.
@@ -124,6 +132,18 @@ impl Log {
     /// # Errors
     /// A signal is missing, or one of the first rows is wrong.
     pub fn of(rows: CsvRows, vehicle: &Vehicle, look: usize) -> Result<Self, TraceError> {
+        Self::with_look_ahead(rows, vehicle, look, LOOK_AHEAD_S)
+    }
+
+    /// The same of rows that are still being written: none waits for those after it.
+    ///
+    /// # Errors
+    /// Those of [`Self::of`].
+    pub fn following(rows: CsvRows, vehicle: &Vehicle, look: usize) -> Result<Self, TraceError> {
+        Self::with_look_ahead(rows, vehicle, look, 0.0)
+    }
+
+    fn with_look_ahead(rows: CsvRows, vehicle: &Vehicle, look: usize, look_ahead_s: f64) -> Result<Self, TraceError> {
         let rows = rows.with_wheel_radius(vehicle.road.wheel_radius_m)?;
         refuse_misnamed_engine(&rows)?;
         let signals = Signals::choose(vehicle, |name| rows.find(name), |name| rows.require(name))?;
@@ -139,6 +159,7 @@ impl Log {
             beside,
             clock: RowClock::default(),
             frozen: FrozenRows::new(),
+            ahead: LookAhead::new(look_ahead_s),
             looked_at,
             median_step_s: f64::NAN,
         };
@@ -179,11 +200,6 @@ impl Log {
         self.median_step_s
     }
 
-    /// How often the clock did not simply go on: resets, and stamps that were far too late.
-    pub fn resets(&self) -> u32 {
-        self.clock.resets()
-    }
-
     /// What was met in the time stamps, the samples and of frozen speeds, in sentences.
     ///
     /// # Errors
@@ -210,27 +226,47 @@ impl Log {
         }
     }
 
-    /// The next row of the file; false at its end.
+    /// The next row, without the readings that rows after it show to be wrong; false at the end.
     fn read(&mut self, input: &mut Input<f64>, row: &mut LogRow) -> Result<bool, TraceError> {
-        let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(false) };
+        loop {
+            if let Some(next) = self.ahead.ready() {
+                return next.map(|next| next.map(|next| (*input, *row) = next).is_some());
+            }
+            match self.read_row() {
+                Ok(Some((next, withdrawn))) => {
+                    self.ahead.push(next.1.time_s, next);
+                    for withdrawn in withdrawn.into_iter().flatten() {
+                        for (input, row) in self.ahead.waiting() {
+                            self.frozen.withdraw(withdrawn, speeds(input), row.time_s);
+                        }
+                    }
+                }
+                Ok(None) => self.ahead.end(None),
+                Err(error) => self.ahead.end(Some(error)),
+            }
+        }
+    }
+
+    /// The next row of the file, and the readings that it shows to be wrong; `None` at its end.
+    fn read_row(&mut self) -> Result<Option<(InputRow, AllWithdrawn)>, TraceError> {
+        let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
         let rows = &self.rows;
-        let Ok(signals) = self.signals.input(dt_s, |column| Ok::<f64, Infallible>(self.samples.number(rows, column)));
-        *input = signals;
-        let Input { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = input;
-        self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
-        row.time_s = time_s;
-        row.truth = match self.truth {
-            None => None,
-            Some(columns) => columns.of(rows)?,
-        };
+        let Ok(mut input) = self.signals.input(dt_s, |column| Ok::<f64, Infallible>(self.samples.number(rows, column)));
+        let truth = self.truth.map(|columns| columns.of(rows)).transpose()?.flatten();
         // A word in a signal that is not needed is no error.
-        if let Some(columns) = self.beside {
+        let beside = self.beside.map_or(Beside::NONE, |columns| {
             let [pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2] =
                 columns.map(|column| column.and_then(|column| rows.number(column).ok()).unwrap_or(f64::NAN));
-            row.beside = Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 };
-        }
-        Ok(true)
+            Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 }
+        });
+        let withdrawn = self.frozen.take_out(speeds(&mut input), time_s);
+        Ok(Some(((input, LogRow { time_s, resets: self.clock.resets(), truth, beside }), withdrawn)))
     }
+}
+
+fn speeds(input: &mut Input<f64>) -> SpeedReadings<'_> {
+    let Input { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = input;
+    [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s]
 }
 
 impl Iterator for Log {

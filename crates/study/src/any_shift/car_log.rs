@@ -7,6 +7,7 @@
 
 use car::Car;
 use car::columns::{command_age, element_commands, element_pressures, pressure_command_column};
+use logs::{LOOK_AHEAD_S, LookAhead};
 use observer::Reading;
 use observer::ShiftTables;
 use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
@@ -17,7 +18,7 @@ pub use evaluate::LogStep;
 
 use super::gear_signal::Gears;
 use super::pressure_command::command_for;
-use crate::frozen_rows::FrozenRows;
+use crate::frozen_rows::{AllWithdrawn, FrozenRows, SpeedReadings};
 use crate::row_clock::{RowClock, RowTime};
 use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
@@ -122,6 +123,8 @@ pub struct CarLog<'c> {
     frozen: FrozenRows,
     samples: RowSamples,
     gears: Gears,
+    /// Rows that may still be shown to have a wrong speed.
+    ahead: LookAhead<LogStep, TraceError>,
 }
 
 impl<'c> CarLog<'c> {
@@ -135,7 +138,13 @@ impl<'c> CarLog<'c> {
         let columns = Columns::of(&rows, car, tables)?;
         let (clock, frozen, samples) = (RowClock::default(), FrozenRows::new(), RowSamples::new(&rows));
         let gears = Gears::new([signal::GEAR, signal::TARGET_GEAR]);
-        Ok(Self { car, columns, rows, clock, frozen, samples, gears })
+        Ok(Self { car, columns, rows, clock, frozen, samples, gears, ahead: LookAhead::new(LOOK_AHEAD_S) })
+    }
+
+    /// A log that is still being written: no row waits for those after it.
+    #[must_use]
+    pub fn following(self) -> Self {
+        Self { ahead: LookAhead::new(0.0), ..self }
     }
 
     /// What was met in the time stamps, the samples, the gears and of frozen speeds, in sentences.
@@ -189,11 +198,32 @@ impl<'c> CarLog<'c> {
         self.rows.find(name).is_none_or(|column| self.rows.factor(column) == 1.0)
     }
 
-    /// The next row; `None` at the end.
+    /// The next row, without the readings that rows after it show to be wrong; `None` at the end.
     ///
     /// # Errors
     /// The file cannot be read, or a time is no number.
     pub fn next_step(&mut self) -> Result<Option<LogStep>, TraceError> {
+        loop {
+            if let Some(next) = self.ahead.ready() {
+                return next;
+            }
+            match self.read_step() {
+                Ok(Some((step, withdrawn))) => {
+                    self.ahead.push(step.time_s, step);
+                    for withdrawn in withdrawn.into_iter().flatten() {
+                        for step in self.ahead.waiting() {
+                            self.frozen.withdraw(withdrawn, speeds(&mut step.input), step.time_s);
+                        }
+                    }
+                }
+                Ok(None) => self.ahead.end(None),
+                Err(error) => self.ahead.end(Some(error)),
+            }
+        }
+    }
+
+    /// The next row of the file, and the readings that it shows to be wrong; `None` at its end.
+    fn read_step(&mut self) -> Result<Option<(LogStep, AllWithdrawn)>, TraceError> {
         let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
         self.take_gears();
         let (rows, columns, samples) = (&self.rows, &self.columns, &self.samples);
@@ -231,9 +261,9 @@ impl<'c> CarLog<'c> {
         };
         let pedals = columns.pedals.map(number);
         let oil_degc = Some(number(columns.oil)).filter(|degc| !degc.is_nan());
-        let ShiftInput { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
-        self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
-        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, oil_degc, reported_n_m, speed_m_s, pressures, truth }))
+        let withdrawn = self.frozen.take_out(speeds(&mut input), time_s);
+        let step = LogStep { time_s, input, pedals, vehicle_m_s, oil_degc, reported_n_m, speed_m_s, pressures, truth };
+        Ok(Some((step, withdrawn)))
     }
 
     /// Takes the cells of `gear` and `target_gear`; an empty one says nothing new.
@@ -256,4 +286,9 @@ impl<'c> CarLog<'c> {
     fn gear_names(&self) -> String {
         self.car.gearbox.gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ")
     }
+}
+
+fn speeds(input: &mut ShiftInput<f64>) -> SpeedReadings<'_> {
+    let ShiftInput { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = input;
+    [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s]
 }

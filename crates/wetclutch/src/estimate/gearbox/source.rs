@@ -70,7 +70,8 @@ impl<'a> CarSource<'a> {
         if map.channels.is_empty() && (log.is_stream() || !logs::needs_map(path)?) {
             warn_of_dbc(map, say);
             let rows = CsvRows::of_log(path, log.reader(stop)?).map_err(|error| other_delimiter(path, error))?;
-            let kind = SourceKind::Rows(Box::new(CarLog::of(rows, car, tables)?));
+            let rows = CarLog::of(rows, car, tables)?;
+            let kind = SourceKind::Rows(Box::new(if is_followed { rows.following() } else { rows }));
             return Self::looking_ahead(kind, [OnChange::default(); MAX_ELEMENTS], reading, is_followed);
         }
         let log = log.open(stop, threads)?;

@@ -180,7 +180,8 @@ impl<'a> Measured<'a> {
         let look = if stop.is_some() { FOLLOWED_LOOK } else { FIRST_LOOK };
         let rows = CsvRows::of_log(path, input.reader(stop)?).map_err(|error| other_delimiter(path, error))?;
         let mut watched = watched(&rows, vehicle, look);
-        let log = study::log::Log::of(rows, vehicle, look)?;
+        let open = if stop.is_some() { study::log::Log::following } else { study::log::Log::of };
+        let log = open(rows, vehicle, look)?;
         log.looked_at().for_each(|(input, _)| watched.push(values(input)));
         check_step(path, log.median_step_s(), false)?;
         watched.check(Seen::Beginning)?;
@@ -442,7 +443,7 @@ impl Rows {
             Some(ahead) => self.ahead = ahead,
             None => self.watched.push(values(&step.input)),
         }
-        let resets = self.log.resets();
+        let resets = self.row.resets;
         each_reading(&step.input, &self.row, |reading| see(resets, reading));
         step.take_row(&self.row, resets);
         Ok(true)

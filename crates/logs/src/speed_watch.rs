@@ -1,0 +1,80 @@
+//! What each reading of a speed is worth, and which of those before it are not.
+
+use crate::copies::Copies;
+use crate::frozen::{FrozenSpeed, NO_SPEEDS, SPEEDS, Speeds};
+use crate::held::HeldSpeed;
+use crate::{Quality, Role, SpeedFaults};
+
+/// Readings of a speed that were taken as good and are not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Withdrawn {
+    /// The speed.
+    pub role: Role,
+    /// They came after this time, s.
+    pub after_s: f64,
+    /// Why they are refused.
+    pub quality: Quality,
+}
+
+/// A reading to be judged.
+#[derive(Debug, Clone, Copy)]
+pub struct SpeedReading {
+    /// The speed.
+    pub role: Role,
+    /// Its value, rad/s, or m/s of the car.
+    pub value: f64,
+    /// When it was measured, s.
+    pub time_s: f64,
+    /// Whether a table may hold it until the next one comes: it has no age of its own.
+    pub may_be_held: bool,
+}
+
+/// Watches the speeds of a log by the rules of [`crate::speed_faults`], [`crate::frozen`], [`crate::held`], and of channels that show another one.
+#[derive(Debug, Clone, Copy)]
+pub struct SpeedWatch {
+    speeds: [(FrozenSpeed, HeldSpeed); SPEEDS],
+    faults: SpeedFaults,
+    copies: Copies,
+    newest: Speeds,
+}
+
+impl SpeedWatch {
+    /// Before the first readings.
+    pub fn new() -> Self {
+        Self {
+            speeds: Role::SPEEDS.map(|role| (FrozenSpeed::new(role), HeldSpeed::new())),
+            faults: SpeedFaults::new(),
+            copies: Copies::new(),
+            newest: NO_SPEEDS,
+        }
+    }
+
+    /// What the next reading is worth, and which are refused because of it: of its speed or of another one, itself included.
+    pub fn judge(&mut self, reading: SpeedReading) -> (Quality, Option<Withdrawn>) {
+        let SpeedReading { role, value, time_s, may_be_held } = reading;
+        let Some((frozen, held)) = self.speeds.get_mut(role as usize) else { return (Quality::Good, None) };
+        if self.faults.is_fault(role, value, time_s) {
+            return (Quality::Impossible, None);
+        }
+        let was_frozen = frozen.is_known();
+        let is_frozen = frozen.is_frozen(value, time_s, &self.newest);
+        let is_held = may_be_held && held.is_held(value);
+        if is_frozen && let Some([value, after_s]) = frozen.still() {
+            self.faults.disbelieve_after(role, value, after_s);
+            let withdrawn = Withdrawn { role, after_s, quality: Quality::Frozen };
+            return (Quality::Frozen, Some(withdrawn).filter(|_| !was_frozen));
+        }
+        self.newest[role as usize] = value;
+        let copy = self.copies.push(role, [value, time_s]).map(|(role, [value, after_s])| {
+            self.faults.disbelieve_after(role, value, after_s);
+            Withdrawn { role, after_s, quality: Quality::Impossible }
+        });
+        (if is_held { Quality::Held } else { Quality::Good }, copy)
+    }
+}
+
+impl Default for SpeedWatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
