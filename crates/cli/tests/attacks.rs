@@ -76,7 +76,7 @@ fn an_output_that_cannot_be_is_answered() {
         (&["-o", &out("x.mf4"), "--format", "csv"], "the name is not that of a file in --format csv"),
         (&["--format", "mf4"], "--format mf4 needs a file"),
         (
-            &["-o", &out("x.csv"), "--sensors", "nowhere.toml", "--observer", "rigid"],
+            &["-o", &out("x.csv"), "--sensors", &format!("{ROOT}experiments/bench.toml"), "--observer", "rigid"],
             "--sensors has no effect with this observer",
         ),
     ];

@@ -81,7 +81,9 @@ fn with_others_of_its_file(
         return vec![error];
     }
     let errors = errors_of(&named, read, before);
-    if errors.is_empty() { vec![error] } else { errors }
+    // The reader may be one of files of this kind alone.
+    let is_other_kind = errors.iter().any(|error| matches!(Wrong::of(error), Wrong::Kind));
+    if errors.is_empty() || is_other_kind { vec![error] } else { errors }
 }
 
 /// The errors with one guess, and whether the reader came to the end.
