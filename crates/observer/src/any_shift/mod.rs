@@ -16,7 +16,8 @@
 //!
 //! Both clutches of a shift have the same equations, from [`GearboxTables`]; nothing is written for the oncoming one. A
 //! clutch that slips has the torque of its valve model, corrected by `f` and `x`; one that holds has the torque that this
-//! takes. A one-way clutch holds any torque in one direction, and none in the other. Which of them hold, the measured slip decides ([`ShiftPhase`]). The shift command may change at any time: what
+//! takes. A one-way clutch holds any torque in one direction, and none in the other. Which of them hold, the measured slip decides ([`ShiftPhase`]);
+//! while that may be a wrong reading, the filter goes on for both cases ([`doubt`]). Where the speeds are noisier than stated, it takes them so ([`noise`]). The shift command may change at any time: what
 //! is known of an element that takes part in both shifts is kept, and nothing begins anew. The valve models of all
 //! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; the
 //! time is estimated by nine piston models for each element, each with its probability.
@@ -30,12 +31,14 @@ mod at_turbine;
 mod begin;
 mod correct;
 mod covariance;
+mod doubt;
 mod elements;
 mod estimate;
 mod held;
 mod input_clutch;
 mod learnt;
 mod newest;
+mod noise;
 mod phases;
 mod pistons;
 mod powertrain;
@@ -56,9 +59,11 @@ use crate::kalman::engine::Engine;
 use crate::kalman::gate::{Gate, Verdict};
 use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, LOST_S, Reading, SpeedReading};
 use covariance::{Gaussian, Measured};
+use doubt::Moment;
 use elements::ElementState;
 use learnt::{ACTING, Acting, Correlations, Known, STATES_ACTING};
 use newest::Newest;
+use noise::ReadingNoise;
 use phases::{Contact, PhaseMemory, Slip};
 use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, output_rate, tied};
 use reported::Compared;
@@ -202,9 +207,12 @@ pub struct AnyShiftState<T> {
     reported: Option<(T, T)>,
     /// The newest readings of turbine, output and wheel.
     newest: [Option<Newest<T>>; SPEEDS],
+    noise: ReadingNoise<T>,
     /// Whether a wheel speed ever came: a car without one has not lost it.
     wheel_came: bool,
     running: Option<Running<T>>,
+    /// The same where the clutch that holds has begun to slip, until it is known whether it has.
+    slipping: Option<Running<T>>,
     /// Whether it has run before and lost its state.
     lost: bool,
     /// Samples in a row in which the gear did not fit the speeds.
@@ -292,8 +300,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             engine: None,
             reported: None,
             newest: [None; SPEEDS],
+            noise: ReadingNoise::stated(),
             wheel_came: false,
             running: None,
+            slipping: None,
             lost: false,
             unfit: 0,
             slips: false,
@@ -308,6 +318,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Takes what came since the step before and returns the estimate for now. Never panics; allocates nothing.
     pub fn step(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
+        let factor = state.noise.factor();
+        if factor > T::one() { self.noisier(factor).step_as_is(state, input) } else { self.step_as_is(state, input) }
+    }
+
+    /// The step with the noise of the readings as it stands in the filter.
+    fn step_as_is(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
         let dt_s = if state.started { input.dt_s } else { T::zero() };
         if !(dt_s >= T::zero() && dt_s.is_finite()) {
             self.reject_time(state);
@@ -330,6 +346,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         channels.engine_torque = self.take_reported(state, input, dt_s);
         channels.engine = self.take_engine(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);
+        self.take_noise(state, input);
         health = health.max(self.take_gear(state, input.gear));
         let side = self.input_side(state, input);
         let torque = side.as_ref().and_then(|side| self.turbine.at(side));
@@ -339,11 +356,17 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             running.compared.step(&self.turbine, side.as_ref().filter(|_| running.shift.is_none()), dt_s);
             match &torque {
                 Some(torque) => {
-                    let speeds = self.measured(&state.newest, Some(running));
-                    let same_s = state.engine.and_then(|engine| engine.same_error_s());
-                    self.advance(running, &state.elements, (torque, same_s), speeds, dt_s);
+                    let moment = Moment {
+                        elements: &state.elements,
+                        newest: &state.newest,
+                        torque,
+                        same_s: state.engine.and_then(|engine| engine.same_error_s()),
+                        input,
+                        channels,
+                        dt_s,
+                    };
                     [channels.turbine, channels.output, channels.wheel] =
-                        self.take_speeds(running, input, &channels, speeds);
+                        self.go_on(running, &mut state.slipping, &moment);
                 }
                 None => state.lose(),
             }
@@ -360,6 +383,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     fn reject_time(&self, state: &mut AnyShiftState<T>) {
         state.lose();
         state.newest = [None; SPEEDS];
+        state.noise.pause();
         state.engine = None;
         state.reported = None;
         for (memory, element) in state.elements.iter_mut().zip(self.tables.elements) {
@@ -452,5 +476,6 @@ impl<T: Real> AnyShiftState<T> {
     /// Ends the filter. What a shift has shown up to then is not learnt: it is not known what went wrong.
     fn lose(&mut self) {
         self.lost = self.lost || self.running.take().is_some();
+        self.slipping = None;
     }
 }

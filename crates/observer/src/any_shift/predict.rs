@@ -65,7 +65,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         running: &mut Running<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         (torque, same_s): (&turbine::Found<T>, Option<T>),
-        speeds: [T; 2],
+        (speeds, read): ([T; 2], [bool; 2]),
         dt_s: T,
     ) {
         let share = dt_s / (dt_s + T::of(SHARE_S));
@@ -90,7 +90,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         for silent_s in &mut running.silent_s {
             *silent_s = *silent_s + dt_s;
         }
-        self.find_phase(running, elements, &now, speeds);
+        self.find_phase(running, elements, &now, (speeds, read));
         // The phase may have changed the direction of a torque.
         running.torques = Some(self.torques(running, elements, torque, speeds));
     }
@@ -165,7 +165,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         running: &mut Running<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         torques: &Torques<T>,
-        speeds: [T; 2],
+        (speeds, read): ([T; 2], [bool; 2]),
     ) {
         let Some(shift) = running.shift else { return };
         let holding = running.phase.phase.holding();
@@ -190,16 +190,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         };
         let contacts = [contact(0), contact(1)];
         let before = running.phase.phase;
-        running.phase.step(&contacts);
+        running.phase.step(&contacts, read);
         let after = running.phase.phase;
         if before == after {
             return;
         }
         if let Some(held) = before.holding() {
-            // The slip has begun unseen.
-            let (y, ratio) = (contacts[held.min(1)].slip.value, shift.clutches[held.min(1)].ratio);
-            running.x.add(TURBINE, TURBINE, y * y);
-            running.x.add(OUTPUT, OUTPUT, square(y / ratio));
+            Self::untie(running, shift.clutches[held.min(1)].ratio, contacts[held.min(1)].slip.value);
         }
         if let Some(held) = after.holding() {
             let held = held.min(1);
@@ -220,6 +217,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let direction = torques.clutches[held.min(1)].per_friction_n_m.signum();
         let (_, probability) = positive_part(direction * running.x.value(&slip), running.x.variance(&slip));
         direction * probability
+    }
+
+    /// The speeds of a clutch that held and whose slip, rad/s, has begun unseen.
+    pub(super) fn untie(running: &mut Running<T>, ratio: T, slip: T) {
+        running.x.add(TURBINE, TURBINE, slip * slip);
+        running.x.add(OUTPUT, OUTPUT, square(slip / ratio));
     }
 
     /// A clutch that grips ties both speeds with its ratio `i`. Its impulse acts between them, so that what is kept is the

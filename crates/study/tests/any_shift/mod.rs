@@ -14,12 +14,14 @@ mod input_clutch;
 mod learning;
 mod learnt_coverage;
 mod limits;
+mod noise;
 mod one_way;
 mod ratios_alone;
 mod sensitivity;
 mod strokes;
 mod valve_timing;
 mod wheel;
+mod wrong_readings;
 
 use car::Car;
 use cars::{cars, sensors};
