@@ -185,6 +185,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// Lowest and highest pressure of an element by its command alone, Pa, for errors within the budget, by its place in
     /// [`super::GearboxTables::elements`]; in a gear as in a shift. `None` if there is no such element, or no budget of it.
     pub fn pressure_range_pa(&self, state: &AnyShiftState<T>, at: usize) -> Option<[T; 2]> {
+        match self.longest_delay_s() {
+            Some(_) => state.late.pressure_range_pa.get(at).copied().flatten(),
+            None => self.range_of_element(state, at),
+        }
+    }
+
+    /// The same at the time of the state.
+    pub(super) fn range_of_element(&self, state: &AnyShiftState<T>, at: usize) -> Option<[T; 2]> {
         self.element(&state.elements, at).and_then(|(memory, element)| memory.pressure_range_pa(element))
     }
 

@@ -17,7 +17,7 @@
 //! Both clutches of a shift have the same equations, from [`GearboxTables`]; nothing is written for the oncoming one. A
 //! clutch that slips has the torque of its valve model, corrected by `f` and `x`; one that holds has the torque that this
 //! takes. A one-way clutch holds any torque in one direction, and none in the other. Which of them hold, the measured slip decides ([`ShiftPhase`]);
-//! while that may be a wrong reading, the filter goes on for both cases ([`doubt`]). Where the speeds are noisier than stated, it takes them so ([`noise`]). The shift command may change at any time: what
+//! while that may be a wrong reading, the filter goes on for both cases (`doubt.rs`). Where the speeds are noisier than stated, it takes them so (`noise.rs`). The shift command may change at any time: what
 //! is known of an element that takes part in both shifts is kept, and nothing begins anew. The valve models of all
 //! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; the
 //! time is estimated by nine piston models for each element, each with its probability.
@@ -36,6 +36,7 @@ mod elements;
 mod estimate;
 mod held;
 mod input_clutch;
+mod late;
 mod learnt;
 mod newest;
 mod noise;
@@ -61,6 +62,7 @@ use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, LOST_S, R
 use covariance::{Gaussian, Measured};
 use doubt::Moment;
 use elements::ElementState;
+use late::Late;
 use learnt::{ACTING, Acting, Correlations, Known, STATES_ACTING};
 use newest::Newest;
 use noise::ReadingNoise;
@@ -208,6 +210,8 @@ pub struct AnyShiftState<T> {
     /// The newest readings of turbine, output and wheel.
     newest: [Option<Newest<T>>; SPEEDS],
     noise: ReadingNoise<T>,
+    /// The steps whose readings are late, if the readings are.
+    late: Late<T>,
     /// Whether a wheel speed ever came: a car without one has not lost it.
     wheel_came: bool,
     running: Option<Running<T>>,
@@ -301,6 +305,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             reported: None,
             newest: [None; SPEEDS],
             noise: ReadingNoise::stated(),
+            late: Late::nothing(),
             wheel_came: false,
             running: None,
             slipping: None,
@@ -318,6 +323,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Takes what came since the step before and returns the estimate for now. Never panics; allocates nothing.
     pub fn step(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
+        match self.longest_delay_s() {
+            Some(longest_s) => self.step_late(state, input, longest_s),
+            None => self.step_on_time(state, input),
+        }
+    }
+
+    /// The step with the noise of the readings as it was found.
+    fn step_on_time(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
         let factor = state.noise.factor();
         if factor > T::one() { self.noisier(factor).step_as_is(state, input) } else { self.step_as_is(state, input) }
     }

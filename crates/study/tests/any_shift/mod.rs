@@ -11,6 +11,7 @@ mod drives;
 mod engine_torque;
 mod holes;
 mod input_clutch;
+mod late;
 mod learning;
 mod learnt_coverage;
 mod limits;
