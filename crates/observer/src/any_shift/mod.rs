@@ -361,7 +361,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         self.take_newest(state, input, dt_s, &mut channels);
         self.take_noise(state, input);
         health = health.max(self.take_gear(state, input.gear));
-        let side = self.input_side(state, input);
+        let side = self.input_side(state, input, dt_s);
         let torque = side.as_ref().and_then(|side| self.turbine.at(side));
         let input_clutch = side.as_ref().and_then(|side| self.input_clutch(state, input, side));
         let at_turbine = torque.as_ref().and_then(|torque| self.at_turbine(state, input.gear, torque));
