@@ -120,7 +120,6 @@ impl CarStudy {
         let check = Check::of(&source);
         let of_drive = drive.as_ref().and_then(|drive| drive.sensors);
         let own = raw.sensors.as_ref().map(|raw| sensors(&check, "sensors", raw, None)).transpose()?;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number within its range")]
         let runs = check.count("runs", &raw.runs, 1.0..=MOST_RUNS)? as u64;
         Ok(Self {
             name: check.name("name", raw.name.get_ref(), raw.name.span().start)?,

@@ -75,7 +75,6 @@ impl DriveFile {
                 return Err(check.meaning("segment", at, message, Some(hint)));
             }
         };
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number within its range")]
         let repetitions = match &raw.repetitions {
             Some(count) => check.count("repetitions", count, 1.0..=MOST_REPETITIONS)? as u32,
             None => 1,

@@ -83,7 +83,6 @@ pub fn toml_number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value:.1}");
     }
-    #[expect(clippy::cast_possible_truncation, reason = "the exponent of a number is small")]
     let exponent = Real::log10(value.abs()).floor() as i32;
     if (-3..6).contains(&exponent) {
         let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);

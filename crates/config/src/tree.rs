@@ -160,7 +160,6 @@ impl Value {
                     _ => return Err("a switch is 0 (off) or 1 (on)".to_owned()),
                 }
             }
-            #[expect(clippy::cast_precision_loss, reason = "a number that a person wrote")]
             Self::Integer(old) => *self = Self::Float(new(*old as f64)),
             Self::List(list) if change != Change::Set => {
                 return list.iter_mut().try_for_each(|item| item.value.apply(change, value));

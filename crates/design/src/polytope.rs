@@ -62,7 +62,7 @@ pub(crate) fn slowest_valve(model: &RigidModel<f64>, uncertainty: &Uncertainty) 
     valve_extremes(model, uncertainty).into_iter().map(|(_, a22_per_s)| a22_per_s).fold(f64::NEG_INFINITY, f64::max)
 }
 
-#[expect(clippy::float_cmp, reason = "a range written as one number twice is one vertex")]
+// A range written as one number twice is one vertex.
 pub(crate) fn distinct((least, greatest): (f64, f64)) -> Vec<f64> {
     if least == greatest { vec![least] } else { vec![least, greatest] }
 }

@@ -43,7 +43,6 @@ fn assert_single_follows_double(double: &impl Estimator<f64>, single: &impl Esti
         let dt = if n == 1 { 10.0 } else { 0.01 };
         let wheel_rad_s = (car.speeds[0] - 0.6 * car.speeds[1]) / 3.0;
         let x = Sample { wheel_rad_s, ..input(dt, car.speeds[0], car.speeds[1], car.command) };
-        #[expect(clippy::cast_possible_truncation, reason = "single precision is what is tested")]
         let y = Sample {
             dt_s: x.dt_s as f32,
             engine_rad_s: x.engine_rad_s as f32,

@@ -158,7 +158,6 @@ fn second_derivative(points: &[(f64, f64)]) -> Option<f64> {
 /// are as far from it have the same one.
 fn even_second_derivative(points: &[(f64, f64)]) -> Option<f64> {
     let ((first_s, _), (last_s, _)) = (*points.first()?, *points.last()?);
-    #[expect(clippy::cast_precision_loss, reason = "a small count")]
     let count = points.len() as f64;
     let squares = count * count - 1.0;
     let mean = squares / 3.0;

@@ -194,7 +194,7 @@ macro_rules! real {
             }
 
             #[inline]
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounding down is the purpose")]
+            // Rounding down is the purpose.
             fn whole(self) -> usize {
                 // Through i32, for which processors have an instruction; tables have few bins.
                 self as i32 as usize
@@ -308,7 +308,7 @@ real!(f64, |value| value, |value| value, {
     erfc() = erfc;
 });
 
-#[expect(clippy::cast_possible_truncation, reason = "rounding to the controller's precision is the purpose")]
+// Rounding to the controller's precision is the purpose.
 const fn single(value: f64) -> f32 {
     value as f32
 }

@@ -97,7 +97,6 @@ impl<T: Real, const N: usize> Axis<T, N> {
     }
 
     /// The axis of these points, which are known to rise.
-    #[expect(clippy::cast_precision_loss, reason = "the number of bins is small")]
     fn with_bins(mut points: [T; N], len: usize) -> Self {
         let (first, last) = (points[0], points[len - 1]);
         points[len..].fill(T::infinity());

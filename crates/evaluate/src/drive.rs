@@ -97,7 +97,6 @@ impl ScoredShift {
     }
 
     /// Share of the pressures and torques of both clutches that lie within their guaranteed ranges; `None` without estimates.
-    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn inside(&self) -> Option<f64> {
         let [all, inside] = self.summary.clutches();
         self.is_estimated().then(|| inside as f64 / all as f64)
@@ -105,7 +104,6 @@ impl ScoredShift {
 
     /// Share of the rows of both phases in which the speeds show nothing of the controlling clutch's torque while it slips; `None`
     /// where there are none.
-    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn hidden(&self) -> Option<f64> {
         let [slipping, hidden] = self.summary.hidden;
         (slipping > 0).then(|| hidden as f64 / slipping as f64)
@@ -132,7 +130,6 @@ impl ScoredShift {
     }
 
     /// The worst health and its share of the rows; `None` without estimates.
-    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn worst_health(&self) -> Option<(Health, f64)> {
         let worst = Health::ALL.into_iter().filter(|health| self.summary.rows_with(*health) > 0).max()?;
         Some((worst, self.summary.rows_with(worst) as f64 / self.summary.counts.rows as f64))

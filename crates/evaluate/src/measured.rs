@@ -98,7 +98,6 @@ impl<'s> SensedDrive<'s> {
         };
         let commands = element_commands(car).into_iter().filter(|_| sensors.current.is_some());
         let currents = commands.filter(|(at, _)| is_current(*at)).map(|(at, name)| (at, recorded(&name)));
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small and not negative")]
         let (every, first) = (every as usize, (sensors.row_offset_s / record_s).round() as usize);
         Self {
             sensors,
@@ -117,7 +116,6 @@ impl<'s> SensedDrive<'s> {
 
     /// Time between two samples that [`Self::push`] takes, s.
     pub fn record_s(&self) -> f64 {
-        #[expect(clippy::cast_precision_loss, reason = "small")]
         let every = self.every as f64;
         self.row_s / every
     }

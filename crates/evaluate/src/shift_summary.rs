@@ -147,7 +147,6 @@ fn hidden(rows: &[ShiftScoreRow], clutch: usize) -> [u64; 2] {
         .fold([0; 2], |[all, hidden], clutch| [all + 1, hidden + u64::from(clutch.hidden)])
 }
 
-#[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
 fn mean(rows: &[ShiftScoreRow], clutch: usize, of: impl Fn(&ClutchRow) -> (f64, Option<[f64; 2]>)) -> Option<[f64; 3]> {
     let (mut sum, mut count) = ([0.0; 3], 0_usize);
     let inertia = |row: &&ShiftScoreRow| row.at_turbine_n_m.is_none() && row.phase() == Some(TruePhase::Inertia);
@@ -160,7 +159,6 @@ fn mean(rows: &[ShiftScoreRow], clutch: usize, of: impl Fn(&ClutchRow) -> (f64, 
     (count > 0).then(|| sum.map(|sum| sum / count as f64))
 }
 
-#[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
 fn mean_at_turbine(rows: &[ShiftScoreRow]) -> Option<[f64; 2]> {
     let inertia = rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia));
     let torques: Vec<[f64; 2]> = inertia.filter_map(|row| row.at_turbine_n_m).collect();

@@ -16,7 +16,6 @@ pub const BY_EACH: usize = 18;
 pub(crate) type Measures = [f64; 3];
 
 /// The measures of a shift of this kind with these rows.
-#[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
 pub(crate) fn measures(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Measures {
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, count) =

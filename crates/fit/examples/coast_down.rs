@@ -42,7 +42,6 @@ fn coasted(load: &RoadLoad<f64>, grades: &[f64], is_back: bool, wind_m_s: f64, r
     while speed > SPEEDS_M_S[1] {
         let noise: f64 = StandardNormal.sample(random);
         read.push(speed + load.wheel_radius_m * NOISE_RAD_S * noise);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "metres of a road")]
         let at = (way_m as usize).min(grades.len() - 1);
         let grade = if is_back { -grades[grades.len() - 1 - at] } else { grades[at] };
         let force = load.rolling_moment_n_m / load.wheel_radius_m + load.drag_force(speed + wind_m_s);
@@ -78,7 +77,6 @@ fn errors(load: &RoadLoad<f64>, is_other: Option<bool>, of: [f64; 3], random: &m
         if let Some(is_back) = is_other {
             // Back over the same part of the road.
             let way_m: f64 = drives[0].iter().map(|speed| STEP_S * speed).sum();
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "metres of a road")]
             let part = &grades[..(way_m as usize).clamp(1, grades.len())];
             drives.push(coasted(load, part, is_back, if is_back { -wind } else { wind }, random));
         }

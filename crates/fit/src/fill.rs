@@ -182,7 +182,6 @@ impl FillLog<'_> {
         of.scale_preload(preload);
         of.scale_stroke(Real::exp(log_volume));
         let begin_s = self.readings().next().map_or(self.until_s, |(time_s, _)| time_s) - filling.sensor_late_s;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over milliseconds")]
         let points = ((self.until_s - begin_s).max(0.0) / STEP_S) as usize + 2;
         let grid = Grid { begin_s, step_s: STEP_S, points };
         let computed = pressures(&of, filling.late_s, self.commands, grid);

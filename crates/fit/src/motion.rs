@@ -199,7 +199,6 @@ impl Motion {
     /// The step that a time lies in, and how far in it, in steps.
     fn place(&self, points: usize, time_s: f64) -> (usize, f64) {
         let steps = (time_s - self.begin_s) / STEP_S;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the points")]
         let i = (steps.max(0.0) as usize).min(points.saturating_sub(2));
         (i, steps - i as f64)
     }

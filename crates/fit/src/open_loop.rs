@@ -24,7 +24,6 @@ pub fn open_loop(vehicle: &Vehicle, record: &ShiftRecord) -> Vec<OpenLoop> {
     let car = Car::of_file(vehicle, ReadingAges::default());
     let begin_s = record.oncoming.time_s.first().copied().unwrap_or(0.0);
     let end_s = record.oncoming.time_s.last().copied().unwrap_or(0.0);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over milliseconds")]
     let points = ((end_s - begin_s) / STEP_S) as usize + 1;
     let grid = Grid { begin_s, step_s: STEP_S, points };
     let pressure = pressures(&Hydraulics::of(&vehicle.oncoming), 0.0, &record.oncoming, grid);

@@ -77,7 +77,6 @@ impl Grid {
     /// The value at a time between the points, by the line through the two next to it.
     pub(crate) fn at(&self, values: &[f64], time_s: f64) -> f64 {
         let place = (time_s - self.begin_s) / self.step_s;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
         let before = (place.max(0.0) as usize).min(values.len().saturating_sub(2));
         values[before] + (place - before as f64) * (values[before + 1] - values[before])
     }

@@ -110,7 +110,6 @@ impl ShiftModel {
         let begin_s = segments.iter().map(|segment| segment.span_s[0]).fold(f64::INFINITY, f64::min);
         let end_s = segments.iter().map(|segment| segment.span_s[1]).fold(f64::NEG_INFINITY, f64::max);
         let steps = |span_s: f64| {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over milliseconds")]
             let steps = (span_s / STEP_S).round().max(0.0) as usize;
             steps
         };
@@ -331,7 +330,6 @@ impl ShiftModel {
     /// A value between the half steps.
     pub(crate) fn on_grid(&self, values: &[f64], time_s: f64) -> f64 {
         let steps = ((time_s - self.half_steps.begin_s) / self.half_steps.step_s).max(0.0);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the points")]
         let i = (steps as usize).min(values.len().saturating_sub(2));
         let share = (steps - i as f64).min(1.0);
         values[i] + share * (values[i + 1] - values[i])

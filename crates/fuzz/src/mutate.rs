@@ -19,13 +19,11 @@ impl Random {
     }
 
     /// A number below `end`; 0 if there is none.
-    #[expect(clippy::cast_possible_truncation, reason = "it is below `end`")]
     pub fn below(&mut self, end: usize) -> usize {
         (self.bits() % (end.max(1) as u64)) as usize
     }
 
     /// A number from 0 to 1.
-    #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
     pub fn share(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -188,7 +186,7 @@ fn insert(text: &mut Vec<u8>, random: &mut Random) {
     text.splice(at..at, random.of(&BYTES).iter().copied());
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "any byte will do")]
+// Any byte will do.
 fn change_byte(text: &mut [u8], random: &mut Random) {
     let at = random.below(text.len());
     if let Some(byte) = text.get_mut(at) {

@@ -110,7 +110,7 @@ fn doubles(input: &[u8]) -> impl Iterator<Item = Input<f64>> {
 }
 
 /// The same samples rounded; of every other one that is no plausible number, the lower half of its bits.
-#[expect(clippy::cast_possible_truncation, reason = "rounding and halves of bits are the purpose")]
+// Rounding and halves of bits are the purpose.
 fn singles(input: &[u8]) -> impl Iterator<Item = Input<f32>> {
     let single = |bits: u64| {
         let double = f64::from_bits(bits);

@@ -14,7 +14,6 @@ pub(crate) fn size(n: c_int) -> usize {
 
 /// Whether an option character is the given letter, in either case.
 pub(crate) fn is(option: c_char, letter: u8) -> bool {
-    #[expect(clippy::cast_sign_loss, reason = "option characters are ASCII letters")]
     let given = option as u8;
     given.eq_ignore_ascii_case(&letter)
 }

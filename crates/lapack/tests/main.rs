@@ -10,7 +10,6 @@ use nalgebra::DMatrix;
 const N: i32 = 5;
 const ORDER: usize = 5;
 
-#[expect(clippy::cast_possible_wrap, reason = "ASCII letters")]
 fn letter(option: u8) -> *const i8 {
     Box::leak(Box::new(option as i8))
 }

@@ -447,7 +447,6 @@ fn numbers(column: &mut ColumnReader, form: Form, rows: usize, numbers: &mut Vec
         numbers.extend(levels.iter().map(|level| next(level).unwrap_or(f64::NAN)));
         Ok(())
     }
-    #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
     match (column, form) {
         (ColumnReader::BoolColumnReader(column), _) => read(column, rows, numbers, |value| f64::from(u8::from(*value))),
         (ColumnReader::Int32ColumnReader(column), Form::Unsigned) => {

@@ -55,7 +55,6 @@ impl Extremes {
         self.least = self.least.min(value);
         self.greatest = self.greatest.max(value);
         if value != 0.0 {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the table")]
             let size = ((Real::log2(value.abs()) + 32.0) * PARTS as f64).clamp(0.0, (SIZES - 1) as f64) as usize;
             self.sizes[size] = self.sizes[size].saturating_add(1);
         }

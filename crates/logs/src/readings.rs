@@ -253,7 +253,6 @@ impl<'a> Readings<'a> {
                 return None;
             }
             channels.parts.fill(None);
-            #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
             let divisor = if entry.combine == Combine::Mean { known.len() as f64 } else { 1.0 };
             value = known.iter().sum::<f64>() / divisor;
         }

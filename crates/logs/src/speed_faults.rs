@@ -345,7 +345,6 @@ mod tests {
                 let first_s = found[at].first().copied().unwrap_or(f64::INFINITY);
                 assert!(first_s < 3.0, "{at} {step_s}: {first_s}");
                 // And from then on without a gap.
-                #[expect(clippy::cast_precision_loss, reason = "small")]
                 let count = found[at].len() as f64;
                 assert!((count * step_s - (6.0 - first_s)).abs() < 2.0 * step_s, "{at} {step_s}: {count}");
                 assert!((0..WATCHED).all(|speed| speed == at || found[speed].is_empty()), "{at}: {found:?}");
@@ -414,7 +413,6 @@ mod tests {
                     speeds
                 });
                 let rows = 1.5 / step_s;
-                #[expect(clippy::cast_precision_loss, reason = "small")]
                 let count = found[at].len() as f64;
                 assert!(count >= rows - 2.0 && count <= rows, "{at} {other} {step_s}: {count}");
                 assert!((0..WATCHED).all(|speed| speed == at || found[speed].is_empty()), "{at} {other}: {found:?}");

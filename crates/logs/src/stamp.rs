@@ -64,7 +64,7 @@ impl StampForm {
     pub(crate) fn seconds(self, text: &str) -> Option<f64> {
         let text = text.trim().replace(',', ".");
         let of = |seconds: i64, nanoseconds: u32| {
-            #[expect(clippy::cast_precision_loss, reason = "2^53 s are beyond every date")]
+            // 2^53 s are beyond every date.
             let whole = seconds as f64;
             whole + 1e-9 * f64::from(nanoseconds)
         };

@@ -19,7 +19,7 @@ impl DelayLine {
     pub fn send(&mut self, now_s: f64, delay_s: f64, command: f64) {
         let newest = self.under_way.back().map_or(self.arrived, |&(_, command)| command);
         // An unchanged command arrives nowhere new; this spares the integrator a stop.
-        #[expect(clippy::float_cmp, reason = "only the very same command may be left out")]
+        // Only the very same command may be left out.
         if newest == command {
             return;
         }

@@ -38,7 +38,7 @@ impl Noise {
     /// platform's own, are rounded away.
     fn normal(&mut self) -> f64 {
         let x: f64 = StandardNormal.sample(&mut self.0);
-        #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+        // Rounding is the purpose.
         let rounded = f64::from(x as f32);
         if x.abs() < TAIL { x } else { rounded }
     }

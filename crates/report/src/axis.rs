@@ -99,7 +99,6 @@ pub(crate) fn nice_step(least: f64) -> f64 {
 
 /// Decimals that tell multiples of a step apart.
 pub(crate) fn decimals(step: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a small count")]
     let digits = (-Real::log10(step * 1.001).floor()).clamp(0.0, 6.0) as usize;
     digits
 }

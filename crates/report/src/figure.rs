@@ -210,7 +210,6 @@ impl Figure {
 
         let lines = placed.y_label();
         for (n, line) in lines.iter().enumerate() {
-            #[expect(clippy::cast_precision_loss, reason = "a few lines")]
             let x = margins.left - placed.ticks() - LINE * (lines.len() - n) as f64 + 11.0;
             scene.add(Primitive::Text {
                 x,
@@ -336,7 +335,6 @@ impl Placed<'_> {
         matches!(self.panel.axis, Axis::Unmarked(..))
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a few lines")]
     fn left(&self) -> f64 {
         self.ticks() + LINE * self.y_label().len() as f64 + 4.0
     }
@@ -379,7 +377,6 @@ fn draw_entry(scene: &mut Scene, entry: &Entry, x: f64, top: f64) {
     }
     let colour = if entry.key == Key::Remark { "#666666" } else { TEXT };
     for (n, line) in entry.lines.iter().enumerate() {
-        #[expect(clippy::cast_precision_loss, reason = "a few lines")]
         let y = middle + 4.5 + LINE * n as f64;
         scene.add(text(x + KEY + GAP, y, line, colour, TextAnchor::Start));
     }

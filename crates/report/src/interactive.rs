@@ -206,7 +206,6 @@ impl TimesOfCurves {
 }
 
 impl Times {
-    #[expect(clippy::cast_precision_loss, reason = "a few thousand points")]
     fn of(times: &[f64]) -> Self {
         let (from, to) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
         let count = times.len();
@@ -214,11 +213,6 @@ impl Times {
         let is_even = times.iter().enumerate().all(|(i, time)| (time - from - i as f64 * step).abs() <= EVEN * step);
         let steps = (!is_even).then(|| {
             let unit = (to - from) / f64::from(u32::MAX);
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "between the first and the last"
-            )]
             let bytes = times.iter().flat_map(|time| (((time - from) / unit).round() as u32).to_le_bytes());
             base64(&bytes.collect::<Vec<u8>>())
         });
@@ -234,11 +228,6 @@ impl Values {
         let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
         let step = if high > low { (high - low) / TOP } else { 1.0 };
         let code = |value: f64| match value.is_finite() {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "between the lowest and the highest"
-            )]
             true => ((value - low) / step).round().min(TOP) as u16,
             false => GAP,
         };

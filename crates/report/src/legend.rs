@@ -36,7 +36,6 @@ impl Entry {
         Self { key, lines: broken(name, WIDEST), wish }
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a few lines")]
     pub(crate) fn height(&self) -> f64 {
         LINE * self.lines.len() as f64
     }

@@ -375,14 +375,12 @@ pub(crate) fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> 
     if met.iter().all(|health| *health == Health::Good) {
         return None;
     }
-    #[expect(clippy::cast_precision_loss, reason = "a handful of lines")]
     let series = met.iter().enumerate().map(|(line, health)| Series {
         label: health.name().replace('_', " "),
         stroke: Stroke { colour: COLOURS[*health as usize], weight: Weight::Main, dash: None },
         points: held(healths, *health, -(line as f64)),
     });
     let series: Vec<Series> = series.collect();
-    #[expect(clippy::cast_precision_loss, reason = "a handful of lines")]
     let lines = series.len() as f64;
     let axis = Axis::Unmarked(0.5 - lines, 0.5);
     Some(Panel { y_label: "health".to_owned(), height: 18.0 * lines + 8.0, series, band: None, axis })

@@ -300,7 +300,6 @@ impl SpeedsPage<'_> {
         /// Forward gears of a car whose ratios are not given: larger numbers are codes for reverse and neutral.
         const MOST_GEARS: usize = 10;
         let highest = if self.ratios.is_empty() { MOST_GEARS } else { self.ratios.len() };
-        #[expect(clippy::cast_precision_loss, reason = "a handful of gears")]
         let highest = highest as f64;
         // Numbers beyond the forward gears stand for others.
         let gear = |series: &Readings| {
@@ -354,7 +353,6 @@ impl SpeedsPage<'_> {
         };
         let mut bins: Vec<Vec<f64>> = vec![Vec::new(); 50];
         for moment in self.moments.iter().filter(|moment| !moment.no_slip) {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bin of a ratio")]
             let bin = (moment.speed_ratio().max(0.0) / BIN) as usize;
             if let Some(bin) = bins.get_mut(bin) {
                 bin.push(fit.by_engine(self.record, moment) / Real::powi(moment.engine_rad_s, 2));
@@ -362,17 +360,10 @@ impl SpeedsPage<'_> {
         }
         let quantile = |bin: &mut Vec<f64>, share: f64| {
             bin.sort_by(f64::total_cmp);
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                clippy::cast_precision_loss,
-                reason = "a place"
-            )]
             let place = (share * bin.len() as f64) as usize;
             if bin.len() < 10 { f64::NAN } else { milli(bin[place.min(bin.len() - 1)]) }
         };
         let mut of = |share: f64| -> Vec<(f64, f64)> {
-            #[expect(clippy::cast_precision_loss, reason = "a bin")]
             let at = |i: usize| (i as f64 + 0.5) * BIN;
             bins.iter_mut().enumerate().map(|(i, bin)| (at(i), quantile(bin, share))).collect()
         };

@@ -267,7 +267,6 @@ impl Comparison {
             .filter_map(|((estimate, truth), bound)| bound.map(|b| size(truth - estimate.pressure_pa) - b))
             .collect();
         let inside = excesses.iter().filter(|&&excess| excess <= 1e-9).count();
-        #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
         let share = inside as f64 / excesses.len().max(1) as f64;
         (!excesses.is_empty()).then(|| (share, excesses.iter().copied().fold(0.0, f64::max)))
     }

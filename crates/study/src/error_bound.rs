@@ -147,7 +147,6 @@ fn size(of_runs: &[f64]) -> Size {
     let reached = of_runs.iter().position(|&value| value * (1.0 + SETTLED) >= largest);
     let mut sorted = of_runs.to_vec();
     sorted.sort_by(f64::total_cmp);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the list")]
     let quantile = |share: f64| {
         let at = (share * sorted.len() as f64).ceil() as usize;
         sorted.get(at.saturating_sub(1)).copied().unwrap_or(f64::NAN)

@@ -89,13 +89,11 @@ impl Overview {
             self.first_s = sample.time_s;
         }
         let place = |interval_s: f64| (sample.time_s - self.first_s) / interval_s;
-        #[expect(clippy::cast_precision_loss, reason = "a small count")]
         while place(self.interval_s) >= MOST as f64 {
             self.interval_s *= 2.0;
             self.intervals =
                 self.intervals.chunks(2).map(|pair| pair[0].joined(pair.get(1).unwrap_or(&EMPTY))).collect();
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the most intervals")]
         let at = place(self.interval_s) as usize;
         if self.intervals.len() <= at {
             self.intervals.resize(at + 1, EMPTY);
@@ -111,7 +109,6 @@ impl Overview {
 
     /// The intervals with the times of their beginnings and ends, s.
     pub fn intervals(&self) -> impl Iterator<Item = ([f64; 2], &Interval)> {
-        #[expect(clippy::cast_precision_loss, reason = "a small count")]
         let time_s = |at: usize| self.first_s + at as f64 * self.interval_s;
         self.intervals.iter().enumerate().map(move |(at, interval)| ([time_s(at), time_s(at + 1)], interval))
     }

@@ -95,7 +95,6 @@ impl ErrorScore {
     /// The scores, phase by phase.
     pub fn finish(&self) -> Vec<PhaseScore> {
         let score = |(phase, errors): (Phase, &Errors)| {
-            #[expect(clippy::cast_precision_loss, reason = "a count of samples")]
             let count = errors.samples.max(1) as f64;
             PhaseScore {
                 phase,
@@ -169,7 +168,6 @@ pub fn score_ranges(
         .filter_map(|phase| {
             let at = (0..phases.len()).filter(|&i| phases[i] == phase);
             let ranges: Vec<(usize, Bounds<f64>)> = at.filter_map(|i| Some((i, bounds(i)?))).collect();
-            #[expect(clippy::cast_precision_loss, reason = "a count of samples")]
             let mean = |value: &dyn Fn(usize, &Bounds<f64>) -> f64| {
                 ranges.iter().map(|(i, bounds)| value(*i, bounds)).sum::<f64>() / ranges.len() as f64
             };

@@ -466,7 +466,6 @@ impl MeasuredError {
 
 fn unhealthy(samples: &[LogSample]) -> Vec<(Health, f64)> {
     let share = |health: Health| {
-        #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
         let share = samples.iter().filter(|sample| sample.estimate.health == health).count() as f64
             / samples.len().max(1) as f64;
         (health, share)

@@ -148,7 +148,6 @@ impl<W: Write + Seek> MdfWriter<W> {
             words_are_same |= cell == Some(Cell::SameWords);
             match (column, cell) {
                 (Column::Number, Some(Cell::Number(number))) => set(&mut record, &number.to_le_bytes()),
-                #[expect(clippy::cast_precision_loss, reason = "counts")]
                 (Column::Number, Some(Cell::Whole(number))) => {
                     set(&mut record, &(number as f64).to_le_bytes());
                 }
@@ -178,7 +177,6 @@ impl<W: Write + Seek> MdfWriter<W> {
         let end = self.writer.stream_position()?;
         let length = end - (self.places.data_length - 8);
         let padded = end.next_multiple_of(8);
-        #[expect(clippy::cast_possible_truncation, reason = "below 8")]
         self.writer.write_all(&[0; 8][..(padded - end) as usize])?;
         let mut blocks = Blocks { bytes: Vec::new(), from: padded };
         let mut links = Vec::new();

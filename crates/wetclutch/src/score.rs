@@ -50,7 +50,6 @@ pub fn score(truth: &Table, estimates: &Table) -> Result<Scores, Error> {
         for (at, clutch) in ["offgoing", "oncoming"].into_iter().enumerate() {
             let torque = SquaredErrors::of(&rows, phase, at);
             let (pressure_pa, torque_n_m) = (SquaredErrors::of_pressure(&rows, phase, at).rms_pa(), torque.rms_n_m());
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of rows")]
             let rows = torque.rows as usize;
             phases.push(PhaseScore { clutch, phase: phase_name, rows, pressure_pa, torque_n_m });
         }

@@ -192,7 +192,6 @@ impl Values {
     fn push(&mut self, cell: Cell<'_>) {
         match (self, cell) {
             (Self::Numbers(numbers), Cell::Number(number)) => numbers.push(number),
-            #[expect(clippy::cast_precision_loss, reason = "counts are far below 2^53")]
             (Self::Numbers(numbers), Cell::Whole(number)) => numbers.push(number as f64),
             (Self::Numbers(numbers), _) => numbers.push(f64::NAN),
             (Self::Words(words), Cell::Word(word)) => words.push(word),

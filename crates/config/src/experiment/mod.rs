@@ -206,7 +206,6 @@ const DRAWS: u64 = 5;
 
 fn draws(check: &Check<'_>, raw: Option<&Number>) -> Result<u64, ConfigError> {
     let Some(draws) = raw else { return Ok(DRAWS) };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 1 to 1000")]
     check.count("draws", draws, 1.0..=1000.0).map(|count| count as u64)
 }
 

@@ -213,7 +213,6 @@ fn kind(raw: RawKind) -> ElementKind {
 }
 
 /// A whole number of teeth or planets.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number within its range")]
 fn whole(
     check: &Check<'_>,
     key: &str,

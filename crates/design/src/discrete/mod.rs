@@ -387,7 +387,7 @@ fn least_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
 }
 
 /// The gain as a controller has it: in physical units and in single precision, here normalised again.
-#[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+// Rounding is the purpose.
 fn rounded(gain: &DMatrix<f64>, model: Model, phase: Phase) -> DMatrix<f64> {
     let (states, outputs) = (state_units(model), outputs(model, phase));
     DMatrix::from_fn(gain.nrows(), gain.ncols(), |i, j| {

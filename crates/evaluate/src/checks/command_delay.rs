@@ -318,13 +318,11 @@ fn between(sums: &[f64; MOVES], place: usize) -> f64 {
 }
 
 /// How far the pressures of a place among the moves are moved, s: positive for commands that come late.
-#[expect(clippy::cast_precision_loss, reason = "a handful")]
 fn moved_s(place: usize) -> f64 {
     (place as f64 - TO_ONE_SIDE as f64) * GRID_S
 }
 
 /// The time of so many points, s.
-#[expect(clippy::cast_precision_loss, reason = "a handful")]
 fn span_s(points: usize) -> f64 {
     points as f64 * GRID_S
 }

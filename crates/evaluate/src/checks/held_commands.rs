@@ -93,11 +93,6 @@ impl Changes {
         if self.repeated == 0 {
             self.at_once += 1;
         } else if since_s <= LONGEST_S && change > RESOLUTIONS * self.smallest {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "positive, and at most LONGEST_S"
-            )]
             let class = (since_s / CLASS_S).round().max(0.0) as usize;
             self.later[class.min(CLASSES - 1)] += 1;
         }
@@ -107,14 +102,12 @@ impl Changes {
     /// The usual time between two changes, s, if they come more rarely than the readings.
     fn period_s(&self) -> Option<f64> {
         let later: u64 = self.later.iter().sum();
-        #[expect(clippy::cast_precision_loss, reason = "counts")]
         let is_held = later >= ENOUGH && self.at_once as f64 <= BY_CHANCE * later as f64;
         let mut below = 0;
         let middle = self.later.iter().position(|count| {
             below += count;
             2 * below >= later
         });
-        #[expect(clippy::cast_precision_loss, reason = "a class")]
         middle.filter(|_| is_held).map(|class| class as f64 * CLASS_S)
     }
 }

@@ -95,7 +95,6 @@ impl DoubtedPressures {
     }
 
     /// A warning that names the elements whose pressures contradict their commands.
-    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub(crate) fn warning(&self, car: &Car) -> Option<String> {
         let doubted = self.rows.iter().enumerate().filter_map(|(element, [all, outside])| {
             let share = *outside as f64 / *all as f64;

@@ -36,7 +36,6 @@ impl<const FINE: u32> RatioHistogram<FINE> {
             let factor = |way: f64| 1.0 + way + 0.5 * way * way;
             let [down, up] = [place.floor() - place, place.floor() + 1.0 - place].map(|way| factor(way / Self::FINE));
             self.within = ratio * down * (1.0 + ROUNDING)..ratio * up * (1.0 - ROUNDING);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the bins")]
             let bin = place as usize;
             self.last = bin;
         }

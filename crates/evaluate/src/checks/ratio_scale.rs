@@ -48,7 +48,6 @@ impl RatioScale {
     }
 
     /// The factor of the gear with the most rows, if most rows are in gears that have the same.
-    #[expect(clippy::cast_precision_loss, reason = "a share")]
     fn factor(&self) -> Option<Factor> {
         let all: u64 = self.gears.iter().map(|(_, rows)| rows).sum();
         let (of_gear, _) = self.gears.iter().max_by_key(|(_, rows)| *rows)?;

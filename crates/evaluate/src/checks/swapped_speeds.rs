@@ -41,7 +41,6 @@ impl SwappedSpeeds {
     /// What the log shows, if it contradicts the channels, in a sentence.
     pub fn contradiction(&self) -> Option<String> {
         let Self { turbine_alone, engine_alone, engine: [all, engine] } = *self;
-        #[expect(clippy::cast_precision_loss, reason = "a share")]
         let is_in_gear = engine as f64 >= MOST * all as f64;
         (is_in_gear && engine_alone >= ENOUGH && engine_alone > TIMES * turbine_alone).then(|| {
             format!(

@@ -97,7 +97,6 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
         return Err("the speeds and torques do not fit together".to_owned());
     };
     let bends = bends(&knots, solution.unknowns.as_slice());
-    #[expect(clippy::cast_precision_loss, reason = "a count of moments")]
     let per_moment_s = 0.02 * every as f64;
     let knot = |(i, &speed_ratio): (usize, &f64)| Knot {
         speed_ratio,
@@ -108,7 +107,6 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     let all: Vec<Knot> = knots.iter().enumerate().map(knot).collect();
     drives_no_engine(&all)?;
     let coupled = Knot { speed_ratio: 1.0, capacity_n_m_s2: 0.0, sd_n_m_s2: 0.0, time_s: 0.0 };
-    #[expect(clippy::cast_precision_loss, reason = "a count of moments")]
     Ok(ConverterFit {
         knots: all.into_iter().chain([coupled]).collect(),
         inertia_kg_m2: solution.unknowns[knots.len()],

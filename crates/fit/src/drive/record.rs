@@ -109,13 +109,11 @@ impl DriveRecord {
         let (Some(first_s), Some(last_s)) = (self.engine.time_s.first(), self.engine.time_s.last()) else {
             return Vec::new();
         };
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a time over a step")]
         let step = |time_s: f64| ((time_s - first_s) / STEP_S) as u64;
         let (mut moments, mut next) = (Vec::new(), 0);
         for span in self.engine.time_s.chunk_by(|before_s, after_s| after_s - before_s <= APART_S) {
             let from = step(span[0] - 0.5 * APART_S).max(next);
             next = step(span[span.len() - 1] + 0.5 * APART_S).saturating_add(1).min(step(*last_s));
-            #[expect(clippy::cast_precision_loss, reason = "a count of steps")]
             let times = (from..next).map(|i| first_s + i as f64 * STEP_S);
             moments.extend(times.filter_map(|time_s| self.moment(time_s)));
         }

@@ -99,7 +99,6 @@ impl ConverterFit {
         };
         if let Some(inertia_s) = shift.inertia_s {
             let moments: Vec<&Moment> = within(inertia_s).collect();
-            #[expect(clippy::cast_precision_loss, reason = "a count of moments")]
             let count = moments.len() as f64;
             let known: Vec<_> = moments.iter().filter_map(|m| Some((**m, self.torques(record, m)?))).collect();
             // With holes a mean would be that of the rest.
@@ -141,7 +140,6 @@ impl ShiftTorque {
         let net = |(time_s, asked): (f64, f64)| asked - record.friction_torque.at(time_s);
         let least = asked.iter().map(|point| net(*point)).fold(f64::INFINITY, f64::min);
         self.reduction = Some([least, last.0 - first.0]);
-        #[expect(clippy::cast_precision_loss, reason = "a count of readings")]
         let count = asked.len() as f64;
         let error = |point: &(f64, f64)| (record.engine_torque.at(point.0) - net(*point)).abs();
         self.reduction_error_n_m = Some(asked.iter().map(error).sum::<f64>() / count);

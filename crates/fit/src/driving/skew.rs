@@ -156,7 +156,6 @@ impl SkewRecorder {
         if self.cells >= CELLS || speeds.iter().any(|series| series.longest_gap_s(span) > GAP_S) {
             return;
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a minute over a step")]
         let count = ((span[1] - span[0]).max(0.0) / CELL_S) as usize;
         let cells = (0..count).map(|at| {
             let [turbine, other] = speeds.each_ref().map(|series| mean(series, span[0] + CELL_S * at as f64));
@@ -174,7 +173,6 @@ impl SkewRecorder {
 
 /// Mean of readings over the cell that begins at a time.
 fn mean(series: &Series, begin_s: f64) -> f64 {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants")]
     let points = (CELL_S / POINT_S).round() as u32;
     let at = (0..points).map(|point| series.at(begin_s + POINT_S * (f64::from(point) + 0.5)));
     at.sum::<f64>() / f64::from(points)

@@ -109,7 +109,6 @@ impl Stretch {
         [begin_s, end_s]: [f64; 2],
     ) -> Option<Self> {
         let open = &car.gears.get(gear)?.open;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over a step")]
         let count = |step_s: f64| ((end_s - begin_s).max(0.0) / step_s) as usize;
         let [halves, fine] = [STEP_S, FINE_S].map(|step_s| {
             let span = |at: usize| [begin_s + step_s * at as f64, step_s];
@@ -157,7 +156,6 @@ const WEIGHTS: [Weight; 2] = [Weight::Falling, Weight::Rising];
 
 /// Times in a step with this begin and length, and their shares in its mean.
 fn points([begin_s, step_s]: [f64; 2], weight: Weight) -> impl Iterator<Item = (f64, f64)> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants")]
     let points = (step_s / POINT_S).round() as u32;
     (0..points).map(move |point| {
         let passed = (f64::from(point) + 0.5) / f64::from(points);

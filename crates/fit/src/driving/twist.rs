@@ -91,7 +91,6 @@ impl TwistRecorder {
         if speeds.iter().any(|series| series.longest_gap_s(span) > GAP_S) {
             return;
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a minute over a step")]
         let count = ((span[1] - span[0]).max(0.0) / CELL_S) as usize;
         // What comes behind a cell without speeds is not its neighbour.
         let cells = (0..count).map_while(|at| cell(car, gear, &speeds, span[0] + CELL_S * at as f64));
@@ -114,7 +113,6 @@ fn cell(car: &DrivenCar, gear: usize, speeds: &[Series; 4], begin_s: f64) -> Opt
     let (gear, converter) = (car.gears.get(gear)?, car.converter.as_ref()?);
     let final_ratio = car.driveline.final_ratio;
     let [engine, turbine, output, wheel] = speeds;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants")]
     let points = (CELL_S / POINT_S).round() as u32;
     let share = f64::from(points).recip();
     let mut cell = Cell::default();
@@ -156,7 +154,6 @@ impl InputTorque {
 
 /// Cells in which the teeth rest against each other, and the shafts too.
 pub(crate) fn rests(cells: &[Cell]) -> Vec<usize> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants")]
     let before = (SETTLES_S / CELL_S).round() as usize;
     let is_clear = |cell: &Cell, sign: f64| sign * cell.turbine_n_m > RESTS_N_M && cell.sign() == sign;
     let rests = |at: &usize| {

@@ -92,7 +92,6 @@ impl ShiftModel {
         let rows = tables.tables();
         let row = rows.shift(log.gears[0], log.gears[1])?;
         let [begin_s, end_s] = log.slip_s;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over milliseconds")]
         let points = ((end_s - begin_s).max(0.0) / STEP_S).ceil() as usize + 2;
         let grid = Grid { begin_s, step_s: STEP_S, points };
         let times = || (0..points).map(|i| grid.time_s(i));
@@ -331,7 +330,6 @@ pub fn open_loop(car: &Car, tables: &ShiftTables<f64>, log: &ShiftLog) -> Vec<Op
     let (Some(model), Some(row)) = (ShiftModel::new(car, tables, &quantities, log), row) else { return Vec::new() };
     let pressure = model.clutches.each_ref().map(|clutch| clutch.pressures(model.grid, &AtValve::default()));
     let of_reading = |time_s: &f64| {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
         let i = ((time_s - model.grid.begin_s) / model.grid.step_s).round() as usize;
         let torque = |which: usize| {
             let clutch = &model.clutches[which];

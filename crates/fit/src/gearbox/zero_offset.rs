@@ -69,7 +69,6 @@ fn at_rest(hydraulics: &Hydraulics, commands: &Series, pressure: &Series) -> Vec
     let (Some(first_s), Some(last_s)) = (pressure.time_s.first(), pressure.time_s.last()) else { return Vec::new() };
     // What the valve did before its first command is not known.
     let Some(known_s) = commands.time_s.first() else { return Vec::new() };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over milliseconds")]
     let points = ((last_s - known_s) / STEP_S).clamp(0.0, 1e5) as usize + 2;
     let grid = Grid { begin_s: *known_s, step_s: STEP_S, points };
     let early = pressures(hydraulics, -LATER_S, commands, grid);

@@ -188,7 +188,7 @@ impl Blf {
         // which a trigger keeps, have negative times.
         let (per_s, stamp) =
             (if u32_at(bytes, BASE) == 1 { 1e5 } else { 1e9 }, i64::from_le_bytes(bytes_at(bytes, 24)));
-        #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
+        // 2^53 ns are 104 days.
         let time_s = stamp as f64 / per_s;
         let (id, payload, remote) = match object.kind {
             CAN_MESSAGE | CAN_MESSAGE2 => {

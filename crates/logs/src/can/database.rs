@@ -67,11 +67,7 @@ pub(super) enum Number {
 
 impl Number {
     /// The number in so many bits.
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "a double keeps 53 bits; a float has 32"
-    )]
+    // A double keeps 53 bits; a float has 32.
     pub(super) fn of(self, raw: u64, size: usize) -> f64 {
         match self {
             Self::Unsigned => raw as f64,
@@ -246,7 +242,6 @@ impl Signal {
 }
 
 /// A bound of the range that the DBC states.
-#[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
 fn bound(value: NumericValue) -> f64 {
     match value {
         NumericValue::Uint(value) => value as f64,

@@ -128,7 +128,7 @@ impl Named<'_> {
 
     /// The bits of a number before factor and offset. A negative one may also be written as its bits.
     fn raw(&self, id: i64) -> u64 {
-        #[expect(clippy::cast_precision_loss, reason = "the signal has no more bits")]
+        // The signal has no more bits.
         match self.number {
             Number::Float => u64::from((id as f32).to_bits()),
             Number::Double => (id as f64).to_bits(),

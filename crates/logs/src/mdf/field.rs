@@ -174,7 +174,6 @@ impl<'a> Field<'a> {
             match (self.kind, self.bytes) {
                 (Kind::Index, _) => {
                     let first = records.index + from as u64;
-                    #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
                     self.convert((first..).take(count).map(|index| index as f64), values);
                 }
                 (_, 0..=2) => self.short(self.quarter(records, from, 0, &mut tile.quarters[0][..count]), values),
@@ -276,7 +275,6 @@ impl<'a> Field<'a> {
     #[inline(always)]
     fn long(&self, words: &[u64], values: &mut Vec<f64>) {
         let (up, down) = (64 - self.bits - self.shift, 64 - self.bits);
-        #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
         match self.kind {
             Kind::Float => self.convert(words.iter().map(|word| f64::from_bits(*word)), values),
             Kind::Signed => self.convert(words.iter().map(|word| ((word << up).cast_signed() >> down) as f64), values),

@@ -423,7 +423,6 @@ impl ShiftFinder {
         const MOST: f64 = 12.0;
         let most =
             if self.ratios.is_empty() { MOST } else { f64::from(u32::try_from(self.ratios.len()).unwrap_or(u32::MAX)) };
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 1 to the number of gears")]
         (value.fract() == 0.0 && (1.0..=most).contains(&value)).then_some(value as u32)
     }
 

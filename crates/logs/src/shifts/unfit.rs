@@ -29,7 +29,6 @@ impl Unfit {
         if self.others.is_empty() {
             self.others.resize(2 * CLASSES.unsigned_abs() as usize + 1, 0);
         }
-        #[expect(clippy::cast_possible_truncation, reason = "limited to the classes")]
         let class = ((Real::ln(ratio) / CLASS).round() as i32).clamp(-CLASSES, CLASSES) + CLASSES;
         self.others[class.unsigned_abs() as usize] += 1;
     }

@@ -21,7 +21,6 @@ impl Random {
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
         let share = ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
         share
     }
@@ -34,7 +33,6 @@ impl Random {
         self.share() < share
     }
 
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small whole numbers")]
     fn count(&mut self, low: usize, high: usize) -> usize {
         low + (self.share() * (high + 1 - low) as f64) as usize
     }

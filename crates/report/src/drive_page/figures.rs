@@ -30,7 +30,6 @@ const OPEN_LOOP: Stroke = Stroke { colour: "#767676", weight: Weight::Rival, das
 /// The gear as a number for an axis: its name where that is a number, else its place among the forward gears.
 fn gear_number(car: &Car, gear: usize) -> f64 {
     let place = car.gearbox.forward_gears().iter().position(|&forward| forward == gear);
-    #[expect(clippy::cast_precision_loss, reason = "a handful of gears")]
     let place = place.map_or(0.0, |place| place as f64 + 1.0);
     name(car, gear).parse().unwrap_or(place)
 }

@@ -92,7 +92,6 @@ const COLUMNS: &[Column] = &[
     ),
     column("pressures in range", "share of the measured pressures within their ranges by the error budget", |s, _| {
         let [all, inside] = s.summary.pressures;
-        #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
         let share = inside as f64 / all as f64;
         if all > 0 { coverage(share) } else { String::new() }
     }),
@@ -259,7 +258,6 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         }
     }
     let [pressures, inside] = shift.summary.pressures;
-    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     let share = if pressures > 0 { inside as f64 / pressures as f64 } else { f64::NAN };
     cells.push(number("measured_pressure_inside_range", share));
     for (c, role) in ["offgoing", "oncoming"].iter().enumerate() {

@@ -72,7 +72,6 @@ impl Layout {
             Member::Housing => self.rows.len(),
             Member::Shaft(shaft) => self.rows[shaft],
         };
-        #[expect(clippy::cast_precision_loss, reason = "a few rows")]
         let y = self.top + ROW * row as f64;
         y
     }

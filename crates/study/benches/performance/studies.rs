@@ -71,7 +71,6 @@ fn speed_up(campaign: &Campaign) -> String {
         })
         .collect();
     ratios.sort_by(f64::total_cmp);
-    #[expect(clippy::cast_precision_loss, reason = "two threads")]
     let most = THREADS as f64;
     // Two threads cannot be more than twice as fast: what is beyond is noise.
     let beyond = ratios.iter().filter(|ratio| **ratio > most).count();

@@ -330,7 +330,6 @@ pub struct CarSummary {
 
 impl CarSummary {
     /// Shifts of all cars.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
     pub fn shifts(&self) -> u64 {
         self.sums.iter().map(|sums| sums.shifts).sum::<f64>() as u64
     }
@@ -356,7 +355,6 @@ fn gain(car: &Car, from: usize, to: usize) -> f64 {
 }
 
 /// The numbers of a group in a row, in the order of the header.
-#[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
 fn numbers(sums: &Sums) -> [f64; WIDTH] {
     let errors = sums.errors.iter().flatten().flat_map(|PhaseErrors { torque, pressure }| {
         let [a, b] = torque.rms_n_m();
@@ -388,7 +386,6 @@ impl Sums {
             let torque = of_rms(of[0], of[1], of[2]);
             sum.add(&PhaseErrors { torque, pressure: of_rms(of[0], of[3], of[4]) });
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts")]
         let count = |at: usize| counts[at] as u64;
         self.counts.add(&MatrixCounts {
             failed: count(0),

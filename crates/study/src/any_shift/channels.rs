@@ -287,7 +287,6 @@ fn reverse_gears(car: &Car) -> Vec<usize> {
 }
 
 /// The number of a gear, by its place: 1 is the first forward gear, 0 none, -1 reverse, -2 a second reverse gear.
-#[expect(clippy::cast_precision_loss, reason = "a handful of gears")]
 pub fn gear_number(car: &Car, gear: usize) -> f64 {
     let place = |gears: Vec<usize>| gears.iter().position(|&known| known == gear).map(|place| place as f64 + 1.0);
     place(car.gearbox.forward_gears()).or_else(|| place(reverse_gears(car)).map(|place| -place)).unwrap_or(0.0)
@@ -306,7 +305,6 @@ fn gear_of(car: &Car, number: f64) -> Option<usize> {
             let named = reverse.iter().copied().find(|&gear| gear_number(car, gear) == whole);
             named.or_else(|| reverse.first().copied())
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1")]
         _ => forward.get(whole as usize - 1).copied(),
     }
 }

@@ -110,7 +110,6 @@ pub struct Coverage {
 impl Coverage {
     /// Of a quantity, as far as it was learnt: the standard deviation is at least 5 % below that of a filter that has learnt nothing. `None`
     /// if there are no such values.
-    #[expect(clippy::cast_precision_loss, reason = "fewer values than a double has integers")]
     pub fn of<'e>(quantity: Quantity, errors: impl Iterator<Item = &'e LearntError>) -> Option<Self> {
         let is_learnt = |error: &&LearntError| error.standard_deviation < LEARNT_BELOW * error.unlearnt;
         let of: Vec<_> = errors.filter(|error| error.quantity == quantity).filter(is_learnt).collect();

@@ -208,7 +208,6 @@ pub fn matrix(known: &Car, plan: &MatrixPlan<'_>, mut done: impl FnMut()) -> Res
     let mut rows: Vec<MatrixRow> = shifts.iter().map(row).collect();
     let work = |number: u64| {
         let (at, draw) = (number / plan.draws, number % plan.draws);
-        #[expect(clippy::cast_possible_truncation, reason = "below the number of shifts")]
         let at = at as usize;
         (at, run(known, &shifts[at], plan.seed.wrapping_add(draw), plan))
     };

@@ -79,10 +79,7 @@ const SOBOL_LENGTH: u64 = 1 << 16;
 fn sobol(study: &Study, run: u64, dimension: usize) -> f64 {
     // The sequence is SOBOL_LENGTH long; another scramble of it follows.
     let (part, index) = (run / SOBOL_LENGTH, run % SOBOL_LENGTH);
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "below the limits of the sequence; the seed's upper half is meant"
-    )]
+    // Below the limits of the sequence; the seed's upper half is meant.
     let (index, dimension, seed) = (index as u32, dimension as u32, (mixed(study.seed, part) >> 32) as u32);
     f64::from(sobol_burley::sample(index, dimension, seed))
 }
@@ -91,7 +88,6 @@ fn sobol(study: &Study, run: u64, dimension: usize) -> f64 {
 pub(crate) fn value_at(values: &Values, place: f64) -> f64 {
     match *values {
         Values::List(ref list) => {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the list")]
             let at = (place * list.len() as f64) as usize;
             list[at.min(list.len() - 1)]
         }
@@ -164,7 +160,6 @@ fn shuffled(at: u64, count: u64, seed: u64) -> u64 {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts far below 2^53, or the upper 53 bits")]
 fn as_f64(x: u64) -> f64 {
     x as f64
 }

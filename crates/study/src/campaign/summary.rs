@@ -38,7 +38,6 @@ impl Distribution {
             self.diverged += 1;
             return;
         }
-        #[expect(clippy::cast_possible_truncation, reason = "clamped")]
         let bin = (Real::log2(value.max(1e-12)) * BINS_PER_OCTAVE).floor().clamp(-1e6, 1e6) as i32;
         *self.bins.entry(bin).or_default() += 1;
     }
@@ -362,7 +361,6 @@ impl Effects {
     fn push(&mut self, value: f64, places: &[f64]) {
         self.all.push(value);
         for (bins, place) in self.bins.iter_mut().zip(places) {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place from 0 to 1")]
             let bin = (place * EFFECT_BINS as f64) as usize;
             bins[bin.min(EFFECT_BINS - 1)].push(value);
         }
@@ -381,7 +379,6 @@ impl Effects {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts far below 2^53")]
 fn as_f64(count: u64) -> f64 {
     count as f64
 }

@@ -74,7 +74,6 @@ fn shaft_before(comparison: &Comparison) -> f64 {
 
 /// Mean absolute error over torque and inertia phase.
 fn mean_over_shift(phases: [PhaseScore; 2]) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
     let [(first, m), (second, n)] = phases.map(|score| (score.mean, score.samples as f64));
     (first * m + second * n) / (m + n)
 }

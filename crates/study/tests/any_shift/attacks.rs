@@ -420,7 +420,7 @@ fn single_precision_estimates_the_same() {
     assert!(input_clutches > 100 && of_input_clutch < 0.1, "{input_clutches} {of_input_clutch}");
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+// Rounding is the purpose.
 pub(crate) fn cast(input: &ShiftInput<f64>) -> ShiftInput<f32> {
     let to = |reading: Option<Reading<f64>>| {
         reading.map(|reading| Reading { value: reading.value as f32, age_s: reading.age_s as f32 })

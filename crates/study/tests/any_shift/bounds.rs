@@ -152,7 +152,6 @@ fn ranges_hold_in_cars_within_the_bounds_that_their_file_states() {
         }
         let all = shifts(&known);
         for _ in 0..2 {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of shifts")]
             let (from, to, throttle) = all[(random.uniform() * all.len() as f64) as usize];
             let [controller_knows, filter_knows] = [random.uniform() < 0.5, random.uniform() < 0.5];
             let sensors = sensors_within(&budget, filter_knows, &mut random);
@@ -199,7 +198,6 @@ fn ranges_hold_where_an_element_that_stays_engaged_may_slip() {
         let truth = ShiftDraw::within(&known, &budget, || random.uniform()).car(&known);
         let all = shifts(&known);
         for _ in 0..3 {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of shifts")]
             let (from, to, throttle) = all[(random.uniform() * all.len() as f64) as usize];
             let shift = CarShift::usual(&known, from, to, throttle);
             for row in scored(&known, &truth, &known, &shift, &sensors(), true, number as u64) {

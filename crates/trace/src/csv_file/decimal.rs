@@ -109,7 +109,7 @@ fn number(digits: u64) -> Option<u64> {
 
 /// The digits over a power of ten, rounded once to the nearest number.
 #[inline(always)]
-#[expect(clippy::cast_precision_loss, reason = "whole, or rounded once")]
+// Whole, or rounded once.
 fn quotient(digits: u64, places: usize) -> f64 {
     let power = POWERS[places];
     if digits >> f64::MANTISSA_DIGITS == 0 {
@@ -130,7 +130,7 @@ const RECIPROCALS: [u64; MOST_DIGITS] = {
     let mut at = 0;
     while at < MOST_DIGITS {
         let power = POWERS[at] << POWERS[at].leading_zeros();
-        #[expect(clippy::cast_possible_truncation, reason = "the part above 2^64 is 1")]
+        // The part above 2^64 is 1.
         let above = (u128::MAX / power as u128) as u64;
         reciprocals[at] = above;
         at += 1;
@@ -144,7 +144,7 @@ const RECIPROCALS: [u64; MOST_DIGITS] = {
 #[inline(always)]
 fn divided(high: u64, low: u64, by: u64, reciprocal: u64) -> (u64, u64) {
     let guess = u128::from(reciprocal) * u128::from(high) + (u128::from(high) << 64 | u128::from(low));
-    #[expect(clippy::cast_possible_truncation, reason = "its two halves")]
+    // Its two halves.
     let (whole, fraction) = (((guess >> 64) as u64).wrapping_add(1), guess as u64);
     let rest = low.wrapping_sub(whole.wrapping_mul(by));
     // The guess is too large by one more often than not, and very seldom too small.

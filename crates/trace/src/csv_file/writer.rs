@@ -344,7 +344,7 @@ pub(super) fn put_number(bytes: &mut Vec<u8>, at: usize, number: f64) -> usize {
     if (1e-5..1e16).contains(&size) {
         // Of a number of this size the text has no exponent, and that of a whole one ends with `.0`. To look for it would wait for the text.
         let text = digits.format_finite(number).as_bytes();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "exact if it is whole")]
+        // Exact if it is whole.
         let is_whole = number as i64 as f64 == number;
         return put_digits(bytes, at, &text[..text.len() - if is_whole { 2 } else { 0 }]);
     }

@@ -57,7 +57,6 @@ impl Words {
 
     fn begin_run(&mut self, word: &str) {
         let number = self.numbers.get(word).copied().unwrap_or_else(|| {
-            #[expect(clippy::cast_possible_truncation, reason = "a group has some ten thousand rows")]
             let number = self.words.len() as u32;
             self.words.push(word.into());
             self.numbers.insert(word.into(), number);

@@ -57,7 +57,6 @@ fn numbers_of_teeth(quotient: f64) -> Option<(u32, u32)> {
     let ring = |sun: u32| {
         let exact = f64::from(sun) / quotient;
         let ring = exact.round().max(f64::from(sun) + 1.0);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to 500")]
         (ring <= RING_MAX).then(|| (sun, ring as u32, Real::ln(ring / exact).abs()))
     };
     let best = SUNS.filter_map(ring).min_by(|one, other| one.2.total_cmp(&other.2))?;

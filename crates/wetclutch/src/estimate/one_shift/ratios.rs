@@ -91,7 +91,6 @@ impl Ratios {
         if self.moving < STEPS || self.moving_s < TIME_S {
             return Ok(());
         }
-        #[expect(clippy::cast_precision_loss, reason = "a share")]
         let share = |in_gear: u64| in_gear as f64 / self.moving as f64;
         if share(self.in_gear) < IN_GEAR_SHARE {
             // Turbine and wheels fit each other: it is the output that is wrong.
