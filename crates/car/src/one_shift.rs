@@ -62,7 +62,7 @@ pub enum OneShiftError {
     /// The ratio does not fall, or there is a reverse gear in it.
     #[error(
         "{shift} is no upshift between forward gears, and the designs are for upshifts with a driving engine\n\
-         hint: the filter for any shift serves in the other kinds (`wetclutch estimate`); the upshifts of one clutch against another \
+         hint: the gearbox filter estimates the other kinds (`wetclutch estimate`); the upshifts of one clutch against another \
          are {upshifts}"
     )]
     NoUpshift {
@@ -106,7 +106,7 @@ pub enum OneShiftError {
     /// The car has no converter.
     #[error(
         "the car has no converter, and the observers with designed gains take the turbine torque from the maps of one\n\
-         hint: the filter for any shift takes the torque that the engine's controller reports (`wetclutch estimate`), and `wetclutch \
+         hint: the gearbox filter takes the torque that the engine's controller reports (`wetclutch estimate`), and `wetclutch \
          sensitivity` says what the speeds show of each clutch torque"
     )]
     NoConverter,

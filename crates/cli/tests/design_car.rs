@@ -15,7 +15,7 @@ fn the_gains_of_a_shift_are_printed_with_their_certificate() {
         "eight-speed automatic, 2.0 L, shift 2-3 (",
         "ratio 3.130 to 2.104, 1/(i_off - i_on) = 0.97; oncoming element C, alpha -1.525: its slip is alpha (w_t - 2.104 w_o)",
         "Gains are designed for upshifts with a driving engine.",
-        "the filter for any shift serves",
+        "the gearbox filter estimates",
         "torque phase: the gain is the open loop: no gain reduces the bound",
         "inertia phase: L normalised",
         "turbine-side inertia",

@@ -122,7 +122,7 @@ fn a_file_that_was_not_learnt_of_this_car_is_refused_before_anything_is_written(
         message
     };
     assert!(refused_with(&text.replace("\"E\"", "\"F\"")).contains("was learnt of the gearbox"));
-    let numbers = observer::any_shift::LEARNT;
+    let numbers = observer::gearbox::LEARNT;
     let one_more = format!("has {} numbers, expected {numbers}", numbers + 1);
     assert!(refused_with(&text.replace("mean = [", "mean = [9, ")).contains(&one_more));
     assert!(refused_with(&text.replace("mean = [", "mean = [9")).contains("not within the bounds"));

@@ -1,7 +1,7 @@
-//! Files of what the filter for any shift has learnt of a car.
+//! Files of what the gearbox filter has learnt of a car.
 
 use geartrain::Gearbox;
-use observer::any_shift::{LEARNT, Learnt};
+use observer::gearbox::{LEARNT, Learnt};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -36,7 +36,7 @@ pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     // The temperature that it is for, where the log has one.
     let oil = learnt.oil_degc.map_or_else(String::new, |degc| format!("oil_temperature_degc = {degc:?}\n"));
     format!(
-        "# What the filter for any shift has learnt of a car. Each number is in units of the deviation that the quantity has\n\
+        "# What the gearbox filter has learnt of a car. Each number is in units of the deviation that the quantity has\n\
          # unlearnt: torque factors and kiss points by element, inertias by pair of gears, torque at the gearbox input, stiffness\n\
          # of the drive shafts, scale of the wheel speed, reported engine torque, lags and delays of the valves by element.\n\
          gearbox = {}\nelements = [{}]\nshifts = {}\nrefused = {}\n{oil}mean = [{}]\ncovariance = [\n{}]\n",

@@ -36,7 +36,7 @@ pub enum Kind {
     Sensors,
     /// A gearbox.
     Gearbox,
-    /// What the filter for any shift has learnt of a car.
+    /// What the gearbox filter has learnt of a car.
     Learnt,
     /// Which channels of a log are which signals.
     ChannelMap,

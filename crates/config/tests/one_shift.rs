@@ -222,7 +222,7 @@ fn a_shift_without_a_vehicle_is_told_why() {
         ("3-3", "the gearbox has no shift \"3-3\""),
         (
             "2-1",
-            "2-1 is no upshift between forward gears, and the designs are for upshifts with a driving engine\nhint: the filter for any shift serves",
+            "2-1 is no upshift between forward gears, and the designs are for upshifts with a driving engine\nhint: the gearbox filter estimates",
         ),
         ("R-1", "R-1 is no upshift between forward gears"),
         ("1-4", "in 1-4 more than one element opens or closes (double)"),
@@ -235,10 +235,7 @@ fn a_shift_without_a_vehicle_is_told_why() {
     let error = of(&car, "1-4").unwrap_err();
     assert!(error.ends_with("are 1-2, 2-3, 3-4, 4-5, 5-6, 6-7, 7-8"), "{error}");
     let error = of(&shipped("dual_clutch", "dual_clutch_7"), "1-2").unwrap_err();
-    assert!(
-        error.contains("the car has no converter") && error.contains("\nhint: the filter for any shift"),
-        "{error}"
-    );
+    assert!(error.contains("the car has no converter") && error.contains("\nhint: the gearbox filter"), "{error}");
     let mut without = eight_speed();
     without.clutches[2] = None;
     let error = of(&without, "2-3").unwrap_err();

@@ -4,8 +4,8 @@ use car::ErrorBudget;
 use car::{Car, Sensors};
 use drivetrain::ShiftKind;
 use observer::Health;
-use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
-use observer::{ShiftTables, any_shift_filter};
+use observer::gearbox::{GearboxFilter, GearboxState, ShiftInput};
+use observer::{ShiftTables, gearbox_filter};
 use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR};
 
 use crate::checks::log_beside::is_of_its_gears;
@@ -15,7 +15,7 @@ use crate::score::row;
 use crate::shift_summary::{ShiftSummary, spans_s};
 use crate::thinned::thinned;
 use crate::worth_a_look::chosen;
-use crate::{AnyShiftError, ShiftScoreRow, TruePhase};
+use crate::{EvaluateError, ShiftScoreRow, TruePhase};
 
 /// The place of no element among those of the gearbox.
 pub(crate) const NO_ELEMENT: usize = usize::MAX;
@@ -292,10 +292,10 @@ pub fn score_drive(
     recording: &Recording,
     sensors: &Sensors,
     seed: u64,
-) -> Result<ScoredDrive, AnyShiftError> {
+) -> Result<ScoredDrive, EvaluateError> {
     let budget = ErrorBudget::of_car(known).read_by(known, Some(sensors));
-    let tables = ShiftTables::of_car(known, &budget).map_err(AnyShiftError::TooManyElements)?;
-    let filter = any_shift_filter(known, &tables, &budget, Some(sensors));
+    let tables = ShiftTables::of_car(known, &budget).map_err(EvaluateError::TooManyElements)?;
+    let filter = gearbox_filter(known, &tables, &budget, Some(sensors));
     let mut scorer = DriveScorer::new(known, model, &tables, &filter);
     for (sample, input) in recording.samples.iter().zip(recording.inputs(known, &tables, sensors, seed)) {
         scorer.push(sample, &input);
@@ -308,8 +308,8 @@ pub struct DriveScorer<'a> {
     known: &'a Car,
     model: &'a CarModel,
     tables: &'a ShiftTables<f64>,
-    filter: &'a AnyShiftFilter<'a, f64>,
-    state: AnyShiftState<f64>,
+    filter: &'a GearboxFilter<'a, f64>,
+    state: GearboxState<f64>,
     passing: PassingShifts,
     rating: Option<CarShiftRating>,
     last: Option<CarSample>,
@@ -321,7 +321,7 @@ impl<'a> DriveScorer<'a> {
         known: &'a Car,
         model: &'a CarModel,
         tables: &'a ShiftTables<f64>,
-        filter: &'a AnyShiftFilter<'a, f64>,
+        filter: &'a GearboxFilter<'a, f64>,
     ) -> Self {
         let (state, passing) = (filter.start(), PassingShifts::default());
         Self { known, model, tables, filter, state, passing, rating: None, last: None }

@@ -1,12 +1,12 @@
 //! The gearbox filter step by step, for a log that is not there yet: on a test bench, in a loop, behind another language.
 
 use car::{Car, ElementId, ErrorBudget, Gear, GearId, Sensors, Step};
-use observer::any_shift::{
-    AnyShiftFilter, AnyShiftState, GearCommand, GearboxTables, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput,
+use observer::gearbox::{
+    GearCommand, GearboxFilter, GearboxState, GearboxTables, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput,
 };
-use observer::{ShiftTables, any_shift_filter};
+use observer::{ShiftTables, gearbox_filter};
 
-use crate::AnyShiftError;
+use crate::EvaluateError;
 
 /// The gearbox filter of a car, with what it knows after the steps so far.
 ///
@@ -29,8 +29,8 @@ use crate::AnyShiftError;
 pub struct Estimator {
     tables: ShiftTables<f64>,
     /// With tables of no gearbox; those of this one are put in for each step.
-    filter: AnyShiftFilter<'static, f64>,
-    state: AnyShiftState<f64>,
+    filter: GearboxFilter<'static, f64>,
+    state: GearboxState<f64>,
     gears: Vec<String>,
     elements: Vec<String>,
 }
@@ -43,11 +43,11 @@ impl Estimator {
     ///
     /// # Errors
     /// The gearbox has more clutches than the filter has room for.
-    pub fn new(car: &Car, sensors: Option<&Sensors>, learnt: Option<&Learnt<f64>>) -> Result<Self, AnyShiftError> {
+    pub fn new(car: &Car, sensors: Option<&Sensors>, learnt: Option<&Learnt<f64>>) -> Result<Self, EvaluateError> {
         let budget = ErrorBudget::of_logged_car(car).read_by(car, sensors);
-        let tables = ShiftTables::of_car(car, &budget).map_err(AnyShiftError::TooManyElements)?;
+        let tables = ShiftTables::of_car(car, &budget).map_err(EvaluateError::TooManyElements)?;
         let (filter, state) = {
-            let filter = any_shift_filter(car, &tables, &budget, sensors);
+            let filter = gearbox_filter(car, &tables, &budget, sensors);
             let state = learnt.map_or_else(|| filter.start(), |learnt| filter.start_with(learnt));
             (without_tables(&filter), state)
         };
@@ -66,7 +66,7 @@ impl Estimator {
         self.elements.iter().position(|element| element == name).and_then(ElementId::new)
     }
 
-    /// The name of the element that a [`observer::any_shift::ClutchEstimate`] is of; `None` of a one-way clutch.
+    /// The name of the element that a [`observer::gearbox::ClutchEstimate`] is of; `None` of a one-way clutch.
     pub fn name_of(&self, place: usize) -> Option<&str> {
         if place == ONE_WAY {
             return None;
@@ -78,13 +78,13 @@ impl Estimator {
     /// Takes a step and returns the estimate for it. Readings of elements that the filter does not have are left out.
     pub fn step(&mut self, step: &Step) -> ShiftEstimate<f64> {
         let input = self.input(step);
-        let filter = AnyShiftFilter { tables: self.tables.tables(), ..self.filter };
+        let filter = GearboxFilter { tables: self.tables.tables(), ..self.filter };
         filter.step(&mut self.state, &input)
     }
 
     /// Guaranteed range of the pressure of an element after the last step, Pa; `None` where there is none.
     pub fn pressure_range_pa(&self, element: ElementId) -> Option<[f64; 2]> {
-        let filter = AnyShiftFilter { tables: self.tables.tables(), ..self.filter };
+        let filter = GearboxFilter { tables: self.tables.tables(), ..self.filter };
         filter.pressure_range_pa(&self.state, self.tables.place(element.place())?)
     }
 
@@ -123,9 +123,9 @@ impl Estimator {
 }
 
 /// The filter without its gearbox.
-fn without_tables(filter: &AnyShiftFilter<'_, f64>) -> AnyShiftFilter<'static, f64> {
-    let AnyShiftFilter { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits, .. } = *filter;
-    AnyShiftFilter { tables: NO_TABLES, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits }
+fn without_tables(filter: &GearboxFilter<'_, f64>) -> GearboxFilter<'static, f64> {
+    let GearboxFilter { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits, .. } = *filter;
+    GearboxFilter { tables: NO_TABLES, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits }
 }
 
 #[cfg(test)]
@@ -144,7 +144,7 @@ mod tests {
         let car = six_speed();
         let budget = ErrorBudget::of_logged_car(&car);
         let tables = ShiftTables::of_car(&car, &budget).unwrap();
-        let filter = any_shift_filter(&car, &tables, &budget, None);
+        let filter = gearbox_filter(&car, &tables, &budget, None);
         let mut state = filter.start();
         let mut estimator = Estimator::new(&car, None, None).unwrap();
         let [first, second] = ["1", "2"].map(|name| estimator.gear(name).unwrap());

@@ -1,6 +1,6 @@
 //! What the shifts of a log do to what the filter has learnt.
 
-use observer::any_shift::Learnt;
+use observer::gearbox::Learnt;
 
 /// Shifts that were learnt from, counted step by step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,7 +39,7 @@ impl LearningCount {
 
 #[cfg(test)]
 mod tests {
-    use observer::any_shift::LEARNT;
+    use observer::gearbox::LEARNT;
 
     use super::*;
 

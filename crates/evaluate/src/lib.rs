@@ -27,7 +27,7 @@ pub use estimator::Estimator;
 pub use score::{ClutchRow, ShiftScoreRow, SquaredErrors, TruePhase};
 pub use step::LogStep;
 
-use observer::any_shift::MAX_ELEMENTS;
+use observer::gearbox::MAX_ELEMENTS;
 use plant::TrainError;
 use plant::car::CarError;
 use thiserror::Error;
@@ -45,7 +45,7 @@ pub const DRAG_N_M: f64 = 1.2;
 
 /// Why a shift could not be scored.
 #[derive(Debug, Error)]
-pub enum AnyShiftError {
+pub enum EvaluateError {
     /// The simulation failed.
     #[error("the shift cannot be simulated: {0}")]
     Car(#[from] CarError),

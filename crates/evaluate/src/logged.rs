@@ -2,12 +2,11 @@
 
 use car::ErrorBudget;
 use car::{Car, Sensors};
-use observer::any_shift::{
-    AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate,
-    ShiftPhase,
+use observer::gearbox::{
+    ClutchEstimate, GearCommand, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftPhase,
 };
 use observer::{Health, Reading};
-use observer::{ShiftTables, any_shift_filter};
+use observer::{ShiftTables, gearbox_filter};
 use plant::car::{BeyondGears, CarShiftQuality, NO_GEAR};
 
 use crate::LogStep;
@@ -25,7 +24,7 @@ use crate::checks::still_commands::StillCommands;
 use crate::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
 use crate::learning_count::LearningCount;
 use crate::score::within;
-use crate::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow};
+use crate::{ClutchRow, DRAG_N_M, EvaluateError, ROUNDING_PA, ShiftScoreRow};
 
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
@@ -37,8 +36,8 @@ const HOLE_S: f64 = 0.5;
 pub struct LoggedDrive<'c> {
     car: &'c Car,
     tables: &'c ShiftTables<f64>,
-    filter: AnyShiftFilter<'c, f64>,
-    state: AnyShiftState<f64>,
+    filter: GearboxFilter<'c, f64>,
+    state: GearboxState<f64>,
     learning: LearningCount,
     passing: PassingShifts,
     /// Newest speeds of engine, turbine and output, rad/s: as they came, with the time, and those that the filter did not refuse.
@@ -110,7 +109,7 @@ impl<'c> LoggedDrive<'c> {
         learnt: Option<&Learnt<f64>>,
     ) -> Self {
         let budget = logged_budget(car, sensors);
-        let filter = any_shift_filter(car, tables, &budget, sensors);
+        let filter = gearbox_filter(car, tables, &budget, sensors);
         let state = learnt.map_or_else(|| filter.start(), |learnt| filter.start_with(learnt));
         Self {
             car,
@@ -143,8 +142,8 @@ impl<'c> LoggedDrive<'c> {
     ///
     /// # Errors
     /// The gearbox has more clutches than the filter has room for.
-    pub fn tables(car: &Car, sensors: Option<&Sensors>) -> Result<ShiftTables<f64>, AnyShiftError> {
-        ShiftTables::of_car(car, &logged_budget(car, sensors)).map_err(AnyShiftError::TooManyElements)
+    pub fn tables(car: &Car, sensors: Option<&Sensors>) -> Result<ShiftTables<f64>, EvaluateError> {
+        ShiftTables::of_car(car, &logged_budget(car, sensors)).map_err(EvaluateError::TooManyElements)
     }
 
     /// Takes a row and returns the estimate for it.
@@ -236,7 +235,7 @@ impl<'c> LoggedDrive<'c> {
     }
 
     /// The filter, what it has learnt up to now, and from how many shifts of the log.
-    pub fn learnt(&self) -> (&AnyShiftFilter<'c, f64>, &Learnt<f64>, LearningCount) {
+    pub fn learnt(&self) -> (&GearboxFilter<'c, f64>, &Learnt<f64>, LearningCount) {
         (&self.filter, self.state.learnt(), self.learning)
     }
 

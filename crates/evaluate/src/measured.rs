@@ -11,7 +11,7 @@ use car::{Car, Sensors};
 use drivetrain::CommandKind;
 use observer::Reading;
 use observer::ShiftTables;
-use observer::any_shift::ShiftInput;
+use observer::gearbox::ShiftInput;
 use plant::car::CarSample;
 use plant::sensors::{Channel, Readings, Rows, dealt, read_current, read_speed};
 

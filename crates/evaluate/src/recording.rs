@@ -4,7 +4,7 @@ use car::{Car, Sensors};
 use drivetrain::Real;
 use observer::Reading;
 use observer::ShiftTables;
-use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::{CarSample, NO_GEAR};
 use plant::sensors::{Channel, Readings, Rows, read_speed};
 

@@ -2,12 +2,12 @@
 
 use car::{Car, ErrorBudget, Sensors};
 use drivetrain::Real;
-use observer::any_shift::{AnyShiftFilter, AnyShiftState, ONE_WAY, ShiftEstimate, ShiftInput};
-use observer::{Health, ShiftTables, any_shift_filter};
+use observer::gearbox::{GearboxFilter, GearboxState, ONE_WAY, ShiftEstimate, ShiftInput};
+use observer::{Health, ShiftTables, gearbox_filter};
 use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_shift};
 
 use crate::recording::{Recording, records_in_a_sample};
-use crate::{AnyShiftError, CARRIES_N_M, DRAG_N_M, RECORD_S, ROUNDING_PA};
+use crate::{CARRIES_N_M, DRAG_N_M, EvaluateError, RECORD_S, ROUNDING_PA};
 
 /// Truth and estimates of one clutch at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -177,11 +177,11 @@ pub fn score_shift(
     shift: &CarShift,
     sensors: &Sensors,
     seed: u64,
-) -> Result<Vec<ShiftScoreRow>, AnyShiftError> {
+) -> Result<Vec<ShiftScoreRow>, EvaluateError> {
     let samples = simulated(known, truth, shift)?;
     let budget = ErrorBudget::of_car(known).read_by(known, Some(sensors));
-    let tables = ShiftTables::of_car(known, &budget).map_err(AnyShiftError::TooManyElements)?;
-    let filter = any_shift_filter(known, &tables, &budget, Some(sensors));
+    let tables = ShiftTables::of_car(known, &budget).map_err(EvaluateError::TooManyElements)?;
+    let filter = gearbox_filter(known, &tables, &budget, Some(sensors));
     let inputs = inputs(known, &tables, &samples, sensors, seed);
     Ok(score_samples(&tables, &filter, &samples, &inputs))
 }
@@ -190,7 +190,7 @@ pub fn score_shift(
 ///
 /// # Errors
 /// The gears have no shift between two clutches, or the simulation fails.
-pub fn simulated(known: &Car, truth: &Car, shift: &CarShift) -> Result<Vec<CarSample>, AnyShiftError> {
+pub fn simulated(known: &Car, truth: &Car, shift: &CarShift) -> Result<Vec<CarSample>, EvaluateError> {
     let model = CarModel::new(truth.clone())?;
     let mut samples = Vec::new();
     let shift = CarShift { sample_time_s: RECORD_S, ..*shift };
@@ -215,7 +215,7 @@ pub fn inputs(
 /// Truth and estimates of a recorded drive while its shifts are under way.
 pub fn score_samples(
     tables: &ShiftTables<f64>,
-    filter: &AnyShiftFilter<'_, f64>,
+    filter: &GearboxFilter<'_, f64>,
     samples: &[CarSample],
     inputs: &[(usize, ShiftInput<f64>)],
 ) -> Vec<ShiftScoreRow> {
@@ -225,8 +225,8 @@ pub fn score_samples(
 /// The same by a filter that goes on from a state: with what it has learnt.
 pub fn score_from(
     tables: &ShiftTables<f64>,
-    filter: &AnyShiftFilter<'_, f64>,
-    state: &mut AnyShiftState<f64>,
+    filter: &GearboxFilter<'_, f64>,
+    state: &mut GearboxState<f64>,
     samples: &[CarSample],
     inputs: &[(usize, ShiftInput<f64>)],
 ) -> Vec<ShiftScoreRow> {

@@ -1,6 +1,6 @@
 //! A row of a log, measured or simulated.
 
-use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use observer::{Reading, ShiftTables};
 
 /// A row of a log.

@@ -109,10 +109,7 @@ impl ShiftModel {
         let segments = record.segments.clone();
         let begin_s = segments.iter().map(|segment| segment.span_s[0]).fold(f64::INFINITY, f64::min);
         let end_s = segments.iter().map(|segment| segment.span_s[1]).fold(f64::NEG_INFINITY, f64::max);
-        let steps = |span_s: f64| {
-            let steps = (span_s / STEP_S).round().max(0.0) as usize;
-            steps
-        };
+        let steps = |span_s: f64| (span_s / STEP_S).round().max(0.0) as usize;
         let part = |segment: &Segment| {
             let before = steps(segment.span_s[0] - begin_s);
             Part {

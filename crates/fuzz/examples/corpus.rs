@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use config::{CarFile, write_learnt};
 use fuzz::{Depth, Fuzzer};
-use study::any_shift::logged::LoggedDrive;
+use study::gearbox::logged::LoggedDrive;
 use trace::{Cell, ColumnKind, TableWriter};
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -8,12 +8,12 @@ use car::Car;
 use config::{CarFile, ExperimentFile, GearboxFile, Source, Study, VehicleFile, read_learnt, write_learnt};
 use design::{design_compliant, design_rigid};
 use observer::Reading;
-use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_shift};
 use report::gearbox_figure::{gear_figure, train_figure};
-use study::any_shift::car_log::LogStep;
-use study::any_shift::logged::LoggedDrive;
 use study::campaign::{factor_values, run_seed};
+use study::gearbox::car_log::LogStep;
+use study::gearbox::logged::LoggedDrive;
 use study::{Log, Row, RunColumns, simulate_shift};
 use trace::{ColumnKind, CsvRows, GrowingTable, partial_path, read_csv, read_rows, write_csv, write_parquet};
 

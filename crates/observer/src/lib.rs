@@ -14,13 +14,13 @@ extern crate alloc;
 extern crate std;
 
 pub mod alignment;
-pub mod any_shift;
 pub mod bound;
 mod commands;
 pub mod compliant;
 pub mod compliant_model;
 pub mod extended;
 pub mod fill_range;
+pub mod gearbox;
 pub mod inversion;
 pub mod kalman;
 #[cfg(feature = "std")]
@@ -40,18 +40,18 @@ pub mod tracker;
 pub mod unscented;
 
 pub use alignment::{Aligned, AlignedState, Alignment, AlignmentState};
-pub use any_shift::{AnyShiftFilter, AnyShiftState, GearboxTables, ShiftEstimate, ShiftInput};
 pub use bound::{Bounded, Bounds, Budget, RangeEstimator, RangeState};
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};
 pub use extended::{ExtendedFilter, ExtendedState, FilterNoise, Readings};
 pub use fill_range::{FillBudget, PistonRange};
+pub use gearbox::{GearboxFilter, GearboxState, GearboxTables, ShiftEstimate, ShiftInput};
 pub use inversion::{Inversion, InversionState};
 pub use kalman::{
     EngineNoise, KalmanFilter, KalmanState, OffgoingClutch, ReportedTorque, SpeedReading, Uncertainty, ValveModel,
 };
 #[cfg(feature = "std")]
-pub use of_car::{ShiftTables, any_shift_filter, element_uncertainty};
+pub use of_car::{ShiftTables, element_uncertainty, gearbox_filter};
 pub use pressure_range::PressureRange;
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};

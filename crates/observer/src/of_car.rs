@@ -2,8 +2,8 @@
 
 use alloc::vec::Vec;
 
-use crate::any_shift::{
-    AnyShiftFilter, ElementUncertainty, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY,
+use crate::gearbox::{
+    ElementUncertainty, FrictionElement, GearRow, GearboxFilter, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY,
     Piston, ShiftRow, ShiftUncertainty, TurbineTorque, ValveLimits,
 };
 use crate::{Budget, FillBudget, InputLimits, ValveModel};
@@ -221,13 +221,13 @@ fn valve_limits(errors: &ElementErrors) -> ValveLimits<f64> {
 /// moment, with the noise of usual sensors.
 ///
 /// A bound of the errors counts as the edge of a uniform distribution, those of friction and valves times the scale that the file has of its own.
-pub fn any_shift_filter<'a>(
+pub fn gearbox_filter<'a>(
     car: &Car,
     tables: &'a ShiftTables<f64>,
     budget: &ErrorBudget,
     sensors: Option<&Sensors>,
-) -> AnyShiftFilter<'a, f64> {
-    AnyShiftFilter {
+) -> GearboxFilter<'a, f64> {
+    GearboxFilter {
         tables: tables.tables(),
         driveline: car.driveline,
         wheels_kg_m2: car.road.inertia_at_wheel() + car.driveline.wheel_inertia_kg_m2,

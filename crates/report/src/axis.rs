@@ -99,8 +99,7 @@ pub(crate) fn nice_step(least: f64) -> f64 {
 
 /// Decimals that tell multiples of a step apart.
 pub(crate) fn decimals(step: f64) -> usize {
-    let digits = (-Real::log10(step * 1.001).floor()).clamp(0.0, 6.0) as usize;
-    digits
+    (-Real::log10(step * 1.001).floor()).clamp(0.0, 6.0) as usize
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use car::{Car, ErrorBudget};
 use config::CarFile;
 use minijinja::{Value, context};
-use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity};
+use study::gearbox::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity};
 
 use crate::page::{PageError, origin, render};
 use crate::tables::number;
@@ -16,7 +16,7 @@ const HIDDEN: &str = "hidden";
 
 /// Why a certified bound and this statistic may call different phases hidden; without its full stop.
 pub const BOUND_AND_DEVIATION: &str = "`design` and `sensitivity` may call different phases hidden: `design` bounds the error with all errors at their bounds at the \
-                                       same time, for a fixed gain;\n`sensitivity` gives the standard deviation of the filter for any shift, with errors \
+                                       same time, for a fixed gain;\n`sensitivity` gives the standard deviation of the gearbox filter, with errors \
                                        anywhere within their bounds, independent of each other";
 
 /// Titles and rows of the summary: a row for each shift.

@@ -4,8 +4,8 @@ use car::Car;
 use config::CarFile;
 use drivetrain::ShiftKind;
 use minijinja::{Value, context};
-use study::any_shift::SquaredErrors;
-use study::any_shift::matrix::{CLASSES, Matrix, MatrixCounts, MatrixRow, NOTHING_N_M, PhaseErrors, Pooled, class};
+use study::gearbox::SquaredErrors;
+use study::gearbox::matrix::{CLASSES, Matrix, MatrixCounts, MatrixRow, NOTHING_N_M, PhaseErrors, Pooled, class};
 use trace::Cell;
 
 use crate::page::{PageError, origin, render};
@@ -121,7 +121,7 @@ pub fn kind_rows(matrix: &Matrix) -> (Vec<&'static str>, Vec<Vec<String>>) {
     let mut rows = Vec::new();
     for kind in ShiftKind::ALL {
         for at in 0..CLASSES.len() {
-            let of = |shift: &study::any_shift::matrix::MatrixShift| shift.kind == kind && class(shift.gain) == at;
+            let of = |shift: &study::gearbox::matrix::MatrixShift| shift.kind == kind && class(shift.gain) == at;
             if !matrix.rows.iter().any(|row| of(&row.shift)) {
                 continue;
             }

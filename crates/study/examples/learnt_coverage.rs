@@ -17,7 +17,7 @@ use std::path::Path;
 use car::Drive;
 use car::ErrorBudget;
 use config::{CarFile, DriveFile};
-use study::any_shift::learnt_coverage::{Coverage, LearntDrive, Quantity, Sampled, SampledCar, TorqueErrors, learn};
+use study::gearbox::learnt_coverage::{Coverage, LearntDrive, Quantity, Sampled, SampledCar, TorqueErrors, learn};
 
 const CARS: [&str; 5] = ["eight_speed", "six_speed", "four_speed", "ten_speed", "dual_clutch"];
 

@@ -8,7 +8,7 @@ use observer::{Bounds, Estimate, Phase};
 use plant::PlantError;
 use trace::{Trace, TraceError, signal};
 
-use crate::any_shift::AnyShiftError;
+use crate::gearbox::EvaluateError;
 use crate::observers::{AnyObserver, ranges};
 use crate::sampling::{sampled, through_sensors};
 use crate::score::{score_ranges, size};
@@ -52,7 +52,7 @@ pub enum StudyError {
     Trace(#[from] TraceError),
     /// A shift of a car with any gearbox could not be scored.
     #[error(transparent)]
-    AnyShift(#[from] AnyShiftError),
+    AnyShift(#[from] EvaluateError),
 }
 
 /// One observer's part in a comparison.

@@ -5,7 +5,6 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
-pub mod any_shift;
 pub mod bench;
 pub mod campaign;
 pub mod comparison;
@@ -15,6 +14,7 @@ pub mod drive;
 pub mod error_bound;
 pub mod estimates;
 mod frozen_rows;
+pub mod gearbox;
 pub mod log;
 pub mod observers;
 pub mod overview;

@@ -1,4 +1,4 @@
-//! How well the filter for any shift learns a car from shift to shift.
+//! How well the gearbox filter learns a car from shift to shift.
 //!
 //! A car that is not the one that filter and controller know makes shifts between neighbouring gears, up and down, with and
 //! without power, in a random order. After them each of its shifts is scored with what was learnt up to then.
@@ -6,12 +6,12 @@
 use car::ErrorBudget;
 use car::{Car, Sensors};
 use observer::Reading;
-use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
-use observer::{ShiftTables, any_shift_filter};
+use observer::gearbox::{GearboxFilter, Learnt, ShiftInput};
+use observer::{ShiftTables, gearbox_filter};
 use plant::car::{CarSample, CarShift};
 
-use crate::any_shift::recording::reported_engine_n_m;
-use crate::any_shift::{AnyShiftError, ShiftScoreRow, inputs, score_from, simulated};
+use crate::gearbox::recording::reported_engine_n_m;
+use crate::gearbox::{EvaluateError, ShiftScoreRow, inputs, score_from, simulated};
 
 /// A shift of the true car with what the filter is shown of it.
 #[derive(Debug, Clone)]
@@ -34,7 +34,7 @@ impl RecordedShift {
         shift: CarShift,
         sensors: &Sensors,
         seed: u64,
-    ) -> Result<Self, AnyShiftError> {
+    ) -> Result<Self, EvaluateError> {
         let samples = simulated(known, truth, &shift)?;
         let inputs = inputs(known, tables, &samples, sensors, seed);
         Ok(Self { shift, samples, inputs })
@@ -57,14 +57,14 @@ impl RecordedShift {
     pub fn rows(
         &self,
         tables: &ShiftTables<f64>,
-        filter: &AnyShiftFilter<'_, f64>,
+        filter: &GearboxFilter<'_, f64>,
         learnt: &Learnt<f64>,
     ) -> Vec<ShiftScoreRow> {
         score_from(tables, filter, &mut filter.go_on_with(learnt), &self.samples, &self.inputs)
     }
 
     /// What a filter has learnt after it, if it had learnt this before.
-    pub fn learnt(&self, filter: &AnyShiftFilter<'_, f64>, before: &Learnt<f64>) -> Learnt<f64> {
+    pub fn learnt(&self, filter: &GearboxFilter<'_, f64>, before: &Learnt<f64>) -> Learnt<f64> {
         let mut state = filter.go_on_with(before);
         for (_, input) in &self.inputs {
             filter.step(&mut state, input);
@@ -77,13 +77,13 @@ impl RecordedShift {
 ///
 /// # Errors
 /// The gearbox has more clutches than the filter has room for.
-pub fn tables_with_inertia(car: &Car, factor: f64) -> Result<ShiftTables<f64>, AnyShiftError> {
-    let mut tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).map_err(AnyShiftError::TooManyElements)?;
+pub fn tables_with_inertia(car: &Car, factor: f64) -> Result<ShiftTables<f64>, EvaluateError> {
+    let mut tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).map_err(EvaluateError::TooManyElements)?;
     tables.scale_inertia(factor);
     Ok(tables)
 }
 
 /// The filter of a car with these tables behind these sensors.
-pub fn filter<'a>(car: &Car, tables: &'a ShiftTables<f64>, sensors: &Sensors) -> AnyShiftFilter<'a, f64> {
-    any_shift_filter(car, tables, &ErrorBudget::of_car(car).read_by(car, Some(sensors)), Some(sensors))
+pub fn filter<'a>(car: &Car, tables: &'a ShiftTables<f64>, sensors: &Sensors) -> GearboxFilter<'a, f64> {
+    gearbox_filter(car, tables, &ErrorBudget::of_car(car).read_by(car, Some(sensors)), Some(sensors))
 }

@@ -13,7 +13,7 @@ use plant::PlantError;
 use plant::car::CarError;
 use report::PageError;
 use study::StudyError;
-use study::any_shift::AnyShiftError;
+use study::gearbox::EvaluateError;
 use trace::{ShownPath as _, TraceError};
 
 /// Why a call failed. A message has one line or more; a line that begins with `hint: ` says what to do.
@@ -190,11 +190,11 @@ impl From<StudyError> for Error {
     }
 }
 
-impl From<AnyShiftError> for Error {
-    fn from(error: AnyShiftError) -> Self {
+impl From<EvaluateError> for Error {
+    fn from(error: EvaluateError) -> Self {
         match error {
-            AnyShiftError::Car(error) => error.into(),
-            AnyShiftError::Train(_) | AnyShiftError::TooManyElements(_) | AnyShiftError::NoTables(_) => {
+            EvaluateError::Car(error) => error.into(),
+            EvaluateError::Train(_) | EvaluateError::TooManyElements(_) | EvaluateError::NoTables(_) => {
                 Self::Input(error.to_string())
             }
         }

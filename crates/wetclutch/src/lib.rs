@@ -23,7 +23,7 @@ pub use estimate::{Destination, EstimateOptions, Estimates, LogInput, estimate};
 pub use evaluate::Estimator;
 pub use gains::{DesignObserver, DesignOptions, Designed, design};
 pub use observer::Health;
-pub use observer::any_shift::{ClutchEstimate, ShiftEstimate, ShiftPhase};
+pub use observer::gearbox::{ClutchEstimate, ShiftEstimate, ShiftPhase};
 pub use score::{PhaseScore, Scores, score};
 pub use simulate::{Simulation, simulate};
 pub use table::{Column, Table, Values, Words};

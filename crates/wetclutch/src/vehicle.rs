@@ -5,7 +5,7 @@ use std::path::Path;
 use car::{Car, CarSize, Drive, GainMethod, ObserverKind, Sensors};
 use config::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
 use config::{CarFile, DriveFile, Kind, Source, read_learnt, write_learnt};
-use observer::any_shift::Learnt;
+use observer::gearbox::Learnt;
 use trace::ShownPath as _;
 
 use crate::Error;

@@ -209,7 +209,7 @@ pub(crate) enum Command {
     /// errors of the readings: scale, delays, outliers, lost readings, channels with clocks of their own.
     ///
     /// With the vehicle file of a car with a gearbox: every shift between neighbouring gears, up and down, with power and
-    /// without, each in --draws cars, estimated by the filter for any shift and by the open loop. Prints the RMS errors of the
+    /// without, each in --draws cars, estimated by the gearbox filter and by the open loop. Prints the RMS errors of the
     /// clutch torques (N m) by phase and their ratio, by shift and by kind; with -o, also writes bench.html and bench.csv.
     ///
     ///   wetclutch bench --vehicle vehicles/eight_speed.toml --draws 10 -o out

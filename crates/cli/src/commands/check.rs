@@ -187,7 +187,8 @@ fn describe_file(options: &Check, file: &Path, (source, kind): (Source, Kind)) -
             describe(&study.vehicle)
         }
         Kind::Learnt => {
-            let what = "what the filter for any shift has learnt of a car; whether it is of this car is known with its vehicle file";
+            let what =
+                "what the gearbox filter has learnt of a car; whether it is of this car is known with its vehicle file";
             describe_use(what, "wetclutch estimate LOG --vehicle VEHICLE --learnt", file)
         }
         Kind::ChannelMap => {

@@ -2,7 +2,7 @@
 
 use car::Sensors;
 use config::{CarFile, Change, DefaultTaken, VehicleFile};
-use study::any_shift::influence::{CarInfluence, ErrorOfEstimate, ValueFrom, car_influences};
+use study::gearbox::influence::{CarInfluence, ErrorOfEstimate, ValueFrom, car_influences};
 use study::{Influence, default_influences};
 use trace::units;
 

@@ -8,12 +8,12 @@ use config::{DriveFile, Source};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
 use report::matrix_page::kind_rows;
-use study::any_shift::drive::{ScoredDrive, score_drive};
-use study::any_shift::matrix::{Matrix, Random};
-use study::any_shift::measured::MeasuredRow;
-use study::any_shift::recording::Recording;
-use study::any_shift::tour::{LeftOut, drive_tour};
-use study::any_shift::{RECORD_S, ShiftDraw};
+use study::gearbox::drive::{ScoredDrive, score_drive};
+use study::gearbox::matrix::{Matrix, Random};
+use study::gearbox::measured::MeasuredRow;
+use study::gearbox::recording::Recording;
+use study::gearbox::tour::{LeftOut, drive_tour};
+use study::gearbox::{RECORD_S, ShiftDraw};
 use trace::{Cell, ShownPath as _};
 
 use super::matrix::bench_sensors;

@@ -6,7 +6,7 @@ use car::{Car, Sensors};
 use config::ExperimentFile;
 use report::matrix_page::{failures, kind_rows, matrix_page, shift_cells, shift_rows, without_tables};
 use serde_json::json;
-use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
+use study::gearbox::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::{Cell, ShownPath as _};
 
 use super::car::no_shift;

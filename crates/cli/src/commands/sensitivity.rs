@@ -7,7 +7,7 @@ use config::{Kind, Source, VehicleFile};
 use report::car_sensitivity_page::{BOUND_AND_DEVIATION, car_sensitivity_page, hidden_phases, sensitivity_rows};
 use report::sensitivity_page;
 use serde_json::json;
-use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity, car_sensitivity};
+use study::gearbox::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity, car_sensitivity};
 use study::sensitivity as find;
 use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
 use trace::ShownPath as _;

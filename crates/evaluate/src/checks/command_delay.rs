@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 
 use car::{ElementErrors, ErrorBudget};
 use observer::ShiftTables;
-use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
+use observer::gearbox::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
 
 use crate::LogStep;
 

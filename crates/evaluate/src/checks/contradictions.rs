@@ -7,7 +7,7 @@
 use car::Car;
 use car::ErrorBudget;
 use observer::ShiftTables;
-use observer::any_shift::MAX_ELEMENTS;
+use observer::gearbox::MAX_ELEMENTS;
 
 /// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.
 const STEADY_S: f64 = 1.0;

@@ -79,7 +79,7 @@ mod tests {
     use crate::{LogStep, SAMPLE_S};
     use config::CarFile;
     use observer::Reading;
-    use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+    use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
 
     /// A log in which the engine has this share of the torque that the converter takes; its speed changes at this rate, rad/s^2.
     fn said(share: f64, rate: f64, lock_up_applied: bool, rows: u32) -> Option<String> {

@@ -5,7 +5,7 @@
 use car::Car;
 use observer::Reading;
 use observer::ShiftTables;
-use observer::any_shift::MAX_ELEMENTS;
+use observer::gearbox::MAX_ELEMENTS;
 
 /// Longest time between two changes that is one message, s \[chosen\]: what stands longer is a command that rests.
 const LONGEST_S: f64 = 0.5;

@@ -90,7 +90,7 @@ mod tests {
     use crate::SAMPLE_S;
     use config::CarFile;
     use observer::Reading;
-    use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+    use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
 
     /// What is said of so long a log with this slip, rad/s, an engine that reports the pump's torque and more, N m, and a flag.
     fn said(seconds: u32, slip: f64, more_n_m: Option<f64>, lock_up_applied: bool) -> Option<String> {

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use car::Car;
 use drivetrain::ShiftKind;
 use observer::ShiftTables;
-use observer::any_shift::{GearCommand, MAX_ELEMENTS};
+use observer::gearbox::{GearCommand, MAX_ELEMENTS};
 use plant::car::CarShiftQuality;
 
 use crate::LogStep;

@@ -6,7 +6,7 @@
 use car::Car;
 use observer::Reading;
 use observer::ShiftTables;
-use observer::any_shift::MAX_ELEMENTS;
+use observer::gearbox::MAX_ELEMENTS;
 
 /// Readings of a command in a shift that are needed to judge \[chosen\].
 const ENOUGH: u32 = 3;

@@ -3,7 +3,7 @@
 use car::Vehicle;
 use drivetrain::{Converter, Driveline, RoadLoad, Tyre};
 use observer::ShiftTables;
-use observer::any_shift::MAX_ELEMENTS;
+use observer::gearbox::MAX_ELEMENTS;
 
 use super::Term;
 use crate::shape::{Knots, Map};

@@ -1,7 +1,7 @@
 //! A stretch of driving in one gear, reduced to steps.
 
 use drivetrain::clutch::drag_torque;
-use observer::any_shift::MAX_ELEMENTS;
+use observer::gearbox::MAX_ELEMENTS;
 
 use super::car::{CAPACITIES, DrivenCar, OpenElement};
 use super::skew::Pair;

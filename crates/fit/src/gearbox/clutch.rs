@@ -7,7 +7,7 @@ use car::Car;
 use drivetrain::{Cylinder, Real};
 use nalgebra::{DMatrix, DVector};
 use observer::ShiftTables;
-use observer::any_shift::ShiftRow;
+use observer::gearbox::ShiftRow;
 
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift::{MeasuredPressure, Unknowns};

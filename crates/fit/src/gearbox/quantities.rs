@@ -4,8 +4,8 @@ use car::Car;
 use car::ErrorBudget;
 use drivetrain::Real;
 use nalgebra::DMatrix;
-use observer::any_shift::{AnyShiftFilter, ElementUncertainty};
-use observer::{ShiftTables, any_shift_filter, element_uncertainty};
+use observer::gearbox::{ElementUncertainty, GearboxFilter};
+use observer::{ShiftTables, element_uncertainty, gearbox_filter};
 
 use super::shift_log::{ShiftLog, named_pair};
 use super::zero_offset::{sd_before_pa, zero_offsets};
@@ -133,7 +133,7 @@ impl Quantities {
         let mut elements: Vec<_> = (0..car.gearbox.elements.len()).filter_map(by_bounds).collect();
         elements.sort_by_key(|(place, _)| *place);
         let elements: Vec<_> = elements.into_iter().map(|(_, uncertainty)| uncertainty).collect();
-        let filter = any_shift_filter(car, tables, &budget, None);
+        let filter = gearbox_filter(car, tables, &budget, None);
         let mass_share = car.error_bounds.mass_share.unwrap_or(MASS);
         let known = Known { filter: &filter, elements: &elements, has_converter, measured: &measured, mass_share };
         let before = DMatrix::from_fn(all.len(), all.len(), |i, j| {
@@ -239,7 +239,7 @@ impl Quantities {
 
 /// What is known before a fit: what the filter of the car does not know.
 struct Known<'a> {
-    filter: &'a AnyShiftFilter<'a, f64>,
+    filter: &'a GearboxFilter<'a, f64>,
     /// By place in the tables.
     elements: &'a [ElementUncertainty<f64>],
     has_converter: bool,

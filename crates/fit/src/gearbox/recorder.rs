@@ -3,7 +3,7 @@
 use car::Car;
 use observer::Reading;
 use observer::ShiftTables;
-use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftClutch, ShiftInput};
+use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftClutch, ShiftInput};
 
 use super::shift_log::{ShiftLog, named_pair};
 use crate::driving::{DrivenCar, Driving, DrivingRecorder, RowState};

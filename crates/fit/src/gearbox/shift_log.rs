@@ -2,7 +2,7 @@
 
 use car::Car;
 use drivetrain::ShiftKind;
-use observer::any_shift::ShiftRow;
+use observer::gearbox::ShiftRow;
 
 use crate::Series;
 

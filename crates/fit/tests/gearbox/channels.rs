@@ -5,7 +5,7 @@ use config::CarFile;
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, fit};
 use fit::{Known, ReadingAges, Verdict};
 use observer::Reading;
-use observer::any_shift::{GearCommand, ShiftInput};
+use observer::gearbox::{GearCommand, ShiftInput};
 
 use super::drawn::{Case, Drawn, car, city, hilly, with_tip_ins};
 

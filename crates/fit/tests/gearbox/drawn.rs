@@ -10,13 +10,13 @@ use fit::gearbox::{Quantities, Quantity, Recorded, Recorder, ShiftLog};
 use fit::{ReadingAges, Series};
 use observer::Reading;
 use observer::ShiftTables;
-use observer::any_shift::ShiftInput;
+use observer::gearbox::ShiftInput;
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
-use study::any_shift::ShiftDraw;
+use study::gearbox::ShiftDraw;
 
-use study::any_shift::matrix::Random;
-use study::any_shift::measured::{MeasuredRow, SensedDrive};
-use study::any_shift::recording::reported_engine_n_m;
+use study::gearbox::matrix::Random;
+use study::gearbox::measured::{MeasuredRow, SensedDrive};
+use study::gearbox::recording::reported_engine_n_m;
 
 /// Bounds of what is drawn: as shares, and of the kiss point in Pa.
 const FRICTION: f64 = 0.15;

@@ -3,7 +3,7 @@
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorded, Recorder, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
-use observer::any_shift::{GearCommand, ShiftInput};
+use observer::gearbox::{GearCommand, ShiftInput};
 
 use super::drawn::{self, Case, Drawn, car, city, hilly};
 

@@ -2,9 +2,9 @@
 
 use car::ErrorBudget;
 use car::{Car, Drive};
-use observer::any_shift_filter;
+use observer::gearbox_filter;
 use plant::car::CarModel;
-use study::any_shift::drive::{DriveScorer, ScoredDrive};
+use study::gearbox::drive::{DriveScorer, ScoredDrive};
 
 use super::drawn::{Drawn, sensors, tables};
 
@@ -30,7 +30,7 @@ pub(crate) struct Estimated {
 pub(crate) fn estimated(drawn: &Drawn, drive: &Drive, cars: &[Car]) -> Vec<Estimated> {
     let (all_tables, sensors) = (cars.iter().map(tables).collect::<Vec<_>>(), sensors());
     let filters: Vec<_> = (cars.iter().zip(&all_tables))
-        .map(|(car, tables)| any_shift_filter(car, tables, &ErrorBudget::of_car(car), Some(&sensors)))
+        .map(|(car, tables)| gearbox_filter(car, tables, &ErrorBudget::of_car(car), Some(&sensors)))
         .collect();
     let model = CarModel::new(drawn.truth.clone()).unwrap();
     let mut scorers: Vec<_> = (cars.iter().zip(&all_tables).zip(&filters))

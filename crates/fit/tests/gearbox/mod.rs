@@ -14,8 +14,8 @@ use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
-use observer::any_shift::ShiftInput;
 use observer::element_uncertainty;
+use observer::gearbox::ShiftInput;
 
 fn fitted(drawn: &Drawn, shifts: &[ShiftLog]) -> GearboxFit {
     fit(&drawn.file, &drawn.tables(), shifts, &Driving::default(), &mut |_| ()).unwrap()

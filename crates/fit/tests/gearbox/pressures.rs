@@ -4,7 +4,7 @@ use car::Car;
 use fit::gearbox::{GearboxFit, Quantity, Recorded, Recorder, ShiftLog, open_loop};
 use fit::{ReadingAges, Series};
 use observer::Reading;
-use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
+use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 
 use super::drawn::{self, Case, Drawn, Truth, car, city, every_fifth, hilly};
 use super::{fitted, rows};

@@ -35,7 +35,7 @@ impl Gate {
 
     /// The same, but after a refused reading one within half of the gate tells that nothing has jumped: the next one beyond
     /// the gate is another outlier.
-    // The filter for any shift does without: refusing by this rule too, it fails two of its tests.
+    // The gearbox filter does without: refusing by this rule too, it fails two of its tests.
     pub(crate) fn ended_by_agreement(self) -> Self {
         Self { ended_by_agreement: true, ..self }
     }

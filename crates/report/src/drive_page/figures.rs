@@ -2,8 +2,8 @@
 
 use car::Car;
 use observer::Health;
-use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
-use study::any_shift::{ClutchRow, ShiftScoreRow, TruePhase};
+use study::gearbox::drive::{DriveState, ScoredDrive, ScoredShift};
+use study::gearbox::{ClutchRow, ShiftScoreRow, TruePhase};
 use trace::units::{km_h, mpa, rpm};
 
 use super::{MOST_DRAWN, clutch_names, name};

@@ -9,10 +9,10 @@ use car::Car;
 use config::Source;
 use minijinja::{Value, context};
 use observer::Health;
-use study::any_shift::drive::{ScoredDrive, ScoredShift};
-use study::any_shift::matrix::Matrix;
-use study::any_shift::worth_a_look::BY_EACH;
-use study::any_shift::{ShiftDraw, TruePhase};
+use study::gearbox::drive::{ScoredDrive, ScoredShift};
+use study::gearbox::matrix::Matrix;
+use study::gearbox::worth_a_look::BY_EACH;
+use study::gearbox::{ShiftDraw, TruePhase};
 
 use crate::interactive::within_room;
 use crate::matrix_page::kind_rows;

@@ -2,9 +2,9 @@
 
 use car::Car;
 use observer::Health;
-use study::any_shift::drive::{ScoredDrive, ScoredShift};
-use study::any_shift::matrix::{ErrorsByPhase, controlling_of};
-use study::any_shift::{SquaredErrors, TruePhase};
+use study::gearbox::drive::{ScoredDrive, ScoredShift};
+use study::gearbox::matrix::{ErrorsByPhase, controlling_of};
+use study::gearbox::{SquaredErrors, TruePhase};
 use trace::Cell;
 
 use super::{clutch_names, gears, kind_name, name, phase_s};

@@ -72,8 +72,8 @@ impl Layout {
             Member::Housing => self.rows.len(),
             Member::Shaft(shaft) => self.rows[shaft],
         };
-        let y = self.top + ROW * row as f64;
-        y
+
+        self.top + ROW * row as f64
     }
 
     /// Lower edge, below the housing.

@@ -1,4 +1,4 @@
-//! The filter for any shift over a drive: three minutes in town with the eight-speed car, which twenty times are an hour with
+//! The gearbox filter over a drive: three minutes in town with the eight-speed car, which twenty times are an hour with
 //! more than 200 shifts.
 
 use std::hint::black_box;
@@ -6,11 +6,11 @@ use std::hint::black_box;
 use car::ErrorBudget;
 use car::{Car, Drive, Sensors};
 use config::{CarFile, DriveFile, ExperimentFile};
-use observer::any_shift::{AnyShiftFilter, FrictionElement, GearboxTables, ShiftInput};
-use observer::{ShiftTables, any_shift_filter};
+use observer::gearbox::{FrictionElement, GearboxFilter, GearboxTables, ShiftInput};
+use observer::{ShiftTables, gearbox_filter};
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_drive};
-use study::any_shift::recording::Recording;
-use study::any_shift::{RECORD_S, ShiftDraw, inputs, simulated};
+use study::gearbox::recording::Recording;
+use study::gearbox::{RECORD_S, ShiftDraw, inputs, simulated};
 
 use crate::shared::root;
 
@@ -32,8 +32,8 @@ impl Known {
         Box::leak(Box::new(Self { car, tables, sensors: ExperimentFile::bench().unwrap().experiment.sensors.unwrap() }))
     }
 
-    fn filter(&self) -> AnyShiftFilter<'_, f64> {
-        any_shift_filter(&self.car, &self.tables, &ErrorBudget::of_car(&self.car), Some(&self.sensors))
+    fn filter(&self) -> GearboxFilter<'_, f64> {
+        gearbox_filter(&self.car, &self.tables, &ErrorBudget::of_car(&self.car), Some(&self.sensors))
     }
 
     fn truth(&self) -> Car {
@@ -51,7 +51,7 @@ impl Known {
 }
 
 /// The filter over its inputs, of which there are so many.
-fn steps(filter: AnyShiftFilter<'static, f64>, mut inputs: Vec<ShiftInput<f64>>, count: u64) -> Box<dyn FnMut()> {
+fn steps(filter: GearboxFilter<'static, f64>, mut inputs: Vec<ShiftInput<f64>>, count: u64) -> Box<dyn FnMut()> {
     inputs.truncate(usize::try_from(count).unwrap());
     assert_eq!(inputs.len() as u64, count);
     let mut state = filter.start();
@@ -89,7 +89,7 @@ pub(crate) fn open_loop() -> Box<dyn FnMut()> {
     }
     let filter = known.filter();
     steps(
-        AnyShiftFilter { tables: GearboxTables { elements: elements.leak(), ..tables }, ..filter },
+        GearboxFilter { tables: GearboxTables { elements: elements.leak(), ..tables }, ..filter },
         inputs,
         DRIVE_STEPS,
     )

@@ -32,12 +32,8 @@ pub(crate) const PATHS: &[HotPath] = &[
     HotPath { name: "step of the Kalman filter", units: 200, prepare: kalman_step },
     HotPath { name: "step of the rigid observer", units: 200, prepare: rigid_step },
     HotPath { name: "step of the range", units: 200, prepare: range_step },
-    HotPath { name: "step of the filter for any shift", units: drive::SHIFT_STEPS, prepare: drive::shift },
-    HotPath {
-        name: "step of the filter for any shift, over a drive",
-        units: drive::DRIVE_STEPS,
-        prepare: drive::drive,
-    },
+    HotPath { name: "step of the gearbox filter", units: drive::SHIFT_STEPS, prepare: drive::shift },
+    HotPath { name: "step of the gearbox filter, over a drive", units: drive::DRIVE_STEPS, prepare: drive::drive },
     HotPath {
         name: "step of its valve models alone, over a drive",
         units: drive::DRIVE_STEPS,

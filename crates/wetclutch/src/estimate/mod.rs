@@ -15,7 +15,7 @@ use std::sync::{Arc, LazyLock};
 
 use car::{GainMethod, ObserverKind, Sensors};
 use logs::{ChannelMap, Log, LogError};
-use observer::any_shift::Learnt;
+use observer::gearbox::Learnt;
 use report::drive_page::shift_cells;
 
 pub use self::log_checks::WITHOUT_SENSORS;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use car::Car;
 use config::{ConfigError, Source, read_learnt, write_learnt};
-use observer::any_shift::Learnt;
+use observer::gearbox::Learnt;
 use trace::{ShownPath as _, WholeFile};
 use wetclutch::estimate::gearbox::LearntOfDrive;
 

@@ -9,7 +9,7 @@ use fit::{FitError, ReadingAges};
 use indicatif::ProgressBar;
 use logs::ChannelMap;
 use observer::ShiftTables;
-use study::any_shift::logged::LoggedDrive;
+use study::gearbox::logged::LoggedDrive;
 use trace::ShownPath as _;
 use wetclutch::estimate::LogInput;
 use wetclutch::estimate::gearbox::check_ratios;

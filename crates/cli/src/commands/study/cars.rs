@@ -6,8 +6,8 @@ use car::ElementErrors;
 use config::{CarStudy, CarStudyRuns, Source, significant};
 use report::matrix_page::kind_rows;
 use study::StudyError;
-use study::any_shift::campaign::{CarCampaign, CarRow, CarSummary};
-use study::any_shift::matrix::Pooled;
+use study::gearbox::campaign::{CarCampaign, CarRow, CarSummary};
+use study::gearbox::matrix::Pooled;
 use trace::ShownPath as _;
 
 use super::part::{Part, Runs, lock, merged};

@@ -9,10 +9,10 @@ use evaluate::checks::Unusable;
 use logs::Role;
 use logs::plausibility::Seen;
 use observer::ShiftTables;
-use observer::any_shift::GearCommand;
+use observer::gearbox::GearCommand;
 use observer::{Health, Reading};
 use report::tables::health_meaning;
-use study::any_shift::car_log::{CarLog, LogStep};
+use study::gearbox::car_log::{CarLog, LogStep};
 
 use study::log::FIRST_LOOK;
 use trace::{ShownPath as _, signal};

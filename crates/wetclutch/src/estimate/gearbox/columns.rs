@@ -2,9 +2,9 @@
 
 use car::Car;
 use car::columns::element_column;
-use observer::any_shift::{MAX_ELEMENTS, ONE_WAY, ShiftEstimate};
+use observer::gearbox::{MAX_ELEMENTS, ONE_WAY, ShiftEstimate};
 use observer::{ChannelHealth, Channels};
-use study::any_shift::channels::gear_number;
+use study::gearbox::channels::gear_number;
 use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
 

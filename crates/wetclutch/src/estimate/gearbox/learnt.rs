@@ -4,7 +4,7 @@ use car::Car;
 use evaluate::learning_count::LearningCount;
 use evaluate::logged::LoggedDrive;
 use observer::ShiftTables;
-use observer::any_shift::{Learnt, LearntElement};
+use observer::gearbox::{Learnt, LearntElement};
 
 /// Part of the unlearnt deviation from which on nothing is said of a quantity \[chosen\]: the log has shown next to nothing of it.
 const SHOWN: f64 = 0.9;

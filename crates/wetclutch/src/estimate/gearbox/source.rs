@@ -7,9 +7,9 @@ use std::sync::atomic::AtomicBool;
 use car::Car;
 use logs::{Log, OnChange, Role};
 use observer::ShiftTables;
-use observer::any_shift::MAX_ELEMENTS;
-use study::any_shift::car_log::{CarLog, LogStep};
-use study::any_shift::channels::{CarChannels, own_map};
+use observer::gearbox::MAX_ELEMENTS;
+use study::gearbox::car_log::{CarLog, LogStep};
+use study::gearbox::channels::{CarChannels, own_map};
 use study::log::FIRST_LOOK;
 use trace::{CsvRows, ShownPath as _};
 

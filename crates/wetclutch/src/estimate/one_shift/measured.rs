@@ -10,7 +10,7 @@ use drivetrain::{ClutchValve, CommandKind};
 use logs::plausibility::Seen;
 use logs::{ChannelMap, Gearbox, GearsOfShift, Log, OnChange, Reading, Readings, Role, Shift, ShiftFinder, Steps};
 use observer::{ChannelHealth, Input, Reading as Measurement};
-use study::any_shift::pressure_command::command_of_valve;
+use study::gearbox::pressure_command::command_of_valve;
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use trace::{CsvRows, ShownPath as _, signal};
 

@@ -1,0 +1,117 @@
+//! Corrections by the readings of turbine, output and wheel speed.
+
+use super::{
+    ChannelHealth, Channels, GAP_S, GearboxFilter, MISFIT_S, Measured, OUTPUT, Rates, Reading, Running, SCALE, SPEEDS,
+    ShiftInput, TOOTH, TURBINE, TWIST_RAD, Verdict, WHEEL, WHEEL_S, square,
+};
+use crate::gearbox::learnt::EDGE;
+use drivetrain::Real;
+
+impl<T: Real> GearboxFilter<'_, T> {
+    /// Takes the readings of turbine, output and wheel, each against the speed at its time.
+    pub(super) fn take_speeds(
+        &self,
+        running: &mut Running<T>,
+        input: &ShiftInput<T>,
+        channels: &Channels<ChannelHealth>,
+        speeds: [T; 2],
+    ) -> [ChannelHealth; SPEEDS] {
+        let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
+        let mut health = [channels.turbine, channels.output, channels.wheel];
+        let unseen = self.may_slip_unseen(running, speeds);
+        let Some(torques) = running.torques else { return health.map(unused) };
+        let torques = torques.without(running.phase.phase.holding());
+        let rates = Rates::new(&self.response(running), &torques, &self.driveline, self.wheels_kg_m2);
+        let by_timing = torques.by_timing();
+        running.x.timing.add_pressure(&by_timing);
+        for k in 0..SPEEDS {
+            let Some(reading) = given[k].filter(|_| health[k] == ChannelHealth::Good) else { continue };
+            if unseen && k != WHEEL {
+                // The sensor is not silent, but its reading is not taken.
+                (running.silent_s[k], health[k]) = (T::zero(), ChannelHealth::Absent);
+                continue;
+            }
+            health[k] = self.correct(running, k, &reading, &rates);
+        }
+        running.x.timing.add_pressure(&by_timing.map(|by| by.map(|by| -by)));
+        running.rates = [TURBINE, OUTPUT, WHEEL].map(|k| rates.of(k, &running.x));
+        if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {
+            running.before = None;
+        }
+        health
+    }
+
+    /// Whether a clutch that is taken to hold may have begun to slip.
+    pub(super) fn may_slip_unseen(&self, running: &Running<T>, speeds: [T; 2]) -> bool {
+        match (&running.shift, running.phase.phase.holding()) {
+            (Some(shift), Some(held)) => {
+                let slip = self.slip(shift.clutches[held.min(1)].ratio, speeds);
+                slip.may_be()
+            }
+            (None, _) => self.tied_ratio(running).is_some_and(|ratio| self.slip(ratio, speeds).is_over()),
+            _ => false,
+        }
+    }
+
+    pub(super) fn correct(
+        &self,
+        running: &mut Running<T>,
+        k: usize,
+        reading: &Reading<T>,
+        rates: &Rates<T>,
+    ) -> ChannelHealth {
+        let sensor = &self.readings[k];
+        let age_s = self.age(sensor, reading);
+        let pitch_s = sensor.pitch_rad / reading.value.abs().max(self.uncertainty.output_least_rad_s);
+        let rate = rates.of(k, &running.x);
+        // The speed at the time of the reading: `w - age w'`, that of the wheels in its own scale.
+        let scale = if k == WHEEL { T::one() + running.x.mean[SCALE] } else { T::one() };
+        let then = running.x.mean[k] - age_s * rate;
+        let mut row = rates.rows[k].map(|x| -age_s * scale * x);
+        row[k] = row[k] + scale;
+        if k == WHEEL {
+            row[SCALE] = row[SCALE] + then;
+        }
+        let bent = T::of(0.5) * age_s * (rate - running.rates[k]);
+        let noise = square(sensor.deviation_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
+        let innovation = reading.value - scale * then;
+        let measured = Measured { row, innovation, noise };
+        if k == WHEEL && !self.is_of_this_car(running, reading, age_s) {
+            return ChannelHealth::Refused;
+        }
+        let mut look = running.x.look(&measured);
+        let variance = look.variance;
+        if k != WHEEL {
+            let share = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
+            running.misfit = running.misfit + share * (innovation * innovation / variance - running.misfit);
+        }
+        match running.gates[k].judge(innovation, variance) {
+            Verdict::Refused => return ChannelHealth::Refused,
+            Verdict::Jumped => {
+                running.x.add(k, k, innovation * innovation);
+                look = running.x.look(&measured);
+            }
+            Verdict::Taken => {}
+        }
+        running.x.correct(&look);
+        running.silent_s[k] = T::zero();
+        ChannelHealth::Good
+    }
+
+    /// Whether the wheel speed is that of the output within the bound of its scale, over more than a swing of the drive shafts. What is
+    /// further off is no speed of these wheels: of others that slip, or of a car with another final ratio.
+    fn is_of_this_car(&self, running: &mut Running<T>, reading: &Reading<T>, age_s: T) -> bool {
+        let share = running.silent_s[WHEEL] / (running.silent_s[WHEEL] + T::of(WHEEL_S));
+        running.silent_s[WHEEL] = T::zero();
+        let by_output = (running.x.mean[OUTPUT] - age_s * running.rates[OUTPUT]) / self.driveline.final_ratio;
+        let off = reading.value - by_output;
+        running.wheel_off_rad_s = running.wheel_off_rad_s + share * (off - running.wheel_off_rad_s);
+        let scale = T::of(EDGE) * self.uncertainty.wheel_scale * by_output.abs();
+        running.wheel_off_rad_s.abs() <= scale + T::of(TWIST_RAD / WHEEL_S)
+    }
+}
+
+/// What becomes of a reading that is not taken although it could be.
+fn unused(health: ChannelHealth) -> ChannelHealth {
+    if health == ChannelHealth::Good { ChannelHealth::Absent } else { health }
+}

@@ -1,0 +1,347 @@
+//! What the filter says after a step.
+
+use drivetrain::Real;
+
+use super::elements::{ElementState, PressureError};
+use super::phases::Slip;
+use super::powertrain::{ClutchTorque, Torques};
+use super::{
+    ClutchesAtTurbine, FRICTION, GearCommand, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS, N, Newest,
+    OUTPUT, PRESSURE, SHARE, SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+};
+use crate::{ChannelHealth, Channels, Health};
+
+/// Share of the valve model's uncertainty above which the speeds have shown nothing of a clutch's torque \[chosen\].
+const HIDDEN: f64 = 0.9;
+
+/// Pressure and torque of one clutch of a shift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClutchEstimate<T> {
+    /// The element, by its place in [`super::GearboxTables::elements`].
+    pub element: usize,
+    /// Cylinder pressure, Pa.
+    pub pressure_pa: T,
+    /// Torque, N m, positive when it drives its output side.
+    pub torque_n_m: T,
+    /// Standard deviation of the torque, N m.
+    pub deviation_n_m: T,
+    /// Pressure by the models of valve and piston alone, Pa.
+    pub valve_pa: T,
+    /// Torque by these models and friction alone, N m; of a clutch that holds, the torque up to which it does, in the direction of
+    /// its load.
+    pub open_loop_n_m: T,
+    /// Whether it holds.
+    pub holds: bool,
+    /// Whether the speeds show nothing of its torque: the estimate is that of the valve model.
+    pub hidden: bool,
+    /// Lowest and highest pressure, Pa, for errors within the budget.
+    pub pressure_range_pa: Option<[T; 2]>,
+    /// Lowest and highest torque, N m, for errors within the budget. Its direction is that of the slip, if that is larger than its
+    /// error; else, where an element that is engaged in both gears may slip by the bounds of the errors, and where a speed has not been read twice within 50 ms or its last reading was refused, either direction is
+    /// possible. The slip errs by 7 deviations and 0.6 rad/s, by twice its change since the older reading, by the spread of
+    /// the readings' ages times the rate of each speed, and by an acceleration that changes by up to 10,000 rad/s^3.
+    pub torque_range_n_m: Option<[T; 2]>,
+}
+
+/// Output of the filter after one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftEstimate<T> {
+    /// The gear or shift that the filter is in; none while it has only the valve models.
+    pub gear: Option<GearCommand>,
+    /// Which clutches hold.
+    pub phase: Option<ShiftPhase>,
+    /// The offgoing and the oncoming clutch of the shift; none in a gear.
+    pub clutches: Option<[ClutchEstimate<T>; 2]>,
+    /// Pressures of all elements by the models of their valves and pistons, Pa.
+    pub valve_pa: [T; MAX_ELEMENTS],
+    /// Slip of the offgoing clutch away from the new gear, at the turbine, rad/s, where the readings show one: a flare. Else
+    /// zero.
+    pub flare_rad_s: T,
+    /// Torque at the gearbox input, N m, as corrected.
+    pub turbine_n_m: Option<T>,
+    /// Torque of the drive shafts, N m.
+    pub shaft_n_m: Option<T>,
+    /// The lock-up clutch of the converter while it is applied; without a converter, the clutch of the gear while there is no shift.
+    pub input_clutch: Option<InputClutch<T>>,
+    /// All clutches together as the turbine feels them, of a gearbox without elements: one of which the ratios alone are known.
+    pub at_turbine: Option<ClutchesAtTurbine<T>>,
+    /// Whether the input could be used, and whether the estimate can be believed.
+    pub health: Health,
+    /// What became of the reading of each channel; of the commands together a refused one, or a lost one
+    /// of an element that shifts.
+    pub channels: Channels<ChannelHealth>,
+    /// The same of the command of each element.
+    pub commands: [ChannelHealth; MAX_ELEMENTS],
+}
+
+impl<T: Real> ShiftEstimate<T> {
+    pub(super) fn nothing() -> Self {
+        Self {
+            gear: None,
+            phase: None,
+            clutches: None,
+            valve_pa: [T::zero(); MAX_ELEMENTS],
+            flare_rad_s: T::zero(),
+            turbine_n_m: None,
+            shaft_n_m: None,
+            input_clutch: None,
+            at_turbine: None,
+            health: Health::SpeedsRejected,
+            channels: Channels::all(ChannelHealth::Lost),
+            commands: [ChannelHealth::Lost; MAX_ELEMENTS],
+        }
+    }
+}
+
+impl<T: Real> GearboxFilter<'_, T> {
+    pub(super) fn conclude(
+        &self,
+        state: &mut GearboxState<T>,
+        input: &ShiftInput<T>,
+        (channels, commands): (&Channels<ChannelHealth>, &[ChannelHealth; MAX_ELEMENTS]),
+        mut health: Health,
+        turbine_n_m: Option<T>,
+    ) {
+        let refused = channels.each().contains(&ChannelHealth::Refused);
+        let lost = channels.each().contains(&ChannelHealth::Lost);
+        health = health.max(match (channels.command == ChannelHealth::Refused, lost, refused) {
+            (true, _, _) => Health::CommandRejected,
+            (_, true, _) => Health::ChannelLost,
+            (_, _, true) => Health::ReadingRefused,
+            _ => Health::Good,
+        });
+        let (_, since_s) = state.gears;
+        let mut valve_pa =
+            state.elements.each_ref().map(|element| element.as_ref().map_or(T::zero(), |element| element.valve_pa));
+        if state.strokes {
+            valve_pa = state.elements.each_ref().map(|of| of.as_ref().map_or(T::zero(), ElementState::pressure_pa));
+        }
+        let estimate = &mut state.estimate;
+        *estimate = ShiftEstimate { valve_pa, channels: *channels, commands: *commands, ..ShiftEstimate::nothing() };
+        match &state.running {
+            Some(running) => {
+                let (x, line) = (&running.x.mean, &self.driveline);
+                let damper = line.shaft_damping_n_m_s_rad * line.twist_rate(x[OUTPUT], x[WHEEL]);
+                let turbine_n_m = running.torques.map_or(running.slow_n_m, |torques| {
+                    torques.turbine_n_m + x[SHARE] * torques.share_n_m + x[SLOW_SHARE] * torques.slow_share_n_m
+                });
+                estimate.gear = Some(match &running.shift {
+                    Some(shift) => GearCommand { from: shift.from, to: shift.to },
+                    None => GearCommand { from: running.gear, to: running.gear },
+                });
+                estimate.phase = Some(running.phase.phase);
+                estimate.shaft_n_m = Some(x[SPRING] + damper);
+                estimate.turbine_n_m = Some(turbine_n_m);
+                estimate.flare_rad_s = match &running.shift {
+                    Some(shift) if self.are_read(&state.newest) => {
+                        self.flare(shift, self.measured(&state.newest, None))
+                    }
+                    _ => T::zero(),
+                };
+                estimate.clutches = running.shift.map(|shift| {
+                    [0, 1].map(|c| {
+                        let estimate = self.of_clutch(running, &state.elements, &shift, c);
+                        let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
+                        self.in_range(estimate, &state.elements, (&shift.clutches[c.min(1)], is_tied), &state.newest)
+                    })
+                });
+            }
+            None => {
+                let GearCommand { from, to } = input.gear;
+                let at_turbine = from != to && self.is_at_turbine(input.gear);
+                let is_modelled = from == to || at_turbine || self.tables.shift(from, to).is_some();
+                let without = match is_modelled || !self.are_read(&state.newest) {
+                    true => Health::SpeedsRejected,
+                    false => Health::ShiftNotModelled,
+                };
+                let phase = self.phase_at_turbine(state, input.gear).filter(|_| at_turbine && turbine_n_m.is_some());
+                let estimate = &mut state.estimate;
+                if phase.is_some() {
+                    (estimate.phase, estimate.turbine_n_m) = (phase, turbine_n_m);
+                } else if health < Health::TooSlow {
+                    health = without;
+                }
+                let then = self.measured(&state.newest, None);
+                estimate.clutches =
+                    self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(
+                        |shift| {
+                            let learnt = state.learnt.known_mean(&self.acting(shift));
+                            [0, 1].map(|c| {
+                                let clutch = &shift.clutches[c];
+                                let lasting = [learnt[c], learnt[c + 2]];
+                                let slip = self.slip(clutch.ratio, then);
+                                let direction = Self::direction_by_valve(&slip, turbine_n_m);
+                                let estimate = self.by_valve(&state.elements, clutch, [slip.value, direction], lasting);
+                                let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
+                                self.in_range(estimate, &state.elements, (clutch, is_tied), &state.newest)
+                            })
+                        },
+                    );
+            }
+        }
+        state.estimate.health = health;
+    }
+
+    /// Lowest and highest pressure of an element by its command alone, Pa, for errors within the budget, by its place in
+    /// [`super::GearboxTables::elements`]; in a gear as in a shift. `None` if there is no such element, or no budget of it.
+    pub fn pressure_range_pa(&self, state: &GearboxState<T>, at: usize) -> Option<[T; 2]> {
+        match self.longest_delay_s() {
+            Some(_) => state.late.pressure_range_pa.get(at).copied().flatten(),
+            None => self.range_of_element(state, at),
+        }
+    }
+
+    /// The same at the time of the state.
+    pub(super) fn range_of_element(&self, state: &GearboxState<T>, at: usize) -> Option<[T; 2]> {
+        self.element(&state.elements, at).and_then(|(memory, element)| memory.pressure_range_pa(element))
+    }
+
+    /// Slip of the offgoing clutch away from the new gear, where the readings show one.
+    fn flare(&self, shift: &ShiftRow<T>, speeds: [T; 2]) -> T {
+        let [off, on] = shift.clutches.map(|clutch| clutch.ratio);
+        let slip = self.slip(off, speeds);
+        // Towards the new gear the turbine goes from `i_off w_o` to `i_on w_o`.
+        let away = slip.value * (off - on) * speeds[OUTPUT] > T::zero();
+        if away && slip.is_over() { slip.value.abs() } else { T::zero() }
+    }
+
+    /// In which direction a clutch carries where the speeds cannot be used: that of its slip, and where none is seen that of the load, as far
+    /// as it is known. The sign of a slip below the noise of the speeds changes from step to step.
+    fn direction_by_valve(slip: &Slip<T>, turbine_n_m: Option<T>) -> T {
+        match turbine_n_m {
+            Some(load) if !slip.is_over() => load.signum(),
+            _ => slip.direction(),
+        }
+    }
+
+    /// A clutch by its valve model and what is learnt of it, where the speeds cannot be used; `slip` is the slip at the turbine and the
+    /// direction of the torque.
+    fn by_valve(
+        &self,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        clutch: &ShiftClutch<T>,
+        slip: [T; 2],
+        [f, k]: [T; 2],
+    ) -> ClutchEstimate<T> {
+        let zero = T::zero();
+        let (torque, valve_pa, pressure_pa, both) =
+            self.element(elements, clutch.element).map_or((ClutchTorque::none(), zero, zero, zero), |found| {
+                let (memory, element) = found;
+                let torque = memory.torque(element, clutch, slip, &PressureError::unseen(k));
+                let valve_pa = memory.pressure_pa();
+                let pressure_pa = element.limits.possible_pressure(valve_pa * (T::one() + element.gain_error(f, k)));
+                (torque, valve_pa, pressure_pa, element.correlation_in_shift())
+            });
+        let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
+        ClutchEstimate {
+            element: clutch.element,
+            pressure_pa,
+            torque_n_m: corrected / clutch.alpha,
+            deviation_n_m: (torque.unlearnt_variance(both).sqrt() / clutch.alpha).abs(),
+            valve_pa,
+            open_loop_n_m: torque.open_loop_n_m / clutch.alpha,
+            holds: false,
+            hidden: true,
+            pressure_range_pa: None,
+            torque_range_n_m: None,
+        }
+    }
+
+    fn of_clutch(
+        &self,
+        running: &super::Running<T>,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        shift: &ShiftRow<T>,
+        c: usize,
+    ) -> ClutchEstimate<T> {
+        let (x, zero) = (&running.x, T::zero());
+        let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
+        let Some(torques) = running.torques else {
+            let lasting = [x.mean[FRICTION[c]], x.mean[KISS[c]]];
+            let slip = self.slip(clutch.ratio, [x.mean[0], x.mean[1]]);
+            return self.by_valve(elements, clutch, [slip.value, slip.direction()], lasting);
+        };
+        let own = torques.clutches[c];
+        let holds = running.phase.phase.holding() == Some(c);
+        let (row, rest) = self.torque_row(running, shift, c, &torques);
+        let mut torque = x.value(&row) + rest;
+        if !holds && torque * own.per_pressure_n_m <= zero {
+            // A slipping clutch does not push.
+            torque = zero;
+        }
+        let deviation = x.variance(&row).sqrt();
+        let (valve_pa, pressure_pa, both) =
+            self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
+                let modelled_pa = memory.pressure_pa();
+                let gain = modelled_pa * element.gain_error(x.mean[FRICTION[c]], x.mean[KISS[c]]);
+                // The error of the pressure itself.
+                let itself = memory.error_pa(element, x.mean[PRESSURE[c]]);
+                let pressure_pa = modelled_pa + gain + if holds { zero } else { itself };
+                (modelled_pa, element.limits.possible_pressure(pressure_pa), element.correlation_in_shift())
+            });
+        let open_loop_n_m = if holds { own.open_loop_n_m.abs() * torque.signum() } else { own.open_loop_n_m };
+        let alone = own.unlearnt_variance(both).sqrt();
+        ClutchEstimate {
+            element: clutch.element,
+            pressure_pa,
+            torque_n_m: torque / clutch.alpha,
+            deviation_n_m: (deviation / clutch.alpha).abs(),
+            valve_pa,
+            open_loop_n_m: open_loop_n_m / clutch.alpha,
+            holds,
+            hidden: !holds && !clutch.is_one_way() && deviation >= T::of(HIDDEN) * alone,
+            pressure_range_pa: None,
+            torque_range_n_m: None,
+        }
+    }
+
+    /// The torque at the turbine as a row over the states, and what is left beside them: of a clutch that slips that of its
+    /// pressure, of one that holds its load; of one that has just gripped the mean of both, weighted by the probability that it slips
+    /// yet.
+    fn torque_row(
+        &self,
+        running: &super::Running<T>,
+        shift: &ShiftRow<T>,
+        c: usize,
+        torques: &Torques<T>,
+    ) -> ([T; N], T) {
+        let own = &torques.clutches[c.min(1)];
+        let holds = running.phase.phase.holding() == Some(c);
+        let slips = if holds { running.phase.slips_yet.abs() } else { T::one() };
+        let (mut row, mut rest) = if holds { self.held_torque(shift, c, torques) } else { ([T::zero(); N], T::zero()) };
+        if slips > T::zero() {
+            let held = T::one() - slips;
+            row.iter_mut().for_each(|x| *x = held * *x);
+            row[FRICTION[c.min(1)]] = row[FRICTION[c.min(1)]] + slips * own.per_friction_n_m;
+            row[KISS[c.min(1)]] = row[KISS[c.min(1)]] + slips * own.per_kiss_n_m;
+            row[PRESSURE[c.min(1)]] = row[PRESSURE[c.min(1)]] + slips * own.per_pressure_n_m;
+            rest = held * rest + slips * own.base_n_m;
+        }
+        (row, rest)
+    }
+
+    /// Brings an estimate into the guaranteed ranges, where there are some. Before the dog of its gear is in, a clutch is not tied to the
+    /// output, and the direction of its slip is not known.
+    fn in_range(
+        &self,
+        mut estimate: ClutchEstimate<T>,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        (clutch, is_tied): (&ShiftClutch<T>, bool),
+        newest: &[Option<Newest<T>>; SPEEDS],
+    ) -> ClutchEstimate<T> {
+        let slip = self.bounded_slip(clutch.ratio, newest).filter(|_| is_tied).map(|[slip, error]| {
+            let (middle, half) = (clutch.alpha * slip, clutch.alpha.abs() * error);
+            [middle - half, middle + half]
+        });
+        let element = self.element(elements, clutch.element);
+        let ranges = element.and_then(|(memory, element)| memory.ranges(element, slip));
+        if let Some((pressure, torque)) = ranges {
+            let nearest = |[low, high]: [T; 2], value: T| value.max(low).min(high);
+            estimate.pressure_pa = nearest(pressure, estimate.pressure_pa);
+            estimate.torque_n_m = nearest(torque, estimate.torque_n_m);
+            estimate.pressure_range_pa = Some(pressure);
+            estimate.torque_range_n_m = Some(torque);
+        }
+        estimate
+    }
+}
