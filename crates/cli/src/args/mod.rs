@@ -67,8 +67,8 @@ pub(crate) enum Command {
     ///   estimate.csv   the output of `estimate measured.csv`
     ///
     /// With the vehicle file of a car with a gearbox: drives through all of its gears, up under power, down coasting, up
-    /// without power, down under power, or through a drive file. The car differs from the vehicle file. The filter for any
-    /// shift sees it through toothed wheels and estimates pressure and torque of both clutches. Prints every shift with its
+    /// without power, down under power, or through a drive file. The car differs from the vehicle file. The gearbox
+    /// filter reads its speeds by toothed wheels and estimates pressure and torque of both clutches. Prints every shift with its
     /// quality and the errors of filter and open loop, and writes:
     ///
     ///   report.html    the drive, the shifts, each shift drawn

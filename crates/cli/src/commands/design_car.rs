@@ -16,8 +16,8 @@ use crate::failure::Failure;
 use crate::output;
 
 /// What the designs are not for, and what serves there.
-const OTHER_KINDS: &str = "Gains are designed for upshifts with a driving engine. In the other kinds of shift, and between shifts, the filter for any \
-                           shift serves\n(`wetclutch estimate`): its gains follow from the variances of the readings and of the car's errors.";
+const OTHER_KINDS: &str = "Gains are designed for upshifts with a driving engine. In the other kinds of shift, and between shifts, the gearbox filter \
+                           estimates\n(`wetclutch estimate`): its gains follow from the variances of the readings and of the car's errors.";
 
 /// In the table, where no gain reduces the bound.
 const OPEN_LOOP: &str = "open loop serves";

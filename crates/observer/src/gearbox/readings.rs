@@ -189,11 +189,13 @@ impl<T: Real> GearboxFilter<'_, T> {
         (slip.value.is_finite() && error.is_finite()).then_some([slip.value, error])
     }
 
-    /// What is known in front of the gearbox now; none before the first turbine speed. A turbine speed that is refused, or that is none of the gear
-    /// that ties it, is not used: close to the coupling point of a converter 1 rad/s is 10 N m.
+    /// What is known in front of the gearbox now; none before the first turbine speed. A turbine speed that is refused, or that is not taken as a
+    /// clutch that holds may have begun to slip, is not used: close to the coupling point of a converter 1 rad/s is 10 N m.
     pub(super) fn input_side(&self, state: &GearboxState<T>, input: &ShiftInput<T>, dt_s: T) -> Option<InputSide<T>> {
         let turbine = match (state.newest[TURBINE], &state.running) {
-            (Some(newest), Some(running)) if newest.refused || self.is_off_its_gear(state, running) => {
+            (Some(newest), Some(running))
+                if newest.refused || self.may_slip_unseen(running, self.measured(&state.newest, Some(running))) =>
+            {
                 running.x.mean[TURBINE] + dt_s * running.rates[TURBINE]
             }
             (Some(newest), _) if newest.age_s <= T::of(FIRST_S) => newest.at(T::zero()),
@@ -210,12 +212,6 @@ impl<T: Real> GearboxFilter<'_, T> {
         let reported_n_m = state.reported.map(|(torque, _)| torque);
         let turbine = [turbine, deviation * deviation];
         Some(InputSide { engine, turbine, reported_n_m, lock_up_applied: input.lock_up_applied })
-    }
-
-    /// Whether turbine and output are tied and the readings show a slip.
-    fn is_off_its_gear(&self, state: &GearboxState<T>, running: &Running<T>) -> bool {
-        let speeds = self.measured(&state.newest, Some(running));
-        self.tied_ratio(running).is_some_and(|ratio| self.slip(ratio, speeds).is_over())
     }
 
     pub(super) fn slip(&self, ratio: T, [turbine, output]: [T; 2]) -> Slip<T> {

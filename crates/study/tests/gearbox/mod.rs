@@ -112,58 +112,53 @@ fn draws() -> u64 {
     std::env::var("MATRIX_DRAWS").ok().map_or(1, |draws| draws.parse().unwrap())
 }
 
-/// By how much a ratio of the inertia phase of few draws may be above that of forty \[chosen\].
-const BY_CHANCE: f64 = 0.05;
-/// One draw says too little: in the torque phase of coasting downshifts it is 1.00 where forty have 0.71, and with the whole budget 0.53 in
-/// place of 0.40 in the inertia phase.
-const ANY: f64 = f64::INFINITY;
+/// Cars that are sampled for each shift of the matrix. A few say too little: with one, a ratio of the inertia phase is off by up to 0.1, and of the torque phase
+/// by 0.3. So both tests take some fifteen seconds.
+const MATRIX_DRAWS: u64 = 40;
 
-/// Ratios of torque and inertia phase by kind over all classes, with forty draws.
+/// Ratios of torque and inertia phase by kind over all classes.
 type Ratios = [(ShiftKind, [f64; 2]); 4];
 
 const DOCUMENTED: Ratios = [
-    (ShiftKind::PowerOnUp, [0.77, 0.32]),
-    (ShiftKind::PowerOnDown, [0.53, 0.55]),
-    (ShiftKind::PowerOffUp, [0.52, 0.56]),
+    (ShiftKind::PowerOnUp, [0.75, 0.32]),
+    (ShiftKind::PowerOnDown, [0.52, 0.56]),
+    (ShiftKind::PowerOffUp, [0.52, 0.55]),
     (ShiftKind::CoastDown, [0.71, 0.35]),
 ];
 
 const DOCUMENTED_OF_WHOLE_BUDGET: Ratios = [
     (ShiftKind::PowerOnUp, [0.73, 0.36]),
-    (ShiftKind::PowerOnDown, [0.72, 0.57]),
-    (ShiftKind::PowerOffUp, [0.56, 0.64]),
+    (ShiftKind::PowerOnDown, [0.71, 0.52]),
+    (ShiftKind::PowerOffUp, [0.56, 0.59]),
     (ShiftKind::CoastDown, [0.67, 0.40]),
 ];
 
-/// The matrix is that of the documentation: with its forty draws to the last digit, with fewer no ratio is above it by more than chance
-/// may do.
-fn is_as_documented(rows: &[MatrixRow], ratios: &Ratios, runs_above: f64, by_chance: [f64; 2]) {
+/// The matrix is that of the documentation to the last digit, and all values are in their guaranteed ranges.
+fn is_as_documented(rows: &[MatrixRow], ratios: &Ratios, runs_above: u64) {
     let counts = Pooled::of(rows, |_| true).counts;
     assert_eq!((counts.outside, counts.unranged), (0, 0), "guaranteed");
-    let is_all = draws() == 40;
+    let mut wrong = Vec::new();
     for (kind, documented) in ratios {
         let found = Pooled::of(rows, |shift| shift.kind == *kind).torque.map(|[main, _]| main.ratio().unwrap());
-        for (at, phase) in PHASES.iter().enumerate() {
-            let (found, documented) = (found[at], documented[at]);
-            println!("{kind:?}, {phase} phase, all classes: {found:.3}, with forty draws {documented:.2}");
-            let is_met = if is_all { (found - documented).abs() <= 0.005 } else { found < documented + by_chance[at] };
-            assert!(is_met, "{kind:?}, {phase} phase: {found:.3}, documented {documented}");
+        for ((phase, found), documented) in PHASES.iter().zip(found).zip(documented) {
+            println!("{kind:?}, {phase} phase, all classes: {found:.3}");
+            if (found - documented).abs() > 0.005 {
+                wrong.push(format!("{kind:?}, {phase} phase: {found:.3}, documented {documented}"));
+            }
         }
     }
-    // Two deviations of the share that is counted.
-    let [above, runs] = [counts.runs_above, counts.compared_runs].map(|count| f64::from(u32::try_from(count).unwrap()));
-    let more = if is_all { 0.0 } else { 2.0 * (runs_above * (1.0 - runs_above) / runs).sqrt() };
-    assert!(above / runs <= runs_above + more, "{above} of {runs} runs above the valve model");
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert_eq!(counts.runs_above, runs_above, "runs above the valve model");
 }
 
-/// Lag, delay and hysteresis of the valves anywhere in the budget too: `MATRIX_DRAWS=40 cargo test --release -p study --test
-/// tests whole_budget -- --nocapture`.
+/// Lag, delay and hysteresis of the valves anywhere in the budget too: `cargo test -p study --test tests whole_budget --
+/// --nocapture`.
 #[test]
 fn matrix_of_cars_of_the_whole_budget() {
-    let rows = rows(&cars(), draws(), true);
+    let rows = rows(&cars(), MATRIX_DRAWS, true);
     print(&rows);
     is_not_worse_than_the_open_loop(&rows);
-    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 230.0 / 4960.0, [ANY; 2]);
+    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 213);
 }
 
 /// All values are in their guaranteed ranges, and of no kind and no phase is the filter worse than the valve model, over all
@@ -180,12 +175,12 @@ fn is_not_worse_than_the_open_loop(rows: &[MatrixRow]) {
     }
 }
 
-/// The numbers of the documentation: `MATRIX_DRAWS=40 cargo test --release -p study --test tests matrix -- --nocapture`.
+/// The numbers of the documentation: `cargo test -p study --test tests matrix -- --nocapture`.
 #[test]
 fn matrix_of_shifts_and_kinds() {
-    let rows = rows(&cars(), draws(), false);
+    let rows = rows(&cars(), MATRIX_DRAWS, false);
     print(&rows);
-    is_as_documented(&rows, &DOCUMENTED, 246.0 / 4960.0, [ANY, BY_CHANCE]);
+    is_as_documented(&rows, &DOCUMENTED, 227);
 }
 
 /// The same numbers on one thread and on three, and other cars with another seed.

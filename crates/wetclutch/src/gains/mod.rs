@@ -197,7 +197,7 @@ pub fn design(file: &VehicleFile, shift: Option<&str>, options: &DesignOptions) 
         }
         (VehicleFile::OneShift(file), None) => &file.vehicle,
         (VehicleFile::OneShift(_), Some(_)) => {
-            let message = "shift has an effect with the vehicle file of a car with a gearbox alone\nhint: leave it out";
+            let message = "a shift has no effect with the vehicle file of one shift\nhint: leave it out";
             return Err(Error::Input(message.to_owned()));
         }
     };
