@@ -198,7 +198,7 @@ pub fn simulated(known: &Car, truth: &Car, shift: &CarShift) -> Result<Vec<CarSa
     Ok(samples)
 }
 
-/// What the filter is shown of a drive that was recorded every [`RECORD_S`], every [`SAMPLE_S`]; each with the place of its sample.
+/// What the filter reads of a drive that was recorded every [`RECORD_S`], every [`SAMPLE_S`](crate::SAMPLE_S); each with the place of its sample.
 pub fn inputs(
     car: &Car,
     tables: &ShiftTables<f64>,

@@ -1,46 +1,24 @@
 //! Speeds that come late by a stated time.
 
 use car::{Car, ErrorBudget};
-use evaluate::errors::{NOTHING_N_M, controlling_of};
-use evaluate::score::{SquaredErrors, TruePhase};
 use observer::gearbox::{GearboxState, ShiftInput};
 use observer::{ShiftTables, gearbox_filter};
 use plant::car::CarShift;
 use study::gearbox::matrix::{drawn_car, neighbouring_shifts};
-use study::gearbox::{inputs, score_samples, simulated};
+use study::gearbox::{inputs, simulated};
 
 use super::cars::{cars, sensors};
+use super::ratios::torque_ratios;
 
-/// Torque error of the controlling clutch over that of the open loop, in torque and inertia phase of all neighbouring shifts of a car
-/// whose speeds are late by these times, s: engine, turbine, output, wheel. And values outside their guaranteed range.
+/// Torque errors over those of the open loop in torque and inertia phase, of a car whose speeds are late by these times, s: engine, turbine, output, wheel.
+/// And values outside their guaranteed range.
 fn ratios(known: &Car, delays_s: [f64; 4]) -> ([f64; 2], usize) {
     let mut sensors = sensors();
     let each = [&mut sensors.engine, &mut sensors.turbine, &mut sensors.output, &mut sensors.wheel];
     for (sensor, delay_s) in each.into_iter().zip(delays_s) {
         sensor.delay_s = delay_s;
     }
-    let budget = ErrorBudget::of_car(known).read_by(known, Some(&sensors));
-    let tables = ShiftTables::of_car(known, &budget).unwrap();
-    let filter = gearbox_filter(known, &tables, &budget, Some(&sensors));
-    let (mut sums, mut outside) = ([SquaredErrors::default(); 2], 0);
-    for shift in neighbouring_shifts(known, &tables).0 {
-        for draw in 0..2 {
-            let truth = drawn_car(known, shift.from, shift.to, draw);
-            let usual = CarShift::usual(known, shift.from, shift.to, shift.throttle());
-            let samples = simulated(known, &truth, &usual).unwrap();
-            let inputs = inputs(known, &tables, &samples, &sensors, shift.noise(draw));
-            let rows = score_samples(&tables, &filter, &samples, &inputs);
-            outside += rows.iter().flat_map(|row| &row.clutches).filter(|clutch| !clutch.in_range).count();
-            let clutch = controlling_of(&rows, shift.kind);
-            for (sum, phase) in sums.iter_mut().zip([TruePhase::Torque, TruePhase::Inertia]) {
-                let errors = SquaredErrors::of(&rows, phase, clutch);
-                if errors.rms_n_m()[1] > NOTHING_N_M {
-                    sum.add(&errors);
-                }
-            }
-        }
-    }
-    (sums.map(|sum| sum.ratio().unwrap()), outside)
+    torque_ratios(known, &sensors, &sensors)
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod learnt_coverage;
 mod limits;
 mod noise;
 mod one_way;
+mod ratios;
 mod ratios_alone;
 mod sensitivity;
 mod strokes;
