@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,9 @@ from pathlib import Path
 
 def checked(*command: str) -> str:
     """What a checker prints; it has to find nothing."""
-    done = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True)
+    # pyright asks the Python that comes first on the path where packages are.
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    done = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, env={**os.environ, "PATH": path})
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
