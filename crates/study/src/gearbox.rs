@@ -14,6 +14,7 @@ pub mod matrix;
 mod nominal;
 pub mod pressure_command;
 pub mod sensitivity;
+pub mod shift_bars;
 pub mod tour;
 
 pub use evaluate::score::{inputs, score_from, score_samples, score_shift, simulated};
