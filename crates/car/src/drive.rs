@@ -11,7 +11,7 @@ pub struct DriveSegment {
     pub duration_s: f64,
     /// Throttle, 0 to 1.
     pub throttle: [f64; 2],
-    /// Brake, 0 to 1: share of the largest force of the tyres.
+    /// Brake, 0 to 1: fraction of the largest force of the tyres.
     pub brake: [f64; 2],
     /// Grade, rad, positive uphill.
     pub grade_rad: [f64; 2],

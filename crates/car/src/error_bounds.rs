@@ -10,7 +10,7 @@ use crate::{FillBudget, Sensors};
 pub struct ErrorBounds {
     /// Turbine torque from the converter's maps, N m.
     pub turbine_torque_n_m: f64,
-    /// The same as a share of the torque.
+    /// The same as a fraction of the torque.
     pub turbine_torque_share: f64,
     /// Torque that an error of the turbine-side inertia is worth in the inertia phase, N m. Zero in a file with `[gear_train]`: its bound
     /// on the turbine torque is for both.
@@ -39,7 +39,7 @@ pub struct ErrorBounds {
     pub wheel_quantum_rad_s: f64,
     /// Greatest age of a reading, s.
     pub sampling_delay_s: f64,
-    /// Rounding of one operation in single precision, as a share.
+    /// Rounding of one operation in single precision, as a fraction.
     pub float32_rounding: f64,
     /// Pressure above the kiss point in a shift, at which errors of gain and friction are weighed, Pa.
     pub shift_pressure_pa: f64,
@@ -67,13 +67,13 @@ pub struct ErrorBounds {
     pub slip_rad_s: f64,
     /// Highest pressure that the supply can give, Pa.
     pub pressure_max_pa: f64,
-    /// Error of the scale of the wheel speed, as a share: tyres that are worn, or of another size.
+    /// Error of the scale of the wheel speed, as a fraction: tyres that are worn, or of another size.
     pub wheel_scale: f64,
     /// Largest delay of the wheel speed, s.
     pub wheel_delay_s: f64,
     /// Largest delay of the turbine speed and of the output speed, each against the other, s.
     pub channel_skew_s: f64,
-    /// Error of the torque that the engine controller reports, as a share.
+    /// Error of the torque that the engine controller reports, as a fraction.
     pub engine_torque_share: f64,
     /// Least and greatest factor on the stiffness of the drive shafts.
     pub shaft_stiffness_factor: [f64; 2],
@@ -96,7 +96,7 @@ impl ErrorBounds {
         road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * Real::sin(self.grade_rad)
     }
 
-    /// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its share.
+    /// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its relative error.
     pub fn mass_n_m(&self, road: &RoadLoad<f64>) -> f64 {
         self.mass_kg / road.mass_kg * self.shaft_torque_n_m
     }
@@ -105,17 +105,17 @@ impl ErrorBounds {
 /// Bounds on the errors of a car's file; none where the file says nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CarErrorBounds {
-    /// Of the converter's capacity, as a share.
+    /// Of the converter's capacity, as a fraction.
     pub converter_share: Option<f64>,
-    /// Of the engine torque that the engine's controller reports, as a share.
+    /// Of the engine torque that the engine's controller reports, as a fraction.
     pub engine_torque_share: Option<f64>,
-    /// Of the turbine-side inertia of a shift, as a share.
+    /// Of the turbine-side inertia of a shift, as a fraction.
     pub inertia_share: Option<f64>,
-    /// Of the stiffness of the drive shafts, as a share.
+    /// Of the stiffness of the drive shafts, as a fraction.
     pub shaft_stiffness_share: Option<f64>,
-    /// Of the scale of the wheel speed, as a share.
+    /// Of the scale of the wheel speed, as a fraction.
     pub wheel_scale_share: Option<f64>,
-    /// Of the mass of the car as it is driven, as a share.
+    /// Of the mass of the car as it is driven, as a fraction.
     pub mass_share: Option<f64>,
     /// By how much the torques of the valve models err, over what the bounds of the elements say.
     pub valve_error_scale: Option<f64>,

@@ -43,9 +43,9 @@ impl<T: Real> FillBudget<T> {
         }
     }
 
-    /// Largest share of a pressure of at most `line_pa` that the leak takes, across the passage that feeds it.
+    /// Largest fraction of a pressure of at most `line_pa` that the leak takes, across the passage that feeds it.
     #[inline]
-    pub fn leak_share(&self, line_pa: T) -> T {
+    pub fn leak_fraction(&self, line_pa: T) -> T {
         let ([_, passage], leak) = (&self.supply, self.leak_m3_s_pa);
         let laminar = passage.laminar_pa_s2_m5 * self.viscosity_m2_s[1];
         (leak * (laminar + passage.orifice_pa_s2_m6 * leak * line_pa)).at_most(T::one())

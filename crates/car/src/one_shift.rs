@@ -29,7 +29,7 @@ pub const OFFGOING_OPEN_N_M: f64 = 10.0;
 /// Relative error of the mass of a car as it is driven.
 pub const MASS_ERROR: f64 = 0.15;
 /// Its offgoing and oncoming clutch: torque over that of the turbine, mean radius of the plates, m, and piston area, m^2.
-pub const TORQUE_SHARES: [f64; 2] = [1.5, 0.6];
+pub const TORQUE_FRACTIONS: [f64; 2] = [1.5, 0.6];
 /// The same of the mean radius of the plates, m.
 pub const PLATE_RADII_M: [f64; 2] = [0.14, 0.13];
 /// The same of the piston areas, m^2.
@@ -42,7 +42,7 @@ const SHIFT_TORQUE: f64 = 0.7;
 /// Friction coefficient and number of faces with which its oncoming clutch has the pressures of its error budget.
 const FRICTION: f64 = 0.13;
 const FACES: f64 = 3.0;
-/// Turbine acceleration of an inertia phase at which an error of the inertia is weighed, rad/s^2, per share by which the ratio falls
+/// Turbine acceleration of an inertia phase at which an error of the inertia is weighed, rad/s^2, per fraction by which the ratio falls
 /// \[chosen\]: a turbine of 400 rad/s that reaches its new speed in 0.4 s.
 const TURBINE_RAD_S2: f64 = 1000.0;
 
@@ -359,13 +359,13 @@ impl<'c> OneShift<'c> {
 
     /// Torque of the offgoing clutch per turbine torque, over that of the car of the defaults.
     fn offgoing_size(&self) -> f64 {
-        (1.0 / self.reduced.slip_offgoing[0]).abs() / TORQUE_SHARES[0]
+        (1.0 / self.reduced.slip_offgoing[0]).abs() / TORQUE_FRACTIONS[0]
     }
 
     /// Slip of the oncoming clutch per speed of the turbine, over that of the car of the defaults: its torque per turbine torque is the
     /// inverse.
     fn slip_size(&self) -> f64 {
-        self.reduced.slip_oncoming[0].abs() * TORQUE_SHARES[1]
+        self.reduced.slip_oncoming[0].abs() * TORQUE_FRACTIONS[1]
     }
 
     /// Pressure of the oncoming clutch in a shift, over that of the car of the defaults.

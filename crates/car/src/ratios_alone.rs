@@ -12,11 +12,11 @@ pub const ASSUMED_OF_N_M: f64 = 190.0;
 const COUPLING_KG_M2: f64 = -0.2;
 const OUTPUT_KG_M2: f64 = 0.4;
 
-/// Gives shifts of which nothing but the ratios is known a mass, by the size of the engine. Returns the share of the true
+/// Gives shifts of which nothing but the ratios is known a mass, by the size of the engine. Returns the fraction of the true
 /// inertia by which it may be off, where one was given.
 pub fn assume_masses(gearbox: &mut Gearbox, engine: &Engine<f64>) -> Option<f64> {
     let size = engine.largest_torque() / ASSUMED_OF_N_M;
-    // The one that is off by the same share of either end.
+    // The one that is off by the same fraction of either end.
     let [least, greatest] = TURBINE_SIDE_INERTIA_KG_M2;
     let middle = 2.0 * least * greatest / (least + greatest);
     let mass_kg_m2 =

@@ -5,7 +5,7 @@
 pub struct ReadingErrors {
     /// Factor on the reading, such as the wheel speed of a worn tyre.
     pub scale: f64,
-    /// Share of the readings that are lost, each by chance.
+    /// Fraction of the readings that are lost, each by chance.
     pub missing_share: f64,
     /// Length of one dropout at a random time in the shift, s: every reading in it is lost.
     pub burst_s: f64,

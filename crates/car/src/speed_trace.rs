@@ -35,8 +35,8 @@ impl SpeedTrace {
         let after = self.time_s.partition_point(|&point| point <= time_s);
         match (after.checked_sub(1), self.time_s.get(after)) {
             (Some(before), Some(next)) => {
-                let share = (time_s - self.time_s[before]) / (next - self.time_s[before]);
-                self.speed_m_s[before] + share * (self.speed_m_s[after] - self.speed_m_s[before])
+                let fraction = (time_s - self.time_s[before]) / (next - self.time_s[before]);
+                self.speed_m_s[before] + fraction * (self.speed_m_s[after] - self.speed_m_s[before])
             }
             (Some(last), None) => self.speed_m_s[last],
             (None, _) => self.speed_m_s.first().copied().unwrap_or(0.0),

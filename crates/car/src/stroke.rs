@@ -13,8 +13,8 @@ pub const PLATEAU_FACTOR: [f64; 2] = [0.9, 1.1];
 pub const RESISTANCE_FACTOR: [f64; 2] = [0.8, 1.25];
 /// How far the oil may be from the temperature of the file, K \[chosen\].
 const OIL_K: f64 = 15.0;
-/// Share of the pump's flow that is left at least \[chosen\]: another clutch fills at the same time.
-const FLOW_SHARE: f64 = 0.5;
+/// Fraction of the pump's flow that is left at least \[chosen\]: another clutch fills at the same time.
+const FLOW_FRACTION: f64 = 0.5;
 /// Factors on leak and hydraulic capacity \[chosen\].
 const LEAK_FACTOR: f64 = 2.0;
 /// The same of the capacity.
@@ -30,7 +30,7 @@ pub fn standard(cylinder: &Cylinder<f64>, oil_degc: f64) -> FillBudget<f64> {
         supply: RESISTANCE_FACTOR.map(|factor| cylinder.supply.with_resistance_factor(factor)),
         exhaust: RESISTANCE_FACTOR.map(|factor| cylinder.exhaust.with_resistance_factor(factor)),
         viscosity_m2_s: [viscosity_m2_s(hot), viscosity_m2_s(cold)],
-        flow_max_m3_s: FLOW_SHARE * cylinder.flow_max_m3_s,
+        flow_max_m3_s: FLOW_FRACTION * cylinder.flow_max_m3_s,
         leak_m3_s_pa: LEAK_FACTOR * cylinder.leak_m3_s_pa,
         capacity_m3_pa: CAPACITY_FACTOR * capacity(cylinder),
     }

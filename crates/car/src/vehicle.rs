@@ -58,9 +58,9 @@ pub struct CompliantRequirement {
 /// The Kalman filter's model of the unknown torques, in addition to the error bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilterSettings {
-    /// Standard deviation of the turbine torque, as a share.
+    /// Standard deviation of the turbine torque, as a fraction.
     pub turbine_share: f64,
-    /// Time after which that share is another during a shift, s.
+    /// Time after which that fraction is another during a shift, s.
     pub turbine_share_s: f64,
     /// Standard deviation of the rate of twist outside a shift, rad/s: how far the readings of output and wheel disagree.
     pub twist_rate_rad_s: f64,

@@ -60,7 +60,7 @@ fn the_demo_of_a_car_drives_through_all_gears_and_shows_every_shift() {
     for kind in ["power-on upshift", "coast downshift", "power-off upshift", "power-on downshift"] {
         assert_eq!(column(&shifts, "kind").iter().filter(|cell| *cell == kind).count(), 3, "{kind}");
     }
-    assert!(numbers(&shifts, "inside_range").iter().all(|&share| share == 1.0), "{shifts}");
+    assert!(numbers(&shifts, "inside_range").iter().all(|&fraction| fraction == 1.0), "{shifts}");
     // In most shifts the filter is better than the valve model alone.
     let [filter, valve] =
         ["rms_n_m", "open_loop_rms_n_m"].map(|what| numbers(&shifts, &format!("inertia_phase_controlling_{what}")));

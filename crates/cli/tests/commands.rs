@@ -340,18 +340,18 @@ fn reproduce_writes_page_markdown_numbers_and_figures() {
     assert!(html.contains("certified band") && html.contains("Sliding 1 (large)") && html.contains("after decay"));
 }
 
-/// A line of the documentation without what depends on the number of settings: their shares and their count.
+/// A line of the documentation without what depends on the number of settings: their fractions and their count.
 fn without_settings(line: &str) -> String {
-    let is_share = |cell: &str| {
-        cell.trim().strip_suffix(" %").is_some_and(|share| share.bytes().all(|byte| byte.is_ascii_digit()))
+    let is_fraction = |cell: &str| {
+        cell.trim().strip_suffix(" %").is_some_and(|fraction| fraction.bytes().all(|byte| byte.is_ascii_digit()))
     };
     if line.contains(" settings drawn: ") {
         return String::new();
     }
-    line.split('|').filter(|cell| !is_share(cell)).collect::<Vec<_>>().join("|")
+    line.split('|').filter(|cell| !is_fraction(cell)).collect::<Vec<_>>().join("|")
 }
 
-/// The settings themselves take minutes in a build for tests; CI compares their shares in a release build.
+/// The settings themselves take minutes in a build for tests; CI compares their fractions in a release build.
 #[test]
 fn the_reproduction_in_the_documentation_is_what_the_program_writes() {
     let folder = Folder::new("stale");

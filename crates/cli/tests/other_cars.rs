@@ -8,7 +8,7 @@ const TWO_SHIFTS: &str = "name = \"d\"\n[[shift]]\ntime_s = 6\ngear = \"2\"\n[[s
     [[segment]]\nduration_s = 12\nthrottle = 0.15\n[[segment]]\nduration_s = 8\nthrottle = 0.0\n";
 
 /// The two-speed gearbox by what `check gearboxes/two_speed.toml` prints of it.
-const SHARES: &str = r#"
+const FRACTIONS: &str = r#"
 name = "two-speed gearbox by its shares"
 level = "shares"
 line_pressure_pa = 1.0e6
@@ -52,23 +52,24 @@ fn estimate(folder: &Folder, log: &str, car: &str, output: &str) -> String {
 }
 
 #[test]
-fn a_gearbox_by_its_shares_has_the_estimates_of_its_stick_diagram() {
+fn a_gearbox_by_its_fractions_has_the_estimates_of_its_stick_diagram() {
     let folder = Folder::new("shares");
-    folder.write("box.toml", SHARES);
+    folder.write("box.toml", FRACTIONS);
     let pressure = "[hydraulics]\nline_pressure_pa = 1.0e6\n";
     let train = vehicle(&folder, "train", &format!("{ROOT}gearboxes/two_speed.toml"), pressure);
-    let shares = vehicle(&folder, "shares", "box.toml", pressure);
+    let fractions = vehicle(&folder, "shares", "box.toml", pressure);
     let [_, log] = simulated(&folder, TWO_SHIFTS, &train);
-    let [by_train, by_shares] =
-        [(&train, "train.csv"), (&shares, "shares.csv")].map(|(car, output)| estimate(&folder, &log, car, output));
+    let [by_train, by_fractions] =
+        [(&train, "train.csv"), (&fractions, "shares.csv")].map(|(car, output)| estimate(&folder, &log, car, output));
     for (name, most) in [("oncoming_torque_estimate_n_m", 0.1), ("oncoming_pressure_estimate_pa", 100.0)] {
-        let pairs: Vec<_> = numbers(&by_train, name).into_iter().zip(numbers(&by_shares, name)).collect();
+        let pairs: Vec<_> = numbers(&by_train, name).into_iter().zip(numbers(&by_fractions, name)).collect();
         let compared = pairs.iter().filter(|(one, other)| one.is_finite() && other.is_finite());
         assert!(compared.clone().count() > 100, "{name}");
         assert!(compared.clone().all(|(one, other)| (one - other).abs() < most), "{name}");
     }
     // What cannot be simulated says so.
-    let output = wetclutch(&["simulate", &folder.path("drive.toml"), "--vehicle", &shares, "-o", &folder.path("no")]);
+    let output =
+        wetclutch(&["simulate", &folder.path("drive.toml"), "--vehicle", &fractions, "-o", &folder.path("no")]);
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(!output.status.success() && error.contains("no stick diagram: it can be estimated"), "{error}");
     assert!(error.contains("hint: describe it with level"), "{error}");
@@ -79,7 +80,7 @@ fn a_gearbox_by_its_ratios_alone_has_torques_at_the_turbine() {
     const RATIOS: &str =
         "name = \"g\"\nlevel = \"ratios\"\ngear = [{ name = \"1\", ratio = 2.5 }, { name = \"2\", ratio = 1.0 }]\n";
     let folder = Folder::new("ratios-alone");
-    let mass = SHARES.split_once("[[shift_mass]]").unwrap().1;
+    let mass = FRACTIONS.split_once("[[shift_mass]]").unwrap().1;
     folder.write("masses.toml", format!("{RATIOS}[[shift_mass]]{mass}"));
     folder.write("ratios.toml", RATIOS);
     let train = vehicle(&folder, "train", &format!("{ROOT}gearboxes/two_speed.toml"), "");
@@ -87,7 +88,7 @@ fn a_gearbox_by_its_ratios_alone_has_torques_at_the_turbine() {
         ["masses", "ratios"].map(|name| vehicle(&folder, &format!("by_{name}"), &format!("{name}.toml"), ""));
     let [truth, log] = simulated(&folder, TWO_SHIFTS, &train);
     let truth = std::fs::read_to_string(truth).unwrap();
-    // `alpha` is one over the share.
+    // `alpha` is one over the fraction.
     let sum: Vec<f64> = [("offgoing", [1.0 / 1.5, 1.0 / 0.6]), ("oncoming", [1.0 / 0.6, 1.0 / 1.5])]
         .map(|(role, alphas)| {
             let gears = numbers(&truth, "gear").into_iter().zip(numbers(&truth, &format!("{role}_torque_n_m")));

@@ -25,7 +25,7 @@ pub enum CarStudyRuns {
     Shifts(Vec<[usize; 2]>),
 }
 
-/// Greatest share by which a car differs from the one that is known, each drawn evenly within it; `None` is that of the error
+/// Greatest fraction by which a car differs from the one that is known, each drawn evenly within it; `None` is that of the error
 /// budget of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SampledErrors {
@@ -152,13 +152,13 @@ const FACTOR_MAX: f64 = 0.95;
 
 impl RawErrors {
     fn checked(&self, check: &Check<'_>) -> Result<SampledErrors, ConfigError> {
-        let share = |key: &str, value: &Option<Number>, max: f64| {
+        let fraction = |key: &str, value: &Option<Number>, max: f64| {
             value.as_ref().map(|value| check.number(format_args!("errors.{key}"), value, 0.0..=max)).transpose()
         };
         Ok(SampledErrors {
-            friction: share("friction", &self.friction, FACTOR_MAX)?,
-            valve_gain: share("valve_gain", &self.valve_gain, FACTOR_MAX)?,
-            converter: share("converter", &self.converter, 0.5)?,
+            friction: fraction("friction", &self.friction, FACTOR_MAX)?,
+            valve_gain: fraction("valve_gain", &self.valve_gain, FACTOR_MAX)?,
+            converter: fraction("converter", &self.converter, 0.5)?,
         })
     }
 }

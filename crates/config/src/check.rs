@@ -46,7 +46,7 @@ const MISTAKEN_UNITS: &[(&str, &str, f64)] = &[
 /// Longest name, bytes: with a run's number and an ending it is still a file name.
 const LONGEST_NAME: usize = 80;
 
-/// Breakpoints of an axis are apart by at least this share of the largest value that the axis allows: what is closer is
+/// Breakpoints of an axis are apart by at least this fraction of the largest value that the axis allows: what is closer is
 /// a slip of the pen, and too steep for a slope in single precision.
 const BREAKPOINTS_APART: f64 = 1e-6;
 

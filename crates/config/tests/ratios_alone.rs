@@ -30,10 +30,10 @@ fn a_car_by_ratios_alone_has_masses_of_its_size_and_says_how_far_they_may_be_off
     };
     let assumed = car("", "");
     let mass = |car: &Car| car.gearbox.shift(0, 1).unwrap().reduced.unwrap().mass_kg_m2[0][0];
-    let share = assumed.error_bounds.inertia_share.unwrap();
+    let fraction = assumed.error_bounds.inertia_share.unwrap();
     let [least, greatest] = TURBINE_SIDE_INERTIA_KG_M2;
-    for (end, off) in [(least, 1.0 + share), (greatest, 1.0 - share)] {
-        assert!((mass(&assumed) / (end * off) - 1.0).abs() < 1e-3, "{share}");
+    for (end, off) in [(least, 1.0 + fraction), (greatest, 1.0 - fraction)] {
+        assert!((mass(&assumed) / (end * off) - 1.0).abs() < 1e-3, "{fraction}");
     }
     let large = car("[engine]\nmax_torque_n_m = 380\n", "");
     assert!((mass(&large) / mass(&assumed) - 2.0).abs() < 1e-2);

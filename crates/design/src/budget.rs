@@ -6,7 +6,7 @@ use observer::Phase;
 
 /// Rates of the pressure that the observers' valve model leaves out in a shift, Pa/s, each at its largest.
 ///
-/// With a true time constant `tau'` the model's rate is off by `(tau'/tau - 1) dp/dt`, with a true gain by its share of
+/// With a true time constant `tau'` the model's rate is off by `(tau'/tau - 1) dp/dt`, with a true gain by its fraction of
 /// `p/tau`, with a delay by `delay/tau dp/dt`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ValveErrors {

@@ -190,7 +190,7 @@ pub fn compliant_observer(
 /// `H` from bounds on the errors of turbine torque and of the load at the wheel, Eq. (2.85), (2.86).
 ///
 /// The turbine torque enters turbine and slip together, through one column. A grade acts on the vehicle
-/// with `m g R_w sin(theta)`; a mass error makes the wheel answer the shaft torque wrongly by its own share.
+/// with `m g R_w sin(theta)`; a mass error makes the wheel answer the shaft torque wrongly by its relative error.
 pub fn error_matrix(vehicle: &Vehicle, phase: Phase) -> DMatrix<f64> {
     let model = compliant_model(vehicle);
     let wheel = model.wheel_per_torque * (grade_n_m(vehicle) + mass_n_m(vehicle)) / SPEED_UNITS_RAD_S[2];
@@ -353,7 +353,7 @@ fn smallest_gain(
 }
 
 /// The same, sought at first in multiples of `gain_unit`, then in those in which the minimum is 1: the gain that is taken
-/// depends on what the minimum may grow by, which is a share of it only then.
+/// depends on what the minimum may grow by, which is a fraction of it only then.
 fn smallest_gain_from(
     gain_unit: f64,
     kappa1_per_s: f64,
@@ -486,7 +486,7 @@ mod tests {
         let (gain, offset) = at(GAIN_UNIT);
         for unit in [20.0, 37.0, 90.0] {
             let (other, other_offset) = at(unit);
-            // Three digits of the gain: along a flat direction a share of 1e-7 of the cost moves it by its root.
+            // Three digits of the gain: along a flat direction a fraction of 1e-7 of the cost moves it by its root.
             assert!((&other - &gain).norm() < 1e-3 * gain.norm(), "{unit}: {other} {gain}");
             assert!((other_offset / offset - 1.0).abs() < 1e-4, "{unit}: {other_offset} {offset}");
         }

@@ -15,10 +15,10 @@ use crate::budget::{ValveErrors, shift_pressure, shift_time_constant};
 use crate::compliant::compliant_model;
 use crate::rigid::{input_limits, supervisor, tracker};
 
-/// Error of a reported engine torque beside its share, N m \[chosen\]: accessories, and friction that the temperature changes.
+/// Error of a reported engine torque beside its relative error, N m \[chosen\]: accessories, and friction that the temperature changes.
 const ENGINE_BESIDE_N_M: f64 = 5.0;
 
-/// Share of the budget's shaft torque by which the load of the wheels may change in a gear: mass, and slip of the
+/// Fraction of the budget's shaft torque by which the load of the wheels may change in a gear: mass, and slip of the
 /// tyres \[chosen\].
 const LOAD_IN_GEAR: f64 = 0.3;
 /// Time of such a change, s \[chosen\].
@@ -36,7 +36,7 @@ fn deviation_within(range: [f64; 2]) -> f64 {
 }
 
 /// An error for each unit of what it is weighed at; weighed at nothing there is none.
-fn share(error: f64, weighed_at: f64) -> f64 {
+fn fraction(error: f64, weighed_at: f64) -> f64 {
     if weighed_at > 0.0 { error / weighed_at } else { 0.0 }
 }
 
@@ -81,7 +81,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
     };
     let reported = ReportedTorque {
         engine_kg_m2: vehicle.engine.inertia_kg_m2,
-        share: deviation_of(budget.engine_torque_share),
+        fraction: deviation_of(budget.engine_torque_share),
         beside_n_m: ENGINE_BESIDE_N_M * (vehicle.engine.inertia_kg_m2 / ENGINE_KG_M2),
     };
     KalmanFilter::new(
@@ -106,7 +106,7 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
     let (budget, told) = (&vehicle.error_bounds, &vehicle.settings.filter);
     let line = &vehicle.driveline;
     let wheels = vehicle.road.inertia_at_wheel() + line.wheel_inertia_kg_m2;
-    // A quarter of a swing of the shafts between the gearbox, with the gear's share of the turbine, and the wheels.
+    // A quarter of a swing of the shafts between the gearbox, with the gear's part of the turbine, and the wheels.
     let gearbox = shift.mass_kg_m2[1][1] * Real::powi(line.final_ratio, 2);
     let swing_rad_s = (line.shaft_stiffness_n_m_rad * (gearbox.recip() + wheels.recip())).sqrt();
     let quarter_swing_s = 0.5 * std::f64::consts::PI / swing_rad_s;
@@ -116,9 +116,9 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
     Uncertainty {
         turbine_share: deviation_of(budget.turbine_torque_share),
         turbine_share_s: told.turbine_share_s,
-        stiffness_share: deviation_within(budget.shaft_stiffness_factor),
+        stiffness_fraction: deviation_within(budget.shaft_stiffness_factor),
         backlash_n_m: budget.backlash_rad * line.shaft_stiffness_n_m_rad,
-        valve_share: Real::hypot(lag, delay),
+        valve_fraction: Real::hypot(lag, delay),
         valve_gain: deviation_within(budget.valve_gain_factor),
         rate_s: told.valve_rate_s,
         friction: deviation_within(budget.friction_factor),
@@ -166,8 +166,8 @@ fn aged_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> ExtendedFilter<f
         turbine_share_s: told.turbine_share_s,
         twist_rate_rad_s: told.twist_rate_rad_s,
         output_least_rad_s: told.output_least_rad_s,
-        valve_moving: share(deviation_of(Real::hypot(valve.lag_pa_s, valve.delay_pa_s)), budget.shift_ramp_pa_s),
-        valve_resting_per_s: share(deviation_of(valve.gain_pa_s), shift_pressure(vehicle)),
+        valve_moving: fraction(deviation_of(Real::hypot(valve.lag_pa_s, valve.delay_pa_s)), budget.shift_ramp_pa_s),
+        valve_resting_per_s: fraction(deviation_of(valve.gain_pa_s), shift_pressure(vehicle)),
         valve_rate_s: told.valve_rate_s,
         offgoing_n_m: told.offgoing_n_m,
         offgoing_release_s: told.offgoing_release_s,

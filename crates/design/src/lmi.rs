@@ -60,7 +60,7 @@ pub enum Outcome {
     Failed(String),
 }
 
-/// What the minimum may grow by where the least of several solutions is taken: this share of `1 + |minimum|`. The solver finds
+/// What the minimum may grow by where the least of several solutions is taken: this fraction of `1 + |minimum|`. The solver finds
 /// the minimum to a tenth of it.
 pub const TIE_SLACK: f64 = 1e-7;
 
@@ -169,7 +169,7 @@ mod tests {
         for weight in [1.0, 1e-3] {
             let problem = Problem { objective: vec![weight; 2], blocks: vec![Block::linear(-2.0, &[1.0, 1.0])] };
             let Outcome::Solved { unknowns, .. } = problem.solve_least(0..2) else { panic!("no solution") };
-            // The slack moves the sum by its share of a cost of `2 weight`.
+            // The slack moves the sum by its fraction of a cost of `2 weight`.
             let moved = TIE_SLACK * (1.0 + 2.0 * weight) / weight;
             assert!(unknowns.iter().all(|x| (x - 1.0).abs() < moved + 1e-7), "{unknowns:?}");
         }

@@ -17,7 +17,7 @@ pub fn open_loop_bound_pa(vehicle: &Vehicle, model: Model, phase: Phase, sample_
 /// Whether a gain on the pressure, Pa per rad/s for each of `(w_t, dw, w_w)`, is in effect the open loop.
 ///
 /// The largest correction of one sample, with every error of the budget at its bound and an estimate that is wrong by the bound
-/// of the open loop, may add up for as long as the valve remembers it. If that sum is less than the share of the bound by which a
+/// of the open loop, may add up for as long as the valve remembers it. If that sum is less than the fraction of the bound by which a
 /// gain must beat the open loop, the estimate is that of the open loop.
 pub fn is_open_loop(
     vehicle: &Vehicle,

@@ -9,7 +9,7 @@ use crate::compliant::compliant_model;
 use crate::rigid::{rigid_model, tracker};
 
 /// Low pass of the direct inversion, in valve time constants: it must not be slower than what it looks for.
-const SMOOTHING_SHARE: f64 = 0.5;
+const SMOOTHING_FRACTION: f64 = 0.5;
 
 /// The super-twisting observer of this vehicle. Its gains dominate the rate of the valve error as it shows in the
 /// acceleration, at the strongest friction.
@@ -28,7 +28,7 @@ pub fn super_twisting(vehicle: &Vehicle) -> SuperTwisting<f64> {
 pub fn inversion(vehicle: &Vehicle) -> Inversion<f64> {
     Inversion {
         model: compliant_model(vehicle),
-        smoothing_s: SMOOTHING_SHARE * shift_time_constant(vehicle),
+        smoothing_s: SMOOTHING_FRACTION * shift_time_constant(vehicle),
         shaft_settling_s: vehicle.settings.shaft_settling_s,
         tracker: tracker(vehicle),
     }

@@ -52,10 +52,10 @@ fn phase_gains(vehicle: &Vehicle, phase: Phase) -> ([f64; 2], [f64; 2]) {
     let added_per_s = (kappa2 + a22).max(0.0);
     let weakest = model.influence(phase, weak);
     // With ks3 = s G1 ks1 the decay added is s |G|^2, G at the weakest friction.
-    let share = added_per_s / (weakest[0] * weakest[0] + weakest[1] * weakest[1]);
+    let fraction = added_per_s / (weakest[0] * weakest[0] + weakest[1] * weakest[1]);
     let mut pressure = [0.0; 2];
     for i in 0..outputs {
-        pressure[i] = share * weakest[i] * speed[i];
+        pressure[i] = fraction * weakest[i] * speed[i];
     }
     (speed, pressure)
 }

@@ -126,8 +126,8 @@ fn designs_hold(vehicle: &Vehicle, turn: usize, name: &str) {
 fn filters_are_finite(vehicle: &Vehicle, name: &str) {
     let (noise, unknown) = (extended_filter(vehicle, None).noise, kalman_filter(vehicle, None).uncertainty);
     let rates = super_twisting(vehicle).error_rate_rad_s3;
-    let shares = [unknown.valve_share, unknown.load_shifting_n_m, unknown.load_in_gear_n_m];
-    let numbers = [&[noise.valve_moving, noise.valve_resting_per_s, rates[0], rates[1]][..], &shares].concat();
+    let fractions = [unknown.valve_fraction, unknown.load_shifting_n_m, unknown.load_in_gear_n_m];
+    let numbers = [&[noise.valve_moving, noise.valve_resting_per_s, rates[0], rates[1]][..], &fractions].concat();
     assert!(numbers.iter().all(|x| x.is_finite()), "{name}: {numbers:?}");
     let _ = unscented_filter(vehicle, None);
 }

@@ -209,8 +209,8 @@ fn valve_and_stroke(v: &mut Vehicle, draw: [f64; 12]) {
 
 /// A car with numbers from all over what a vehicle file may say.
 fn vehicle() -> impl Strategy<Value = Vehicle> {
-    let share = || 0.0..1.0_f64;
-    (prop::array::uniform32(share()), prop::array::uniform12(share()), any::<bool>()).prop_map(
+    let fraction = || 0.0..1.0_f64;
+    (prop::array::uniform32(fraction()), prop::array::uniform12(fraction()), any::<bool>()).prop_map(
         |(draw, budget, pulse_width)| {
             let mut draws = draw.into_iter();
             // On a logarithmic scale: the ends of the ranges are met as often as their middles.

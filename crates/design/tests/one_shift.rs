@@ -71,7 +71,7 @@ proptest! {
         shift in 0..SHIFTS.len(),
         inertia in any::<bool>(),
         method in prop::sample::select(METHODS.to_vec()),
-        initial_share in -1.0..1.0_f64,
+        initial_fraction in -1.0..1.0_f64,
         disturbances in prop::collection::vec(disturbance(), 60),
     ) {
         let (vehicle, design) = designed(shift, method);
@@ -79,7 +79,7 @@ proptest! {
             true => (Phase::InertiaPhase, &design.inertia_phase),
             false => (Phase::TorquePhase, &design.torque_phase),
         };
-        let initial_pa = initial_share * vehicle.error_bounds.shift_pressure_pa;
+        let initial_pa = initial_fraction * vehicle.error_bounds.shift_pressure_pa;
         let errors = car(&vehicle, &design, phase)(initial_pa, &disturbances);
         for &[error, left] in &errors {
             // One pascal for rounding.

@@ -110,7 +110,7 @@ pub struct Cylinder<T> {
 /// 2.3 mm.
 pub const STROKE_M: f64 = 1.2e-3;
 /// Preload of the return spring over its force at the kiss point \[chosen\].
-pub const PRELOAD_SHARE: f64 = 0.75;
+pub const PRELOAD_FRACTION: f64 = 0.75;
 /// `C_h` and `C_0`, m^3/Pa \[chosen\]: 4 cm^3/MPa, as a pack yields 0.1 to 0.2 mm over 1 MPa and a cushion plate more.
 pub const CAPACITY_M3_PA: f64 = 4e-12;
 /// `R_l` and `R_t`: fill times and volume of clutch K1 of a Mercedes-Benz 722.6 give 1.17e7 Pa s/m^3 per mm^2/s and
@@ -127,7 +127,7 @@ impl<T: Real> Cylinder<T> {
         let passage = PASSAGE.cast();
         Self {
             stroke_m3: clutch.piston_area_m2 * T::of(STROKE_M),
-            preload_pa: T::of(PRELOAD_SHARE) * clutch.kiss_pressure(),
+            preload_pa: T::of(PRELOAD_FRACTION) * clutch.kiss_pressure(),
             kiss_pa: clutch.kiss_pressure(),
             home_capacity_m3_pa: T::of(CAPACITY_M3_PA),
             capacity_m3_pa: T::of(CAPACITY_M3_PA),

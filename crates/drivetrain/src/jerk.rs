@@ -23,7 +23,7 @@ const ROUNDING_S: f64 = 1e-6;
 /// from even ones, which changes a jerk by less than 0.001 m/s^3 where the car
 /// accelerates with 10 m/s^2.
 const EVEN_S: f64 = 1e-9;
-/// A window is whole if it is no shorter than this share: bins of uneven clocks.
+/// A window is whole if it is no shorter than this fraction: bins of uneven clocks.
 const WHOLE: f64 = 0.95;
 
 /// The greatest jerk of a motion that is shown time by time.

@@ -53,8 +53,8 @@ impl<T: Real> RoadLoad<T> {
     pub fn rolling_moment(&self, wheel_rad_s: T) -> T {
         let turned = wheel_rad_s / T::of(ROLLING_TURN_RAD_S);
         // Beyond 20 the hyperbolic tangent is 1 to the last bit of a double.
-        let share = if turned.abs() > T::of(20.0) { turned.signum() } else { turned.tanh() };
-        self.rolling_moment_n_m * share
+        let fraction = if turned.abs() > T::of(20.0) { turned.signum() } else { turned.tanh() };
+        self.rolling_moment_n_m * fraction
     }
 
     /// Resisting torque at the wheel on a level road with a gripping tyre, N m, Eq. (2.62b):

@@ -315,8 +315,8 @@ pub struct Table2<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColumnPlace<T> {
     segment: usize,
-    /// Share of the segment, 0 to 1.
-    share: T,
+    /// Fraction of the segment, 0 to 1.
+    fraction: T,
 }
 
 impl<T: Real> Table2<T> {
@@ -356,15 +356,15 @@ impl<T: Real> Table2<T> {
     #[inline]
     pub fn place(&self, column: T) -> ColumnPlace<T> {
         let (j, column) = self.columns.locate(column);
-        let share = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
-        ColumnPlace { segment: j, share }
+        let fraction = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
+        ColumnPlace { segment: j, fraction }
     }
 
     /// As [`Self::at`], for many rows at one value of the column.
     #[inline]
     pub fn at_place(&self, row: T, column: &ColumnPlace<T>) -> T {
         let (i, row) = self.rows.locate(row);
-        let (j, c) = (column.segment.min(MAX_COLUMNS - 2), column.share);
+        let (j, c) = (column.segment.min(MAX_COLUMNS - 2), column.fraction);
         let r = (row - self.rows.points[i]) / (self.rows.points[i + 1] - self.rows.points[i]);
         let across = |k: usize| self.values[k][j] + c * (self.values[k][j + 1] - self.values[k][j]);
         across(i) + r * (across(i + 1) - across(i))
@@ -427,9 +427,9 @@ mod tests {
         let values = [0.0, 5.0, -5.0, 7.0, 1.0, 2.0, 3.0, -1.0];
         let table = Table1::new(&axis, &values).unwrap();
         for (segment, ends) in axis.windows(2).enumerate() {
-            for share in [0.0, 1e-9, 0.3, 0.999_999] {
-                let x = ends[0] + share * (ends[1] - ends[0]);
-                let expected = values[segment] + share * (values[segment + 1] - values[segment]);
+            for fraction in [0.0, 1e-9, 0.3, 0.999_999] {
+                let x = ends[0] + fraction * (ends[1] - ends[0]);
+                let expected = values[segment] + fraction * (values[segment + 1] - values[segment]);
                 assert!((table.at(x) - expected).abs() < 1e-6, "at {x}");
             }
         }

@@ -15,9 +15,9 @@ pub use pulse_width::PulseWidth;
 
 use crate::Real;
 
-/// Steps below this share of the time constant are taken by series: there the closed form cancels.
+/// Steps below this fraction of the time constant are taken by series: there the closed form cancels.
 const SHORT: f64 = 1e-2;
-/// From this share `x` on one less the exponential is used, which takes a third of the time: `psi` then loses a factor `1/x` of
+/// From this fraction `x` on one less the exponential is used, which takes a third of the time: `psi` then loses a factor `1/x` of
 /// its digits and its integral `2/x^2`, as the closed form does at [`SHORT`].
 const LONG: f64 = 0.1;
 

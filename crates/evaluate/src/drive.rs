@@ -96,13 +96,13 @@ impl ScoredShift {
         self.summary.counts.rows > 0
     }
 
-    /// Share of the pressures and torques of both clutches that lie within their guaranteed ranges; `None` without estimates.
+    /// Fraction of the pressures and torques of both clutches that lie within their guaranteed ranges; `None` without estimates.
     pub fn inside(&self) -> Option<f64> {
         let [all, inside] = self.summary.clutches();
         self.is_estimated().then(|| inside as f64 / all as f64)
     }
 
-    /// Share of the rows of both phases in which the speeds show nothing of the controlling clutch's torque while it slips; `None`
+    /// Fraction of the rows of both phases in which the speeds show nothing of the controlling clutch's torque while it slips; `None`
     /// where there are none.
     pub fn hidden(&self) -> Option<f64> {
         let [slipping, hidden] = self.summary.hidden;
@@ -129,7 +129,7 @@ impl ScoredShift {
         self.summary.mean_at_turbine_n_m
     }
 
-    /// The worst health and its share of the rows; `None` without estimates.
+    /// The worst health and its fraction of the rows; `None` without estimates.
     pub fn worst_health(&self) -> Option<(Health, f64)> {
         let worst = Health::ALL.into_iter().filter(|health| self.summary.rows_with(*health) > 0).max()?;
         Some((worst, self.summary.rows_with(worst) as f64 / self.summary.counts.rows as f64))

@@ -10,7 +10,7 @@ use crate::{ClutchRow, ShiftScoreRow, TruePhase};
 /// Shifts that are chosen by each of the measures: with the first of each kind they are at most 60.
 pub const BY_EACH: usize = 18;
 
-/// Measures of how much there is to see in a shift: share of the samples whose health is not good, width of the torque's guaranteed range in
+/// Measures of how much there is to see in a shift: fraction of the samples whose health is not good, width of the torque's guaranteed range in
 /// the mean of the inertia phase, N m, and distance of the estimated torque from the valve model's in both phases, N m (RMS). The torques are
 /// those of the controlling clutch where it slips.
 pub(crate) type Measures = [f64; 3];

@@ -7,8 +7,8 @@ use crate::fitted_file::SIDES;
 /// Standard deviations in the error budget of a fitted file \[chosen: the ranges of `estimate` are to hold nearly always, not in 95 %
 /// of the cars\].
 pub(crate) const BUDGET_SIDES: f64 = 4.0;
-/// Least error of a converter's maps, as a share \[chosen\].
-pub(crate) const CONVERTER_SHARE_MIN: f64 = 0.03;
+/// Least error of a converter's maps, as a fraction \[chosen\].
+pub(crate) const CONVERTER_FRACTION_MIN: f64 = 0.03;
 /// What a line of the error budget says of itself.
 pub(crate) const BUDGET_COMMENT: &str =
     "what the fit leaves open: 4 standard deviations, and no more than was known before";
@@ -32,8 +32,8 @@ pub(crate) fn delays(at_ends_s: [f64; 2], half_s: f64) -> [f64; 2] {
     [(one.min(other) - half_s).max(0.0), (one.max(other) + half_s).min(MOST_S)]
 }
 
-/// The same as a share on either side, of which `least` is always open.
-pub(crate) fn share(sd: f64, value: f64, given: f64, least: f64) -> f64 {
+/// The same as a fraction on either side, of which `least` is always open.
+pub(crate) fn fraction(sd: f64, value: f64, given: f64, least: f64) -> f64 {
     let known = given + (value - 1.0).abs();
     (BUDGET_SIDES * sd).clamp(least, known.max(least))
 }
@@ -52,7 +52,7 @@ mod tests {
         around(factors(0.05, 1.14, [0.85, 1.15]), [(-0.2_f64).exp(), 0.1_f64.exp()]);
         // What is not told at all: the 95 % interval of a normal distribution over the same range.
         around(factors(1.0, 1.0, [0.5, 1.5]), [0.5, 3.0_f64.sqrt()]);
-        assert_eq!(share(0.001, 1.0, 0.1, 0.03), 0.03);
-        assert!((share(1.0, 0.9, 0.1, 0.03) - 0.2).abs() < 1e-12);
+        assert_eq!(fraction(0.001, 1.0, 0.1, 0.03), 0.03);
+        assert!((fraction(1.0, 0.9, 0.1, 0.03) - 0.2).abs() < 1e-12);
     }
 }

@@ -138,8 +138,8 @@ impl Car {
             Parameter::CommandDelay => self.command_delay_s = value,
             Parameter::Inertia(i) => {
                 if let Some(shaft) = shafts.get(i) {
-                    for (row, share) in self.shift.mass_kg_m2.iter_mut().zip(shaft.mass_kg_m2) {
-                        row.iter_mut().zip(share).for_each(|(cell, share)| *cell += (value - 1.0) * share);
+                    for (row, fraction) in self.shift.mass_kg_m2.iter_mut().zip(shaft.mass_kg_m2) {
+                        row.iter_mut().zip(fraction).for_each(|(cell, fraction)| *cell += (value - 1.0) * fraction);
                     }
                 }
             }

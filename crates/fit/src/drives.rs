@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::driving::{DrivenCar, Driving, DrivingModel, DrivingWeights, Evaluated, Term, misfit, usable};
 use crate::parameters::{POSSIBLE, Prior, Shaft};
 use crate::shape::Map;
-use crate::shift_model::MASS_SHARE_SD;
+use crate::shift_model::MASS_FRACTION_SD;
 use crate::{FitError, Parameter};
 
 /// The balance of the car alone: the shifts have the reported engine torque.
@@ -79,7 +79,7 @@ pub(crate) struct DriveErrors {
 impl DriveErrors {
     /// Why it is not that of the car, if so.
     fn reason_against(self) -> Option<String> {
-        let mass = self.mass / MASS_SHARE_SD;
+        let mass = self.mass / MASS_FRACTION_SD;
         let other = || format!("its car has {:.2} times the mass of that of the shifts", Real::exp(self.mass));
         misfit("car", self.scale).or_else(|| (mass.abs() > POSSIBLE).then(other))
     }
@@ -104,9 +104,9 @@ pub(crate) struct DriveNormal {
 }
 
 impl DriveNormal {
-    /// The deviation of the mass after a share of its own step and a step of the parameters.
-    pub(crate) fn stepped(&self, deviation: f64, step: &DVector<f64>, share: f64) -> f64 {
-        deviation - (share * self.own[1] + self.mixed.dot(step)) / self.own[0]
+    /// The deviation of the mass after a fraction of its own step and a step of the parameters.
+    pub(crate) fn stepped(&self, deviation: f64, step: &DVector<f64>, fraction: f64) -> f64 {
+        deviation - (fraction * self.own[1] + self.mixed.dot(step)) / self.own[0]
     }
 
     /// What its own step takes away of the cost.
@@ -141,7 +141,7 @@ impl<'a> Drives<'a> {
     pub(crate) fn cost(&self, priors: &[Prior], at: [&[f64]; 2], weights: &[DrivingWeights]) -> f64 {
         let drives = self.evaluated(priors, at, weights);
         let data = drives.iter().map(|drive| drive.cost).sum::<f64>();
-        data + 0.5 * at[1].iter().map(|deviation| Real::powi(deviation / MASS_SHARE_SD, 2)).sum::<f64>()
+        data + 0.5 * at[1].iter().map(|deviation| Real::powi(deviation / MASS_FRACTION_SD, 2)).sum::<f64>()
     }
 
     /// What each drive adds to the normal equations.
@@ -157,7 +157,7 @@ impl<'a> Drives<'a> {
         let drives = self.evaluated(priors, at, weights);
         let normal = |(drive, deviation): (&Evaluated, &f64)| {
             let mass = place(priors, Term::Mass).ok_or_else(|| FitError::Work("the mass is not fitted".to_owned()))?;
-            let precision = Real::powi(MASS_SHARE_SD, -2);
+            let precision = Real::powi(MASS_FRACTION_SD, -2);
             let own = drive.information[(mass, mass)] + precision;
             let own_gradient = precision * deviation - drive.score[mass];
             let mixed = drive.information.column(mass).into_owned();

@@ -21,7 +21,7 @@ pub(crate) const FILL_DROP_PA: f64 = 0.15e6;
 /// Least standard deviation of a fitted fill volume: of slow and of fast flows, as passages and oil may be, one law has not both. Within 10 % of an
 /// orifice's area and 15 K the ratio of the flows at 20 and at 150 kPa has a deviation of 2 and of 4 %.
 const FILL_FLOOR: f64 = 0.04;
-/// What the preload of the spring may be off beside the kiss point, as a share \[chosen, as in the error budget\].
+/// What the preload of the spring may be off beside the kiss point, as a fraction \[chosen, as in the error budget\].
 const PRELOAD: f64 = 0.1;
 /// Standard deviations of what is known before within which a volume is looked for \[chosen: a value anywhere in a range is at most 1.7 away\].
 const SIDES: f64 = 3.0;

@@ -3,7 +3,7 @@
 use config::{Source, VehicleFile};
 use drivetrain::Real;
 
-use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
+use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_FRACTION_MIN};
 use crate::car::Car;
 use crate::driving::backlash;
 use crate::parameters::HYSTERESIS_UNIT_PA;
@@ -124,9 +124,12 @@ impl Fit {
             Parameter::Shape(Map::Capacity, 0),
             Parameter::Shape(Map::Capacity, 1),
         ];
-        let share = budget::share(sd(&converter), capacity, given.turbine_torque_share, CONVERTER_SHARE_MIN);
-        set(bound("turbine_torque_share"), &[share])?;
-        set(bound("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
+        let fraction = budget::fraction(sd(&converter), capacity, given.turbine_torque_share, CONVERTER_FRACTION_MIN);
+        set(bound("turbine_torque_share"), &[fraction])?;
+        set(
+            bound("turbine_torque_n_m"),
+            &[given.turbine_torque_n_m * fraction / given.turbine_torque_share.max(fraction)],
+        )?;
         use Parameter as P;
         let with_shape = |map: Map, some: &[P]| [some, &map.parameters()].concat();
         let friction = with_shape(Map::Friction, &[P::Friction, P::FrictionAtRest, P::FrictionSlope]);

@@ -355,12 +355,12 @@ pub(crate) struct Held {
 /// Without a pressure the gain of the valve cannot be told, nor, apart from the spring, its gain at the kiss point: what speeds seem to say of
 /// them rests on the shape of the lag over pressure. They stay near those of the file, and the intervals get back what was known of them.
 fn hold(priors: &mut [Prior]) -> Vec<Held> {
-    /// Share of its standard deviation in which it is held; none would make it a constant, with which nothing is correlated.
-    const HELD_SHARE: f64 = 0.1;
+    /// Fraction of its standard deviation in which it is held; none would make it a constant, with which nothing is correlated.
+    const HELD_FRACTION: f64 = 0.1;
     let untold = [Parameter::Gain, Parameter::Shape(Map::Gain, 0)];
     let hold = |prior: &mut Prior| {
         let held = Held { parameter: prior.parameter, sd: prior.sd };
-        prior.sd *= HELD_SHARE;
+        prior.sd *= HELD_FRACTION;
         held
     };
     priors.iter_mut().filter(|prior| untold.contains(&prior.parameter)).map(hold).collect()

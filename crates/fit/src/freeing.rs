@@ -92,9 +92,9 @@ pub(crate) fn misfits(
     (0..known).for_each(|j| fitted[(j, j)] += precision(j));
     let fitted = fitted.cholesky()?;
     // What the priors and the driving between shifts pull is shared by all shifts, so that the gradients of what is fitted add up to none.
-    let share = (normal.scores.len() as f64).recip();
+    let fraction = (normal.scores.len() as f64).recip();
     let pulls =
-        DVector::from_fn(known, |j, _| share * (precision(j) * (unknowns[j] - priors[j].mean) + normal.driving[j]));
+        DVector::from_fn(known, |j, _| fraction * (precision(j) * (unknowns[j] - priors[j].mean) + normal.driving[j]));
     let mut found = Vec::new();
     for (i, map) in maps.iter().enumerate() {
         let place = known + 2 * i;

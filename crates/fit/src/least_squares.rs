@@ -8,7 +8,7 @@
 //! ```
 //!
 //! with the reduced gradient `g` and information `H` of the parameters, priors included, and with the decrease `d` by the own
-//! unknowns alone when they go the share `t` of their step. The crate sees the parameters and `s = sqrt(2 d) t`, of which it wants residuals `r`
+//! unknowns alone when they go the fraction `t` of their step. The crate sees the parameters and `s = sqrt(2 d) t`, of which it wants residuals `r`
 //! and derivatives `J`. Here `r = (sqrt(2 c), 0, ..., 0)`, and
 //!
 //! ```text
@@ -49,8 +49,8 @@ pub(crate) trait Objective {
     /// The equations of a step.
     fn equations(&self, point: &Self::Point) -> Result<Equations<Self::Line>, FitError>;
 
-    /// The point with these parameters, whose own unknowns go a share of their own step from another point and follow the parameters.
-    fn moved(&self, from: &Self::Point, line: &Self::Line, parameters: Vec<f64>, share: f64) -> Self::Point;
+    /// The point with these parameters, whose own unknowns go a fraction of their own step from another point and follow the parameters.
+    fn moved(&self, from: &Self::Point, line: &Self::Line, parameters: Vec<f64>, fraction: f64) -> Self::Point;
 
     /// Why there is no step.
     fn not_finite(&self) -> FitError;
@@ -257,8 +257,8 @@ impl<O: Objective> LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, O> {
         };
         let parameters = (0..count).map(limited).collect();
         let way = unknowns[count] - base.unknowns[count];
-        let share = if base.own_way > 0.0 { way / base.own_way } else { 0.0 };
-        self.at = self.objective.moved(&base.point, &base.line, parameters, share);
+        let fraction = if base.own_way > 0.0 { way / base.own_way } else { 0.0 };
+        self.at = self.objective.moved(&base.point, &base.line, parameters, fraction);
         self.cost = self.objective.cost(&self.at);
     }
 
@@ -345,8 +345,14 @@ mod tests {
             })
         }
 
-        fn moved(&self, (from, w): &Self::Point, line: &Self::Line, parameters: Vec<f64>, share: f64) -> Self::Point {
-            let step = -(share * line[0] + line[2] * (parameters[0] - from[0])) / line[1];
+        fn moved(
+            &self,
+            (from, w): &Self::Point,
+            line: &Self::Line,
+            parameters: Vec<f64>,
+            fraction: f64,
+        ) -> Self::Point {
+            let step = -(fraction * line[0] + line[2] * (parameters[0] - from[0])) / line[1];
             ([parameters[0], parameters[1]], w + step)
         }
 

@@ -192,8 +192,8 @@ impl Motion {
 
     /// By a line between the steps, and the first or last of these lines outside.
     pub(crate) fn wheel_at(&self, time_s: f64) -> f64 {
-        let (i, share) = self.place(self.wheel.len(), time_s);
-        self.wheel[i] + share * (self.wheel[i + 1] - self.wheel[i])
+        let (i, fraction) = self.place(self.wheel.len(), time_s);
+        self.wheel[i] + fraction * (self.wheel[i + 1] - self.wheel[i])
     }
 
     /// The step that a time lies in, and how far in it, in steps.

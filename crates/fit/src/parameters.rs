@@ -205,7 +205,7 @@ pub(crate) struct Shaft {
     pub(crate) mass_kg_m2: [[f64; 2]; 2],
 }
 
-/// The shafts of a vehicle file: each inertia is doubled in the text, and the change of the mass matrix is its share.
+/// The shafts of a vehicle file: each inertia is doubled in the text, and the change of the mass matrix is its fraction.
 pub(crate) fn shafts(vehicle: &VehicleFile) -> Result<Vec<Shaft>, FitError> {
     let names = vehicle_text::shaft_names(&vehicle.source.text)?;
     let shaft = |(i, name): (usize, String)| {
@@ -223,9 +223,9 @@ pub(crate) fn shafts(vehicle: &VehicleFile) -> Result<Vec<Shaft>, FitError> {
     names.into_iter().enumerate().map(shaft).collect()
 }
 
-/// The standard deviation of a factor that lies anywhere within this share of 1.
-fn uniform(share: f64) -> f64 {
-    share / 3.0_f64.sqrt()
+/// The standard deviation of a factor that lies anywhere within this fraction of 1.
+fn uniform(fraction: f64) -> f64 {
+    fraction / 3.0_f64.sqrt()
 }
 
 /// The standard deviation of the logarithm of a factor that lies anywhere between these.
@@ -310,7 +310,7 @@ pub(crate) fn shape_priors(vehicle: &Vehicle, knots: &Knots, map: Map, numbers: 
         parameter: Parameter::Shape(map, *i),
         name: knots.name(map, *i),
         mean: 0.0,
-        sd: (whole * knots.sd_share(map, *i)).max(1e-4),
+        sd: (whole * knots.sd_fraction(map, *i)).max(1e-4),
         floor: intervals::floor(Parameter::Shape(map, *i)),
     };
     numbers.iter().map(prior).collect()

@@ -54,9 +54,9 @@ impl Hydraulics {
     pub(crate) fn set_kiss(&mut self, kiss_pa: f64) {
         if let Some(cylinder) = &mut self.cylinder {
             // A spring without force has no ratio to another.
-            let share = if cylinder.kiss_pa > 0.0 { cylinder.preload_pa / cylinder.kiss_pa } else { 0.0 };
+            let fraction = if cylinder.kiss_pa > 0.0 { cylinder.preload_pa / cylinder.kiss_pa } else { 0.0 };
             cylinder.kiss_pa = kiss_pa.max(0.0);
-            cylinder.preload_pa = share * cylinder.kiss_pa;
+            cylinder.preload_pa = fraction * cylinder.kiss_pa;
         }
     }
 }
@@ -169,8 +169,8 @@ impl Piston {
                 if (slope * left_s).abs() > 1e-9 { rate * Real::exp_m1(slope * left_s) / slope } else { rate * left_s };
             match end {
                 Some(end) if way.abs() > end.abs() => {
-                    let share = slope * end / rate;
-                    let passed_s = if share.abs() > 1e-9 { Real::ln_1p(share) / slope } else { end / rate };
+                    let fraction = slope * end / rate;
+                    let passed_s = if fraction.abs() > 1e-9 { Real::ln_1p(fraction) / slope } else { end / rate };
                     self.volume_m3 += end;
                     left_s -= passed_s;
                 }
@@ -292,10 +292,10 @@ mod tests {
     #[test]
     fn a_kiss_point_moves_with_the_preload() {
         let mut of = Hydraulics::of(&clutch());
-        let share = of.cylinder.unwrap().preload_pa / of.cylinder.unwrap().kiss_pa;
+        let fraction = of.cylinder.unwrap().preload_pa / of.cylinder.unwrap().kiss_pa;
         of.set_kiss(80e3);
         let cylinder = of.cylinder.unwrap();
-        assert!((cylinder.kiss_pa - 80e3).abs() < 1e-9 && (cylinder.preload_pa - share * 80e3).abs() < 1e-9);
+        assert!((cylinder.kiss_pa - 80e3).abs() < 1e-9 && (cylinder.preload_pa - fraction * 80e3).abs() < 1e-9);
         of.set_kiss(-1.0);
         assert_eq!(of.cylinder.unwrap().preload_pa, 0.0);
     }

@@ -278,7 +278,7 @@ fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, measure: Meas
     };
     let half = SIDES * sd;
     let interval = [si(x - half), si(x + half)];
-    ReportRow { name: name.to_owned(), measure, value: si(x), interval, share: sd / before, verdict }
+    ReportRow { name: name.to_owned(), measure, value: si(x), interval, fraction: sd / before, verdict }
 }
 
 /// Why intervals may be too small.

@@ -14,7 +14,7 @@ pub struct ReportRow {
     /// Ends of its interval of 95 %.
     pub interval: [f64; 2],
     /// Standard deviation after the fit over that before.
-    pub share: f64,
+    pub fraction: f64,
     /// What the logs tell of it.
     pub verdict: Verdict,
 }
@@ -93,7 +93,7 @@ mod tests {
     fn people_read_milliseconds_kilopascal_and_per_cent() {
         let row = |measure, value, interval| {
             let row =
-                ReportRow { name: "n".to_owned(), measure, value, interval, share: 0.5, verdict: Verdict::Partly };
+                ReportRow { name: "n".to_owned(), measure, value, interval, fraction: 0.5, verdict: Verdict::Partly };
             [row.value_text(), row.interval_text()]
         };
         assert_eq!(row(Measure::Factor, 1.0423, [1.01, 1.0734]), ["x 1.042", "1.010 to 1.073"]);

@@ -55,7 +55,7 @@ struct Bend {
     from: f64,
     peak: f64,
     to: f64,
-    /// Distance over which the map changes by what is known of it before, see [`Self::sd_share`].
+    /// Distance over which the map changes by what is known of it before, see [`Self::sd_fraction`].
     span: f64,
 }
 
@@ -71,7 +71,7 @@ impl Bend {
 
     /// Standard deviation of a random walk at this point when its values at the points beside it are known, over that of its change along
     /// the span.
-    fn sd_share(self) -> f64 {
+    fn sd_fraction(self) -> f64 {
         ((self.peak - self.from).recip() + (self.to - self.peak).recip()).recip().max(0.0).div(self.span).sqrt()
     }
 }
@@ -116,7 +116,7 @@ impl Knots {
     /// at small throttle has above it.
     pub(crate) fn of(vehicle: &Vehicle) -> Self {
         let kiss_pa = vehicle.oncoming.clutch.kiss_pressure();
-        let pressure_pa = [0.0, 0.5, 1.5].map(|share| kiss_pa + share * vehicle.error_bounds.shift_pressure_pa);
+        let pressure_pa = [0.0, 0.5, 1.5].map(|fraction| kiss_pa + fraction * vehicle.error_bounds.shift_pressure_pa);
         let command = vehicle.oncoming.valve.maps().map(|maps| pressure_pa.map(|p| maps.current_for(p)));
         Self { pressure_pa, command: command.filter(|at| at[0] < at[1] && at[1] < at[2]) }
     }
@@ -147,8 +147,8 @@ impl Knots {
     }
 
     /// Standard deviation of a number of a shape over that of the change along the map, which is a random walk.
-    pub(crate) fn sd_share(&self, map: Map, number: usize) -> f64 {
-        self.bend(map, number).sd_share()
+    pub(crate) fn sd_fraction(&self, map: Map, number: usize) -> f64 {
+        self.bend(map, number).sd_fraction()
     }
 
     /// Relative change of a map at a point where a number of its shape changes by 1.
@@ -186,7 +186,7 @@ impl Knots {
 
 /// The same map with more points; as it is where a table has no room for them.
 fn refined(table: &Table1<f64>, points: &[f64]) -> Table1<f64> {
-    /// A point this near to another of the map, as a share of the whole axis, is the same: a file keeps five digits.
+    /// A point this near to another of the map, as a fraction of the whole axis, is the same: a file keeps five digits.
     const SAME: f64 = 1e-3;
     let mut axis = table.axis().to_vec();
     let near = SAME * (axis.last().copied().unwrap_or(0.0) - axis.first().copied().unwrap_or(0.0));
@@ -242,8 +242,8 @@ mod tests {
             assert!((after.at(slip) / before.at(slip) - factor).abs() < 1e-12, "{slip}");
         }
         // A random walk that is known 100 rad/s below and above, of the change along 200 rad/s.
-        assert!((knots.sd_share(Map::Friction, 1) - 0.5).abs() < 1e-12);
-        assert!((knots.sd_share(Map::Lag, 1) - 1.0).abs() < 1e-12);
+        assert!((knots.sd_fraction(Map::Friction, 1) - 0.5).abs() < 1e-12);
+        assert!((knots.sd_fraction(Map::Lag, 1) - 1.0).abs() < 1e-12);
         let [low, middle, high] = knots.pressure_pa;
         let lag = |valve: ClutchValve<f64>, p: f64| valve.lag(p, 0.0);
         let valve = knots.valve(vehicle.oncoming.valve, Map::Lag, 1, 0.2);

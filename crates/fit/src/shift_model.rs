@@ -68,9 +68,9 @@ pub(crate) struct OwnUnknown {
 }
 
 /// Standard deviations \[chosen\] of what differs from shift to shift.
-pub(crate) const MASS_SHARE_SD: f64 = 0.035;
+pub(crate) const MASS_FRACTION_SD: f64 = 0.035;
 const LOAD_UNIT_N: f64 = 500.0;
-const ENGINE_TORQUE_SHARE_SD: f64 = 0.01;
+const ENGINE_TORQUE_FRACTION_SD: f64 = 0.01;
 /// The start of a segment is not known before: these are wide.
 const SPEED_SD_RAD_S: f64 = 20.0;
 const TWIST_UNIT_RAD: f64 = 0.01;
@@ -183,11 +183,11 @@ impl ShiftModel {
 
     fn lay_out_unknowns(&mut self, segments: &[Segment], car: &Car) {
         let mut own = vec![
-            OwnUnknown { mean: 0.0, sd: MASS_SHARE_SD, segment: None },
+            OwnUnknown { mean: 0.0, sd: MASS_FRACTION_SD, segment: None },
             OwnUnknown { mean: 0.0, sd: 1.0, segment: None },
         ];
         if self.has_engine_torque {
-            own.push(OwnUnknown { mean: 0.0, sd: ENGINE_TORQUE_SHARE_SD, segment: None });
+            own.push(OwnUnknown { mean: 0.0, sd: ENGINE_TORQUE_FRACTION_SD, segment: None });
         }
         for (i, segment) in segments.iter().enumerate() {
             let begin_s = self.parts[i].begin_s;
@@ -328,8 +328,8 @@ impl ShiftModel {
     pub(crate) fn on_grid(&self, values: &[f64], time_s: f64) -> f64 {
         let steps = ((time_s - self.half_steps.begin_s) / self.half_steps.step_s).max(0.0);
         let i = (steps as usize).min(values.len().saturating_sub(2));
-        let share = (steps - i as f64).min(1.0);
-        values[i] + share * (values[i + 1] - values[i])
+        let fraction = (steps - i as f64).min(1.0);
+        values[i] + fraction * (values[i + 1] - values[i])
     }
 
     /// What the own unknowns say of a segment.

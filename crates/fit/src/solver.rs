@@ -82,9 +82,9 @@ struct Eliminated {
 }
 
 impl Eliminated {
-    /// Their step: a share of their own one, and what follows from a step of the parameters.
-    fn step(&self, parameters: &DVector<f64>, share: f64) -> DVector<f64> {
-        -self.own.solve(&(&self.gradient * share + &self.mixed * parameters))
+    /// Their step: a fraction of their own one, and what follows from a step of the parameters.
+    fn step(&self, parameters: &DVector<f64>, fraction: f64) -> DVector<f64> {
+        -self.own.solve(&(&self.gradient * fraction + &self.mixed * parameters))
     }
 
     /// What their own step takes away of the cost.
@@ -258,16 +258,16 @@ impl Objective for Weighed<'_> {
         Ok(Equations { information, gradient, own_decrease: normal.own_decrease(), line: normal })
     }
 
-    fn moved(&self, from: &Point, normal: &Normal, shared: Vec<f64>, share: f64) -> Point {
+    fn moved(&self, from: &Point, normal: &Normal, shared: Vec<f64>, fraction: f64) -> Point {
         let step = DVector::from_column_slice(&shared) - DVector::from_column_slice(&from.unknowns.shared);
         let own = (from.unknowns.own.iter().zip(&normal.eliminated))
             .map(|(own, eliminated)| {
-                let step = eliminated.step(&step, share);
+                let step = eliminated.step(&step, fraction);
                 own.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect()
             })
             .collect();
         let drives = normal.drives.iter().zip(&from.unknowns.drives);
-        let drives = drives.map(|(drive, x)| drive.stepped(*x, &step, share)).collect();
+        let drives = drives.map(|(drive, x)| drive.stepped(*x, &step, fraction)).collect();
         let unknowns = Unknowns { shared, own, drives };
         Point { residuals: self.problem.residuals(self.shifts, &unknowns), unknowns }
     }

@@ -17,8 +17,8 @@ impl Verdict {
     /// Of standard deviations after and before.
     pub fn of(after: f64, before: f64) -> Self {
         match after / before {
-            share if share < 1.0 / 3.0 => Self::Measured,
-            share if share < 0.7 => Self::Partly,
+            fraction if fraction < 1.0 / 3.0 => Self::Measured,
+            fraction if fraction < 0.7 => Self::Partly,
             _ => Self::NotTold,
         }
     }

@@ -130,7 +130,7 @@ fn torque_and_work_of_a_shift_are_within_their_range() {
     let ([low, _, high], [least, _, most]) = (found.mean_n_m.unwrap(), found.work_j.unwrap());
     assert!(low < mean && mean < high && high - low < 0.6 * mean, "{low} {mean} {high}");
     assert!(least < work && work < most, "{least} {work} {most}");
-    assert_eq!((found.reduction, found.no_slip_share), (None, 0.0));
+    assert_eq!((found.reduction, found.no_slip_fraction), (None, 0.0));
 }
 
 #[test]

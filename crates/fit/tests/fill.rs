@@ -48,8 +48,8 @@ fn the_preload_that_was_found_with_the_volume_is_written_with_it() {
     let shifts = shifts(&mut car, 2);
     let fit = fitted(&car, &shifts, &[]);
     let file = fit.vehicle_file(&car.file, "a simulation").unwrap();
-    let share = |vehicle: &Vehicle| vehicle.oncoming.cylinder.preload_pa / vehicle.oncoming.cylinder.kiss_pa;
-    let [given, after, truth] = [&car.file, &file, &car.car].map(share);
+    let fraction = |vehicle: &Vehicle| vehicle.oncoming.cylinder.preload_pa / vehicle.oncoming.cylinder.kiss_pa;
+    let [given, after, truth] = [&car.file, &file, &car.car].map(fraction);
     assert!((after - truth).abs() < 0.4 * (given - truth).abs(), "{given} {after} {truth}");
     // The limits of the preload move with it, and contain the true one.
     let limits = file.error_bounds.fill.unwrap().preload_pressure_pa;
@@ -62,10 +62,10 @@ fn the_preload_that_was_found_with_the_volume_is_written_with_it() {
         .replace("preload_n = 450 ", "preload_n = 560 ")
         .replace("[40.5e3, 49.5e3]", "[50.4e3, 61.6e3]");
     let strong = VehicleFile::from_source(Source { text, ..car.file.source.clone() }).unwrap();
-    assert!(share(&strong) > 0.9, "{}", share(&strong));
+    assert!(fraction(&strong) > 0.9, "{}", fraction(&strong));
     let file = fit.vehicle_file(&strong, "a simulation").unwrap();
     // To the digits that are written.
-    assert!((share(&file) / share(&strong) - 1.0).abs() < 1e-5, "{}", share(&file));
+    assert!((fraction(&file) / fraction(&strong) - 1.0).abs() < 1e-5, "{}", fraction(&file));
 }
 
 #[test]

@@ -66,19 +66,19 @@ pub(crate) fn learnt(car: &Car, input: &[u8]) {
     let mut drive = LoggedDrive::new(car, &tables, None, Some(&learnt));
     let reading = |value: f64| Some(Reading { value, age_s: 0.0 });
     for row in 0..20_u32 {
-        let (gear, share) = (GearCommand { from: 2, to: 2 + usize::from(row > 9) }, f64::from(row) / 20.0);
+        let (gear, fraction) = (GearCommand { from: 2, to: 2 + usize::from(row > 9) }, f64::from(row) / 20.0);
         let input = ShiftInput {
             dt_s: 0.01,
             engine_rad_s: reading(210.0),
-            turbine_rad_s: reading(200.0 - 40.0 * share),
+            turbine_rad_s: reading(200.0 - 40.0 * fraction),
             output_rad_s: reading(200.0 / car.gearbox.gears[2].ratio),
             wheel_rad_s: None,
             engine_n_m: None,
             lock_up_applied: false,
-            commands: [reading(share); MAX_ELEMENTS],
+            commands: [reading(fraction); MAX_ELEMENTS],
             gear,
         };
-        let pressures = [reading(1e5 * share); MAX_ELEMENTS];
+        let pressures = [reading(1e5 * fraction); MAX_ELEMENTS];
         let beside =
             LogStep { vehicle_m_s: 10.0, speed_m_s: reading(10.0), ..LogStep::of(0.01 * f64::from(row), input) };
         let estimate = drive.push(&LogStep { pressures, ..beside });

@@ -24,7 +24,7 @@ impl Random {
     }
 
     /// A number from 0 to 1.
-    pub fn share(&mut self) -> f64 {
+    pub fn fraction(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 

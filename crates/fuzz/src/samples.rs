@@ -150,11 +150,11 @@ pub(crate) fn input(random: &mut Random) -> Vec<u8> {
     for _ in 0..=random.below(MOST_SAMPLES) {
         for (value, (low, high)) in now.iter_mut().zip(ranges) {
             *value = match random.below(40) {
-                0 => low + (high - low) * random.share(),
-                1..=10 => (*value + 0.05 * (high - low) * (random.share() - 0.5)).clamp(low, high),
+                0 => low + (high - low) * random.fraction(),
+                1..=10 => (*value + 0.05 * (high - low) * (random.fraction() - 0.5)).clamp(low, high),
                 _ => *value,
             };
-            let given = if random.share() < strange {
+            let given = if random.fraction() < strange {
                 if random.below(2) == 0 { *random.of(&STRANGE) } else { f64::from_bits(random.bits()) }
             } else {
                 *value

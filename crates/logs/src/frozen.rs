@@ -19,7 +19,7 @@ pub const FROZEN_S: f64 = 0.5;
 pub const FROZEN_FROM_START_S: f64 = 5.0;
 /// And for so many samples.
 pub const FROZEN_SAMPLES: u32 = 10;
-/// While a speed that it cannot part from changed by this share of its value: more than the slip of a tyre changes in ordinary
+/// While a speed that it cannot part from changed by this fraction of its value: more than the slip of a tyre changes in ordinary
 /// driving.
 pub const FROZEN_CHANGE: f64 = 0.02;
 /// The same when it has not changed since the log began.
@@ -34,7 +34,7 @@ const STOPPED_CHANGE: f64 = 0.002;
 pub const FROZEN_CHANGE_CONVERTER: f64 = 0.05;
 /// Greatest speed that an idle control holds, of a cold engine, rad/s \[chosen\]: 1500 rpm.
 pub const IDLE_RAD_S: f64 = 157.0;
-/// A turbine above this share of the engine's speed takes the engine along when it changes.
+/// A turbine above this fraction of the engine's speed takes the engine along when it changes.
 pub const COUPLED: f64 = 0.95;
 
 /// A speed that moved has stopped when it stood still for so long, s, and for so many samples \[chosen\].
@@ -114,7 +114,7 @@ impl FrozenSpeed {
             still.others = *speeds;
         }
         still.samples += 1;
-        let (limit_s, share) = match self.longest_still {
+        let (limit_s, fraction) = match self.longest_still {
             0 => (FROZEN_FROM_START_S, FROZEN_CHANGE_FROM_START),
             _ => (FROZEN_S, FROZEN_CHANGE),
         };
@@ -126,7 +126,7 @@ impl FrozenSpeed {
             && time_s - still.since_s >= STOPPED_S;
         if !still.frozen && value != 0.0 && (long || stopped) {
             let quanta = quantum / value.abs();
-            let limit = if stopped { quanta.max(STOPPED_CHANGE) } else { share.max(quanta) };
+            let limit = if stopped { quanta.max(STOPPED_CHANGE) } else { fraction.max(quanta) };
             still.frozen = partners(self.role).iter().any(|partner| {
                 // Without one of both nothing has changed.
                 let (now, then) = (speeds[*partner as usize], still.others[*partner as usize]);

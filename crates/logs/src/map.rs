@@ -390,7 +390,7 @@ fn conversion(entry: &Mapped, text: &str, channel: &Channel, gearbox: &Gearbox) 
     let (role, name) = (entry.role, entry.key());
     let Some(wanted) = role.quantity() else { return Ok((String::new(), 1.0, 0.0)) };
     let channel = error::shown(&channel.name);
-    if text.trim().is_empty() && wanted != Quantity::Share {
+    if text.trim().is_empty() && wanted != Quantity::Fraction {
         return Err(format!(
             "channel `{channel}` ({name}) has no unit in the log\nhint: say it, as in `--channel {name}=\"{channel} [{}]\"` or `channel.{name}.unit`",
             role.unit()
@@ -407,7 +407,7 @@ fn conversion(entry: &Mapped, text: &str, channel: &Channel, gearbox: &Gearbox) 
     let duty = matches!(role, Role::OncomingDuty | Role::OffgoingDuty | Role::ElementDuty);
     let (size, zero) = match (role, unit.quantity) {
         // A duty cycle is in % inside.
-        _ if duty && unit.quantity == Quantity::Share => (100.0 * unit.size, 0.0),
+        _ if duty && unit.quantity == Quantity::Fraction => (100.0 * unit.size, 0.0),
         _ if unit.quantity == wanted => (unit.size, unit.zero),
         (Role::WheelSpeed, Quantity::Velocity) => match gearbox.wheel_radius_m {
             Some(radius_m) => (unit.size / radius_m, 0.0),

@@ -287,10 +287,10 @@ fn alone(entry: &RoleSummary, summary: &[RoleSummary], seen: Seen) -> Option<Fin
         {
             say(format!("most values would be about {:.0} rpm", rpm(middle)), slower(unit, middle))
         }
-        Quantity::Share if unit == "1" && size > 1.5 && !is_duty(entry.role) => {
+        Quantity::Fraction if unit == "1" && size > 1.5 && !is_duty(entry.role) => {
             say(format!("its greatest value is {size:.1}"), "%")
         }
-        Quantity::Share if unit == "1" && is_duty(entry.role) && size > 150.0 => {
+        Quantity::Fraction if unit == "1" && is_duty(entry.role) && size > 150.0 => {
             say(format!("its greatest value is {:.1}", size / 100.0), "%")
         }
         Quantity::Pressure if size > 20e6 => {
@@ -305,7 +305,7 @@ fn alone(entry: &RoleSummary, summary: &[RoleSummary], seen: Seen) -> Option<Fin
         // What follows is too small, or never of the right sign, which only a whole log shows.
         _ if seen == Seen::Beginning => None,
         // An offset of a command that is off is small.
-        Quantity::Current | Quantity::Share
+        Quantity::Current | Quantity::Fraction
             if entry.role.is_command() && entry.extremes.greatest <= 0.0 && entry.extremes.least < -0.05 =>
         {
             let message = format!("{} is never positive: its sign is the other way round", entry.name);

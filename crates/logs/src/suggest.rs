@@ -55,20 +55,20 @@ fn fit(entry: &Words, channel: &Channel) -> Option<Fit> {
     }
     let unit = Unit::parse(&channel.unit).filter(|_| !channel.unit.trim().is_empty());
     // A percentage by its name, where the log does not say the unit.
-    let is_share = unit.is_none() && met(&["percent", "pct", "prozent"], &words);
+    let is_fraction = unit.is_none() && met(&["percent", "pct", "prozent"], &words);
     let unit_fits = match (entry.role.quantity(), unit) {
         (None, None) => 2,
-        (None, Some(unit)) if unit.quantity == Quantity::Share => 2,
+        (None, Some(unit)) if unit.quantity == Quantity::Fraction => 2,
         (Some(wanted), Some(unit)) if wanted == unit.quantity => 4,
         (Some(Quantity::Rotation), Some(unit))
             if entry.role == Role::WheelSpeed && unit.quantity == Quantity::Velocity =>
         {
             3
         }
-        (Some(Quantity::Torque), None) if is_share => return Some(Fit::Share),
+        (Some(Quantity::Torque), None) if is_fraction => return Some(Fit::Fraction),
         (Some(_), None) => 1,
         // Per cent of a torque that the name does not tell.
-        (Some(Quantity::Torque), Some(unit)) if unit.quantity == Quantity::Share => return Some(Fit::Share),
+        (Some(Quantity::Torque), Some(unit)) if unit.quantity == Quantity::Fraction => return Some(Fit::Fraction),
         _ => return None,
     };
     let score = match (exact, vague) {
@@ -83,7 +83,7 @@ fn fit(entry: &Words, channel: &Channel) -> Option<Fit> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Fit {
     /// It is per cent of a torque that the log does not tell: it cannot be used as it is.
-    Share,
+    Fraction,
     /// By name and unit, the better the more.
     Score(u32),
 }
@@ -206,8 +206,8 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
         };
         taken[best] = true;
         let table = table_of(entry.role.name(), entry.role, best, channels);
-        text += &if best_fit == Fit::Share { of_share(&table) } else { table };
-        let others = found.iter().skip(1).filter(|(fit, _)| (*fit == Fit::Share) == (best_fit == Fit::Share));
+        text += &if best_fit == Fit::Fraction { of_fraction(&table) } else { table };
+        let others = found.iter().skip(1).filter(|(fit, _)| (*fit == Fit::Fraction) == (best_fit == Fit::Fraction));
         let others: Vec<String> = others.take(4).map(|(_, i)| error::shown(&channels[*i].name)).collect();
         if !others.is_empty() {
             let _ = writeln!(text, "# also fits: {}", others.join(", "));
@@ -254,7 +254,7 @@ fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
         let _ = writeln!(text, "group = {}", quoted(&channel.group));
     }
     match Unit::parse(&channel.unit) {
-        Some(Unit { quantity: Quantity::Share, .. }) if role.quantity() == Some(Quantity::Torque) => {
+        Some(Unit { quantity: Quantity::Fraction, .. }) if role.quantity() == Some(Quantity::Torque) => {
             text += "unit = \"N m\"\n";
         }
         Some(_) if !channel.unit.trim().is_empty() => {
@@ -269,7 +269,7 @@ fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
 }
 
 /// The table of a channel that is per cent of a torque, as a comment: without a scale it would be wrong by a factor.
-fn of_share(table: &str) -> String {
+fn of_fraction(table: &str) -> String {
     let lines: String = table.lines().filter(|line| !line.is_empty()).map(|line| format!("# {line}\n")).collect();
     format!(
         "\n# In per cent of a torque that the log does not tell. To use it, take the signs away and write how many N m one per cent is.\n\

@@ -49,8 +49,8 @@ impl Drive {
     fn ratio(&self, time_s: f64) -> f64 {
         let mut log = RATIOS[self.first - 1].ln();
         for (begin_s, to) in &self.shifts {
-            let share = ((time_s - begin_s) / INERTIA_S).clamp(0.0, 1.0);
-            log += share * (RATIOS[to - 1].ln() - log);
+            let fraction = ((time_s - begin_s) / INERTIA_S).clamp(0.0, 1.0);
+            log += fraction * (RATIOS[to - 1].ln() - log);
         }
         log.exp()
     }
@@ -340,9 +340,9 @@ fn flare_is_the_turbine_above_the_old_gear() {
     let mut readings = drive.readings(&SPEEDS);
     // A half sine of 12 rad/s in the 0.2 s before the inertia phase.
     for reading in readings.iter_mut().filter(|reading| reading.role == Role::TurbineSpeed) {
-        let share = (reading.time_s - 2.8) / 0.2;
-        if (0.0..1.0).contains(&share) {
-            reading.value += 12.0 * (PI * share).sin();
+        let fraction = (reading.time_s - 2.8) / 0.2;
+        if (0.0..1.0).contains(&fraction) {
+            reading.value += 12.0 * (PI * fraction).sin();
         }
     }
     let shifts = found(&gearbox, &SPEEDS, &readings);

@@ -26,12 +26,12 @@ impl<T: Real> CompliantGains<T> {
 
 impl<T: Real> Mix<T> for CompliantGains<T> {
     #[inline]
-    fn mixed(&self, other: &Self, share: T) -> Self {
+    fn mixed(&self, other: &Self, fraction: T) -> Self {
         let mix = |a: &[[T; OUTPUTS]; 2], b: &[[T; OUTPUTS]; 2]| {
             let mut gain = *a;
             for (row, other) in gain.iter_mut().zip(b) {
                 for (x, y) in row.iter_mut().zip(other) {
-                    *x = between(*x, *y, share);
+                    *x = between(*x, *y, fraction);
                 }
             }
             gain
@@ -165,8 +165,8 @@ impl<T: Real> CompliantObserver<T> {
                 }
             }
             (None, _) => {
-                let share = T::one() - (-dt / self.shaft_settling_s).exp();
-                predicted = predicted + share * (last.steady_n_m - predicted);
+                let fraction = T::one() - (-dt / self.shaft_settling_s).exp();
+                predicted = predicted + fraction * (last.steady_n_m - predicted);
             }
             (Some(_), None) => {}
         }

@@ -23,7 +23,7 @@
 //! xi_lo  rises with (Q_lo(s_lo - p1_hi) - k p1_hi)/V_hi, falls with that over V_lo; held at 1 while m >= p1_hi
 //! F      s_hi where it is above F, else decays to it by C/Q_exh,lo; at most p1_hi while xi_hi < 1; at least p0_hi when
 //!        xi_hi comes to 0
-//! m      s_lo (1 - leak share) where it is below m; else rises to it by C/Q_lo where the piston surely does not stroke:
+//! m      s_lo (1 - leak fraction) where it is below m; else rises to it by C/Q_lo where the piston surely does not stroke:
 //!        below p0_lo, with xi_lo = 1, or above p1_hi. Between them it is held. At least p1_lo when xi_lo comes to 1
 //! upper: F if xi_hi = 0, p1_hi on the stroke, max(F, p1_hi) if xi_hi = 1        lower: m, at least p0_lo if xi_lo > 0
 //! ```
@@ -86,7 +86,7 @@ impl<T: Real> PistonRange<T> {
     #[inline]
     pub(crate) fn advance(&mut self, fill: &FillBudget<T>, outlet: &Outlet<T>, dt_s: T) {
         self.raise(fill, outlet.highest_pa, dt_s);
-        self.lower(fill, outlet.lowest_pa, fill.leak_share(outlet.line_pa), dt_s);
+        self.lower(fill, outlet.lowest_pa, fill.leak_fraction(outlet.line_pa), dt_s);
     }
 
     /// Carries the upper limits over `dt_s`, with the outlet at most at `s`.
@@ -120,11 +120,11 @@ impl<T: Real> PistonRange<T> {
 
     /// Carries the lower limits over `dt_s`, with the outlet at least at `s`.
     #[inline]
-    fn lower(&mut self, fill: &FillBudget<T>, s: T, leak_share: T, dt_s: T) {
+    fn lower(&mut self, fill: &FillBudget<T>, s: T, leak_fraction: T, dt_s: T) {
         let (zero, one) = (T::zero(), T::one());
         let (before, m, leak) = (self.stroke[0], self.lowest_pa, fill.leak_m3_s_pa);
         let ([p0, _], [p1, kissed]) = (fill.preload_pressure_pa, fill.kiss_pressure_pa);
-        let target = s * (one - leak_share);
+        let target = s * (one - leak_fraction);
         let fallen = m.at_most(target);
         let net = if s > kissed {
             fill.least_in(s - kissed) - leak * kissed
@@ -149,8 +149,8 @@ impl<T: Real> PistonRange<T> {
             // The net flow at a drop, less that of the leak, is concave in the drop and not below zero at the target: the
             // chord from there to the start of the step is below it.
             let (drop, inflow) = (target - m, fill.least_in(s - m) - leak * m);
-            let share = (-dt_s * inflow.at_least(zero) / (fill.capacity_m3_pa * drop)).exp();
-            lowest = (target - drop * share).at_most(ceiling);
+            let fraction = (-dt_s * inflow.at_least(zero) / (fill.capacity_m3_pa * drop)).exp();
+            lowest = (target - drop * fraction).at_most(ceiling);
         }
         if stroke >= one {
             lowest = lowest.at_least(p1);

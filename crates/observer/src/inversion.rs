@@ -140,16 +140,16 @@ impl<T: Real> Inversion<T> {
             shaft = shaft + turned;
             if shifting {
                 let torque = self.clutch_torque(&last, sample, mean);
-                let share = T::one() - (-dt / self.smoothing_s).exp();
+                let fraction = T::one() - (-dt / self.smoothing_s).exp();
                 let size = (direction(slip) * torque).at_least(T::zero());
                 // Below the kiss point the clutch carries nothing, and the valve model is all there is.
                 if size > T::zero() {
                     let found = self.model.rigid.clutch.pressure_for(size, slip);
-                    pressure = interval.corrected(pressure, share * (found - pressure), &self.tracker.limits);
+                    pressure = interval.corrected(pressure, fraction * (found - pressure), &self.tracker.limits);
                 }
             } else {
-                let share = T::one() - (-dt / self.shaft_settling_s).exp();
-                shaft = shaft + share * (steady - shaft);
+                let fraction = T::one() - (-dt / self.shaft_settling_s).exp();
+                shaft = shaft + fraction * (steady - shaft);
             }
         }
         // A twist that cannot be is found anew.

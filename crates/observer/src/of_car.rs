@@ -17,17 +17,17 @@ use crate::of_sensors::{SCALE_LEAST, deviation_of, engine_noise, speed_reading};
 const SPEED_QUANTUM_RAD_S: f64 = 0.7;
 /// The same of the wheel speed.
 const WHEEL_QUANTUM_RAD_S: f64 = 0.14;
-/// Errors of the valve's map beside its gain, as a share \[chosen\]: with the bounds of 15 % of friction and 10 % of gain it gives a
+/// Errors of the valve's map beside its gain, as a fraction \[chosen\]: with the bounds of 15 % of friction and 10 % of gain it gives a
 /// deviation of 12 %.
-const MAP_SHARE: f64 = 0.06;
+const MAP_FRACTION: f64 = 0.06;
 
 /// Standard deviations of the part of the pressure's error at rest that does not last, as of hysteresis, and of the kiss
 /// point beside the valve's gain, Pa \[chosen\]: 10 kPa together.
 const PRESSURE_PA: f64 = 7e3;
 const KISS_POINT_PA: f64 = 7e3;
-/// Standard deviation of the part of the turbine torque's error that does not last, as a share \[chosen\]: the shape of the
+/// Standard deviation of the part of the turbine torque's error that does not last, as a fraction \[chosen\]: the shape of the
 /// converter's maps.
-const TURBINE_SHARE: f64 = 0.03;
+const TURBINE_FRACTION: f64 = 0.03;
 
 /// Time after which the scale of the wheel speed is another, by as much as it can be known at best, s \[chosen\]: a tyre that gets warm.
 const WHEEL_SCALE_S: f64 = 60.0;
@@ -202,10 +202,10 @@ fn has_dog(gearbox: &Gearbox, [from, to]: [usize; 2]) -> bool {
 
 /// A piston whose stroke is within these limits, each the edge of a uniform distribution.
 fn piston(cylinder: &Cylinder<f64>, fill: &FillBudget<f64>) -> Piston<f64> {
-    let share = |[least, most]: [f64; 2], value: f64| deviation_of(0.5 * (most - least)) / value;
+    let fraction = |[least, most]: [f64; 2], value: f64| deviation_of(0.5 * (most - least)) / value;
     let flow = |k: usize| fill.supply[k].flow(FILL_PA, fill.viscosity_m2_s[k]).min(cylinder.flow_max_m3_s);
-    let volume = share(fill.volume_m3, cylinder.stroke_m3);
-    Piston::new(*cylinder, Real::hypot(volume, share([flow(1), flow(0)], cylinder.flow(FILL_PA))))
+    let volume = fraction(fill.volume_m3, cylinder.stroke_m3);
+    Piston::new(*cylinder, Real::hypot(volume, fraction([flow(1), flow(0)], cylinder.flow(FILL_PA))))
 }
 
 /// What the valve of an element can be commanded and can give.
@@ -269,14 +269,14 @@ fn shaft_n_m(car: &Car) -> f64 {
 
 /// What the filter does not know of an element, whose friction and valve err by this scale times the bounds.
 pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncertainty<f64> {
-    let parts = [deviation_of(errors.friction()), deviation_of(errors.valve_gain()), MAP_SHARE];
+    let parts = [deviation_of(errors.friction()), deviation_of(errors.valve_gain()), MAP_FRACTION];
     let square: f64 = parts.iter().map(|part| part * part).sum();
     ElementUncertainty {
-        torque_share: scale * square.sqrt(),
+        torque_fraction: scale * square.sqrt(),
         slow_part: 1.0 - parts[2] * parts[2] / square,
         valve_gain: scale * parts[1],
         kiss_point_pa: scale * KISS_POINT_PA,
-        valve_lag_share: scale * deviation_of(errors.valve_lag()),
+        valve_lag_fraction: scale * deviation_of(errors.valve_lag()),
         valve_delay_s: scale * deviation_of(errors.valve_delay()),
         pressure_pa: scale * PRESSURE_PA,
     }
@@ -285,13 +285,13 @@ pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncerta
 /// What the filter does not know beside the elements.
 fn uncertainty(errors: &ErrorBudget) -> ShiftUncertainty<f64> {
     ShiftUncertainty {
-        torque_share_s: 3.0,
+        torque_fraction_s: 3.0,
         pressure_s: 0.15,
-        turbine_share: TURBINE_SHARE,
+        turbine_share: TURBINE_FRACTION,
         turbine_share_s: 3.0,
-        // What is low by a share is exceeded by more than that share.
+        // What is low by a fraction is exceeded by more than that fraction.
         inertia_share: deviation_of(errors.inertia / (1.0 - errors.inertia)),
-        stiffness_share: deviation_of(errors.stiffness),
+        stiffness_fraction: deviation_of(errors.stiffness),
         wheel_scale: deviation_of(errors.wheel_scale).max(SCALE_LEAST),
         wheel_scale_walk: SCALE_LEAST / WHEEL_SCALE_S.sqrt(),
         rate_rad_s: 0.1,

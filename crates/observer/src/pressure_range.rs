@@ -29,9 +29,9 @@ const MOST_PIECES: usize = 8;
 const LOST: f64 = 1.5;
 /// Two readings more than this many usual periods apart have lost more than one.
 const GAP: f64 = 2.5;
-/// Share by which two equal times between rows differ by rounding.
+/// Fraction by which two equal times between rows differ by rounding.
 const ROUNDING: f64 = 1e-9;
-/// The next reading comes after at least this share of the shortest of these times \[chosen\]: clocks waver by a tenth.
+/// The next reading comes after at least this fraction of the shortest of these times \[chosen\]: clocks waver by a tenth.
 const SOONEST: f64 = 0.8;
 /// Times between readings of which the middle one is the usual period \[chosen\]: a slower channel counts as such after three of them, not
 /// at once, since it may be one that has lost readings; and clocks that waver do not make the usual time look like a gap.

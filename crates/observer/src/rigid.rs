@@ -46,12 +46,12 @@ impl<T: Real> RigidGains<T> {
 
 impl<T: Real> Mix<T> for RigidGains<T> {
     #[inline]
-    fn mixed(&self, other: &Self, share: T) -> Self {
+    fn mixed(&self, other: &Self, fraction: T) -> Self {
         let [turbine, slip] = self.inertia_phase_pa_s_rad;
         let [other_turbine, other_slip] = other.inertia_phase_pa_s_rad;
         Self {
-            torque_phase_pa_s_rad: between(self.torque_phase_pa_s_rad, other.torque_phase_pa_s_rad, share),
-            inertia_phase_pa_s_rad: [between(turbine, other_turbine, share), between(slip, other_slip, share)],
+            torque_phase_pa_s_rad: between(self.torque_phase_pa_s_rad, other.torque_phase_pa_s_rad, fraction),
+            inertia_phase_pa_s_rad: [between(turbine, other_turbine, fraction), between(slip, other_slip, fraction)],
         }
     }
 }

@@ -4,8 +4,8 @@ use drivetrain::Real;
 
 /// Gains that can be mixed.
 pub trait Mix<T> {
-    /// `(1 - share) self + share other`.
-    fn mixed(&self, other: &Self, share: T) -> Self;
+    /// `(1 - fraction) self + fraction other`.
+    fn mixed(&self, other: &Self, fraction: T) -> Self;
 }
 
 /// Gains at the ends of a range of friction coefficients, linear between them and constant beyond.
@@ -39,8 +39,8 @@ impl<T: Real, G: Mix<T> + Copy> Schedule<T, G> {
     pub fn at(&self, friction: T) -> G {
         let [least, greatest] = self.friction;
         if greatest > least {
-            let share = ((friction - least) / (greatest - least)).at_least(T::zero()).at_most(T::one());
-            self.ends[0].mixed(&self.ends[1], share)
+            let fraction = ((friction - least) / (greatest - least)).at_least(T::zero()).at_most(T::one());
+            self.ends[0].mixed(&self.ends[1], fraction)
         } else {
             self.ends[0]
         }
@@ -53,8 +53,8 @@ impl<T: Real, G: Clone> From<G> for Schedule<T, G> {
     }
 }
 
-/// `(1 - share) a + share b`.
+/// `(1 - fraction) a + fraction b`.
 #[inline]
-pub(crate) fn between<T: Real>(a: T, b: T, share: T) -> T {
-    a + share * (b - a)
+pub(crate) fn between<T: Real>(a: T, b: T, fraction: T) -> T {
+    a + fraction * (b - a)
 }

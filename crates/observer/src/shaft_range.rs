@@ -7,7 +7,7 @@
 //! dw_t/dt = C11 T_t + C12 T_ca + C13 T_cb + C14 T_s/i        dw_0/dt = the output row of the same
 //! ```
 //!
-//! one combination has no `T_ca`. With the turbine torque within its share, the oncoming clutch's torque within its
+//! one combination has no `T_ca`. With the turbine torque within its bound, the oncoming clutch's torque within its
 //! own range and the accelerations within the uncertainty of the readings, the shaft torque is within a range too.
 //! This range is for an instant in the past, by the largest delay of a reading; the change of the twist extends it,
 //! and the range before, to the present.
@@ -15,7 +15,7 @@
 //! **It is expected, not guaranteed**, since the readings do not bound what the speeds did between them. It holds if
 //!
 //! - each reading is at most `age_s` old, and between the oldest instant that a reading may be of and now every speed
-//!   stays within the span of its readings over that time, widened by the share that `age_s` has in it, at both ends;
+//!   stays within the span of its readings over that time, widened by the fraction that `age_s` has in it, at both ends;
 //! - the age of a reading does not change from one sample to the next, so that the difference of two readings over the
 //!   time step is the mean acceleration between them;
 //! - the torques are within the rest of [`ShaftErrors`], and the supervisor's phase is right after a release.
@@ -46,7 +46,7 @@ pub struct ShaftRange<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShaftErrors<T> {
-    /// Of the turbine torque, as a share.
+    /// Of the turbine torque, as a fraction.
     pub turbine_torque_share: T,
     /// Of a change of the turbine speed from one sample to the next, rad/s.
     pub turbine_rad_s: T,
@@ -54,7 +54,7 @@ pub struct ShaftErrors<T> {
     pub output_rad_s: T,
     /// Of a change of the wheel speed, rad/s.
     pub wheel_rad_s: T,
-    /// Of the scale of the wheel speed, as a share.
+    /// Of the scale of the wheel speed, as a fraction.
     pub wheel_scale: T,
     /// Greatest age of a reading, s.
     pub age_s: T,
@@ -275,11 +275,11 @@ impl<T: Real> ShaftRange<T> {
         let errors = &self.errors;
         let rate = |change: T, error: T| [(change - error) / dt_s, (change + error) / dt_s];
         let [least, most] = self.converter.turbine_range(span.engine, span.turbine);
-        let share = errors.turbine_torque_share;
+        let fraction = errors.turbine_torque_share;
         Seen {
             turbine_rad_s2: rate(turbine, errors.turbine_rad_s),
             output_rad_s2: rate(output, errors.output_rad_s),
-            turbine_n_m: [least - share * least.abs(), most + share * most.abs()],
+            turbine_n_m: [least - fraction * least.abs(), most + fraction * most.abs()],
         }
     }
 }
@@ -309,9 +309,9 @@ fn common<T: Real>(a: [T; 2], b: [T; 2]) -> [T; 2] {
     if both[0] <= both[1] { both } else { [a[0].at_most(b[0]), a[1].at_least(b[1])] }
 }
 
-/// A range made wider by a share of its width and an error at both ends.
-fn widened<T: Real>([low, high]: [T; 2], share: T, error: T) -> [T; 2] {
-    let more = share * (high - low) + error;
+/// A range made wider by a fraction of its width and an error at both ends.
+fn widened<T: Real>([low, high]: [T; 2], fraction: T, error: T) -> [T; 2] {
+    let more = fraction * (high - low) + error;
     [low - more, high + more]
 }
 

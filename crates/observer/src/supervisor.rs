@@ -44,7 +44,7 @@ pub struct Supervisor<T> {
     pub lock_hold_s: T,
 }
 
-/// The share by which a sum of steps may differ from the time that it is compared with: times of a log have few digits.
+/// The fraction by which a sum of steps may differ from the time that it is compared with: times of a log have few digits.
 const ROUNDING: f64 = 1e-3;
 
 /// Memory of the phase supervisor.

@@ -68,8 +68,8 @@ fn clutch_torque(pressure: f64, slip: f64) -> f64 {
 
 /// Turbine torque, N m, from the maps of [`rigid`] at a speed ratio between 0 and 0.9.
 fn turbine_torque(turbine: f64) -> f64 {
-    let share = turbine / ENGINE / 0.9;
-    (4e-3 - 2e-3 * share) * (2.0 - share) * ENGINE * ENGINE
+    let fraction = turbine / ENGINE / 0.9;
+    (4e-3 - 2e-3 * fraction) * (2.0 - fraction) * ENGINE * ENGINE
 }
 
 /// Slip of clutch B in first gear, where the output turns with the turbine over the ratio.

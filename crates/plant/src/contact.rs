@@ -16,11 +16,11 @@ use crate::{Contact, Direction};
 /// Most clutches without slip at one instant.
 pub const MAX_CONTACTS: usize = 8;
 
-/// Share of its largest diagonal element that is added to `W`: with it the programme is strictly convex, and of all
+/// Fraction of its largest diagonal element that is added to `W`: with it the programme is strictly convex, and of all
 /// torques with the same accelerations the smallest are found.
 const REGULARISATION: f64 = 1e-10;
 
-/// Torques and accelerations beyond their limits by less than this share are within.
+/// Torques and accelerations beyond their limits by less than this fraction are within.
 const TOLERANCE: f64 = 1e-9;
 
 /// Clutches without slip.

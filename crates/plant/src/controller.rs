@@ -67,7 +67,7 @@ pub struct ShiftController {
     fill_plan: Option<FillPlan>,
     stage: Stage,
     oncoming_pa: f64,
-    throttle_share: f64,
+    throttle_fraction: f64,
 }
 
 impl ShiftController {
@@ -84,7 +84,7 @@ impl ShiftController {
             vehicle: vehicle.clone(),
             stage: Stage::Before,
             oncoming_pa: 0.0,
-            throttle_share: 1.0,
+            throttle_fraction: 1.0,
         }
     }
 
@@ -104,15 +104,15 @@ impl ShiftController {
             Stage::TorquePhase(since_s) => self.transfer(time_s - since_s, measured, &known),
             Stage::InertiaPhase { .. } => (0.0, self.slip_control(time_s, measured, &known)),
             Stage::Locked(since_s) => {
-                let share = ((time_s - since_s) / self.calibration.lock_ramp_s).min(1.0);
-                (0.0, self.oncoming_pa.max(share * line_pa))
+                let fraction = ((time_s - since_s) / self.calibration.lock_ramp_s).min(1.0);
+                (0.0, self.oncoming_pa.max(fraction * line_pa))
             }
         };
         self.oncoming_pa = oncoming_pa;
         let command =
             |clutch: &ShiftClutch, pressure_pa: f64| clutch.valve.command_for(pressure_pa.clamp(0.0, line_pa));
         Commands {
-            throttle: driver_throttle * self.throttle_share(measured),
+            throttle: driver_throttle * self.throttle_fraction(measured),
             offgoing: command(&self.vehicle.offgoing, offgoing_pa),
             oncoming: command(&self.vehicle.oncoming, oncoming_pa),
         }
@@ -177,14 +177,15 @@ impl ShiftController {
         // The oncoming torque at which nothing is left for the offgoing clutch to hold.
         let row = &self.torque_phase.holding_offgoing;
         let relief_n_m = -row.at(known) / row.per_oncoming_torque;
-        let oncoming_at = |share: f64| v.oncoming.clutch.pressure_for(share * relief_n_m, slip);
-        let offgoing_at = |share: f64| self.holding_pressure(known, share * relief_n_m, c.transfer_holding_margin);
+        let oncoming_at = |fraction: f64| v.oncoming.clutch.pressure_for(fraction * relief_n_m, slip);
+        let offgoing_at =
+            |fraction: f64| self.holding_pressure(known, fraction * relief_n_m, c.transfer_holding_margin);
         // Both ramps are led by the lag that their valve has at the pressure of the moment.
-        let share = (elapsed_s + c.lead_s) / c.torque_phase_s;
+        let fraction = (elapsed_s + c.lead_s) / c.torque_phase_s;
         let led = |clutch: &ShiftClutch, pressure: &dyn Fn(f64) -> f64| {
-            let ahead = share + c.control_period_s / c.torque_phase_s;
-            let rate = (pressure(ahead) - pressure(share)) / c.control_period_s;
-            pressure(share) + clutch.valve.lag(pressure(share), rate) * rate
+            let ahead = fraction + c.control_period_s / c.torque_phase_s;
+            let rate = (pressure(ahead) - pressure(fraction)) / c.control_period_s;
+            pressure(fraction) + clutch.valve.lag(pressure(fraction), rate) * rate
         };
         (led(&v.offgoing, &offgoing_at), led(&v.oncoming, &oncoming_at))
     }
@@ -216,23 +217,23 @@ impl ShiftController {
         clutch.pressure_for(torque_n_m.max(0.0), slip)
     }
 
-    /// Share of the driver's throttle: reduced in the inertia phase, back before lock-up.
-    fn throttle_share(&mut self, measured: &Measured) -> f64 {
+    /// Fraction of the driver's throttle: reduced in the inertia phase, back before lock-up.
+    fn throttle_fraction(&mut self, measured: &Measured) -> f64 {
         let c = &self.calibration;
         let slip = self.vehicle.shift.oncoming_slip(measured.turbine_rad_s, measured.output_rad_s);
         let reduced = matches!(self.stage, Stage::InertiaPhase { .. }) && slip > c.throttle_return_slip_rad_s;
         let target = if reduced { c.throttle_factor } else { 1.0 };
         let largest_change = (1.0 - c.throttle_factor) * c.control_period_s / c.throttle_ramp_s;
-        self.throttle_share += (target - self.throttle_share).clamp(-largest_change, largest_change);
-        self.throttle_share
+        self.throttle_fraction += (target - self.throttle_fraction).clamp(-largest_change, largest_change);
+        self.throttle_fraction
     }
 }
 
 /// Half a cosine from `from` to zero: value and rate after `elapsed_s` of `duration_s`.
 fn falling(from: f64, elapsed_s: f64, duration_s: f64) -> (f64, f64) {
-    let share = (elapsed_s / duration_s).clamp(0.0, 1.0);
-    let angle = std::f64::consts::PI * share;
-    let running = if share < 1.0 { 1.0 } else { 0.0 };
+    let fraction = (elapsed_s / duration_s).clamp(0.0, 1.0);
+    let angle = std::f64::consts::PI * fraction;
+    let running = if fraction < 1.0 { 1.0 } else { 0.0 };
     (
         0.5 * from * (1.0 + Real::cos(angle)),
         -0.5 * from * std::f64::consts::PI / duration_s * Real::sin(angle) * running,

@@ -58,8 +58,8 @@ impl FillPlan {
         let c = &self.calibration;
         // Times are sums of periods; a rounding error must not cost a whole one.
         let after_pulse_s = elapsed_s - self.pulse_s + 1e-9;
-        let share = if after_pulse_s < 0.0 { 0.0 } else { (after_pulse_s / c.ramp_s).min(1.0) };
-        self.kiss_pa + c.over_kiss_pa + share * (c.stroke_over_kiss_pa - c.over_kiss_pa)
+        let fraction = if after_pulse_s < 0.0 { 0.0 } else { (after_pulse_s / c.ramp_s).min(1.0) };
+        self.kiss_pa + c.over_kiss_pa + fraction * (c.stroke_over_kiss_pa - c.over_kiss_pa)
     }
 
     /// How long it takes, s.

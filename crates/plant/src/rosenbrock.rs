@@ -195,8 +195,8 @@ pub fn step<const N: usize, const ROWS: usize, E>(
     let error = combine(&[0.0; N], &ERROR_WEIGHTS, &k);
     let scaled = |i: usize| {
         let allowed = tolerance.relative * (tolerance.scale[i] + x[i].abs().max(end[i].abs()));
-        let share = error[i] / allowed;
-        share * share
+        let fraction = error[i] / allowed;
+        fraction * fraction
     };
     let error = ((0..N).map(scaled).sum::<f64>() / N as f64).sqrt();
     let (end_slope, end_applied) = at_end(&end);

@@ -15,7 +15,7 @@ pub enum Axis {
     Unmarked(f64, f64),
 }
 
-/// Room that a shaded range may take beyond the curves, as a share of their height.
+/// Room that a shaded range may take beyond the curves, as a fraction of their height.
 const RANGE_ROOM: f64 = 0.35;
 
 /// Part of a step by which a value may lie beyond the end of an axis: less than a stroke is wide.

@@ -92,12 +92,12 @@ fn consistency(filter: &BenchConsistency) -> Value {
     let (all, (scenario, least)) = (&filter.all, &filter.least);
     context! {
         observer => &filter.observer,
-        inside => coverage(all.inside_share()),
+        inside => coverage(all.inside_fraction()),
         least => coverage(*least),
         scenario,
         nees => ratio(all.nees()),
         nis => all.nis().map(ratio),
-        same => coverage(all.same_share()),
+        same => coverage(all.same_fraction()),
         largest_kpa => number(1e-3 * all.largest_pa, 2),
         excess_percent => number(100.0 * all.excess_in_single(), 2),
         restarts => all.restarts,

@@ -35,7 +35,7 @@ pub fn error_bound_page(found: &ErrorBound, study: &Study) -> Result<String, Pag
                 context! {
                     name => name.trim_start(),
                     part => name.starts_with(' '),
-                    share => format!("{:.2}", 0.6 * (size.largest / errors.rigid.largest.max(1e-9)).min(1.0)),
+                    fraction => format!("{:.2}", 0.6 * (size.largest / errors.rigid.largest.max(1e-9)).min(1.0)),
                     numbers => numbers.map(|value| format!("{value:.1}")),
                     settled => size.settled_after,
                 }

@@ -102,12 +102,12 @@ impl LogPage<'_> {
     }
 }
 
-/// The order of the table: the worst health first, of equal ones the larger share.
+/// The order of the table: the worst health first, of equal ones the larger fraction.
 fn by_need(a: &ShiftEstimate, b: &ShiftEstimate) -> Ordering {
     let worst = |shift: &ShiftEstimate| shift.estimated.as_ref().and_then(|e| e.unhealthy.first().copied());
     let key = |shift: &ShiftEstimate| worst(shift).map_or((Health::Good, 0.0), |worst| worst);
-    let ((a_health, a_share), (b_health, b_share)) = (key(a), key(b));
-    b_health.cmp(&a_health).then(b_share.total_cmp(&a_share))
+    let ((a_health, a_fraction), (b_health, b_fraction)) = (key(a), key(b));
+    b_health.cmp(&a_health).then(b_fraction.total_cmp(&a_fraction))
 }
 
 /// Titles of the table of shifts, and its first rows. Columns that no shift fills are left out.
@@ -154,10 +154,10 @@ fn ranged(ranged: &Ranged, unit: f64, decimals: usize) -> String {
     ranged.range.map_or(value.clone(), |[low, high]| format!("{value} ({}–{})", text(low), text(high)))
 }
 
-/// The worst health and its share.
+/// The worst health and its fraction.
 fn health(estimated: &EstimatedShift) -> String {
-    estimated.unhealthy.first().map_or("good".to_owned(), |(health, share)| {
-        format!("{} {:.0} %", health.name().replace('_', " "), (100.0 * share).max(1.0))
+    estimated.unhealthy.first().map_or("good".to_owned(), |(health, fraction)| {
+        format!("{} {:.0} %", health.name().replace('_', " "), (100.0 * fraction).max(1.0))
     })
 }
 

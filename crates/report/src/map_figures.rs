@@ -82,7 +82,7 @@ fn friction(vehicle: &Vehicle) -> Figure {
 fn observer_maps(vehicle: &Vehicle, model: &RigidModel<f64>) -> Figure {
     let (_, highest) = ends(vehicle.engine.torque_n_m.rows());
     // Round speeds from a sixth to two thirds of the engine's highest.
-    let of = |share: f64| 50.0 * (share * highest / 50.0).round().max(1.0);
+    let of = |fraction: f64| 50.0 * (fraction * highest / 50.0).round().max(1.0);
     let range = (of(0.15), of(0.7));
     let family = |output: usize| -> Vec<Series> {
         ([0.45, 0.6, 0.75].into_iter().map(of).zip(FAMILY))

@@ -143,16 +143,16 @@ pub fn findings(comparison: &Comparison) -> Vec<String> {
         })
         .collect();
     for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
-        let Some((share, excess)) = comparison.bound_coverage(phase) else { continue };
+        let Some((fraction, excess)) = comparison.bound_coverage(phase) else { continue };
         let (name, observer) = (phase_name(phase), &comparison.runs[0].entry.name);
-        sentences.push(if share >= 1.0 {
+        sentences.push(if fraction >= 1.0 {
             format!("In the {name} the error of {observer} is always within its certified band.")
         } else {
             format!(
                 "In the {name} the error of {observer} is within its certified band for {:.0} % of the time and outside it by \
                  up to {:.3} MPa: the certificate assumes a valve that behaves as its model, but here delay, lag and gain \
                  of the valve vary.",
-                100.0 * share,
+                100.0 * fraction,
                 mpa(excess),
             )
         });

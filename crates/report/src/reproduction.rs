@@ -137,11 +137,11 @@ fn figures(figures: &[Figure]) -> String {
     figures.iter().map(|f| format!("{} {}", f.name, text(f.value, f.unit))).collect::<Vec<_>>().join("; ")
 }
 
-/// A share of the settings, in whole per cent that are 0 and 100 only where it is none and all of them.
-fn share(share: Option<f64>) -> String {
-    share.map_or_else(String::new, |share| {
-        let percent = 100.0 * share;
-        let percent = if share > 0.0 && share < 1.0 { percent.clamp(1.0, 99.0) } else { percent };
+/// A fraction of the settings, in whole per cent that are 0 and 100 only where it is none and all of them.
+fn fraction(fraction: Option<f64>) -> String {
+    fraction.map_or_else(String::new, |fraction| {
+        let percent = 100.0 * fraction;
+        let percent = if fraction > 0.0 && fraction < 1.0 { percent.clamp(1.0, 99.0) } else { percent };
         format!("{percent:.0} %")
     })
 }
@@ -169,7 +169,7 @@ fn statement_view(rows: &[Statement]) -> Value {
             ours => ours(row),
             figures => figures(&row.figures),
             agrees => agrees(row.agrees),
-            share => share(row.share_of_settings.and_then(|shares| shares.agrees)),
+            fraction => fraction(row.share_of_settings.and_then(|fractions| fractions.agrees)),
         }
     };
     context! {
@@ -197,12 +197,12 @@ struct OffsetView {
 struct OffsetTest {
     value: String,
     holds: &'static str,
-    share: String,
+    fraction: String,
 }
 
 impl OffsetView {
     fn page(&self) -> Value {
-        let test = |t: &OffsetTest| context! { value => &t.value, holds => t.holds, share => &t.share };
+        let test = |t: &OffsetTest| context! { value => &t.value, holds => t.holds, fraction => &t.fraction };
         context! {
             experiment => self.experiment,
             claim => &self.claim,
@@ -217,8 +217,8 @@ impl OffsetView {
 
 fn offset_view(row: &Statement) -> Option<OffsetView> {
     let bound: &BoundCheck = row.bound.as_ref()?;
-    let shares = row.share_of_settings.unwrap_or_default();
-    let test = |value, holds, of_settings| OffsetTest { value, holds: yes(holds), share: share(of_settings) };
+    let fractions = row.share_of_settings.unwrap_or_default();
+    let test = |value, holds, of_settings| OffsetTest { value, holds: yes(holds), fraction: fraction(of_settings) };
     let claim = row.claim.trim_start_matches("Certified offset, ");
     Some(OffsetView {
         experiment: row.experiment,
@@ -226,15 +226,15 @@ fn offset_view(row: &Statement) -> Option<OffsetView> {
         chapter: row.chapter_says,
         ours: text(row.ours, row.unit),
         agrees: agrees(row.agrees),
-        agrees_share: share(shares.agrees),
+        agrees_share: fraction(fractions.agrees),
         tests: [
-            test(text(bound.largest_after_decay_pa, Unit::Pascal), bound.holds, shares.holds),
+            test(text(bound.largest_after_decay_pa, Unit::Pascal), bound.holds, fractions.holds),
             test(
                 format!("{:.0} % of it", 100.0 * bound.largest_share_of_bound),
                 Some(bound.holds_with_initial_error),
-                shares.holds_with_initial_error,
+                fractions.holds_with_initial_error,
             ),
-            test(text(bound.largest_from_start_pa, Unit::Pascal), Some(bound.holds_at_start), shares.holds_at_start),
+            test(text(bound.largest_from_start_pa, Unit::Pascal), Some(bound.holds_at_start), fractions.holds_at_start),
         ],
     })
 }
@@ -278,7 +278,7 @@ fn markdown(chapter: &Chapter) -> String {
                 ours(row),
                 figures(&row.figures),
                 agrees(row.agrees),
-                share(row.share_of_settings.and_then(|shares| shares.agrees)),
+                fraction(row.share_of_settings.and_then(|fractions| fractions.agrees)),
             );
         }
     }
@@ -310,8 +310,8 @@ fn offsets_markdown(text: &mut String, chapter: &Chapter) {
     for view in chapter.statements.iter().filter_map(offset_view) {
         let OffsetView { experiment, claim, chapter, ours, agrees, agrees_share, tests } = view;
         let _ = write!(text, "| {experiment} | {claim} | {chapter} | {ours} | **{agrees}** | {agrees_share} |");
-        for OffsetTest { value, holds, share } in tests {
-            let _ = write!(text, " {value} | {holds} | {share} |");
+        for OffsetTest { value, holds, fraction } in tests {
+            let _ = write!(text, " {value} | {holds} | {fraction} |");
         }
         text.push('\n');
     }

@@ -238,7 +238,7 @@ impl SpeedsPage<'_> {
                 ("friction work kJ", torque.and_then(|t| t.work_j).map_or(String::new(), |work| ranged(work, 1e-3, 2))),
                 (
                     "converter without slip",
-                    optional(torque.filter(|t| t.mean_n_m.is_some()).map(|t| 100.0 * t.no_slip_share), 0),
+                    optional(torque.filter(|t| t.mean_n_m.is_some()).map(|t| 100.0 * t.no_slip_fraction), 0),
                 ),
             ]
         };
@@ -255,7 +255,7 @@ impl SpeedsPage<'_> {
             Some(torque) if torque.mean_n_m.is_none() => {
                 "The speed ratio of the converter leaves what was fitted, or speeds are missing: the torque at the turbine is not known throughout."
             }
-            Some(torque) if torque.no_slip_share > 0.5 => {
+            Some(torque) if torque.no_slip_fraction > 0.5 => {
                 "The converter does not slip in this shift: the engine's inertia is part of what the clutch brakes, and its torque signal gives the turbine's torque."
             }
             _ => "",
@@ -358,21 +358,21 @@ impl SpeedsPage<'_> {
                 bin.push(fit.by_engine(self.record, moment) / Real::powi(moment.engine_rad_s, 2));
             }
         }
-        let quantile = |bin: &mut Vec<f64>, share: f64| {
+        let quantile = |bin: &mut Vec<f64>, fraction: f64| {
             bin.sort_by(f64::total_cmp);
-            let place = (share * bin.len() as f64) as usize;
+            let place = (fraction * bin.len() as f64) as usize;
             if bin.len() < 10 { f64::NAN } else { milli(bin[place.min(bin.len() - 1)]) }
         };
-        let mut of = |share: f64| -> Vec<(f64, f64)> {
+        let mut of = |fraction: f64| -> Vec<(f64, f64)> {
             let at = |i: usize| (i as f64 + 0.5) * BIN;
-            bins.iter_mut().enumerate().map(|(i, bin)| (at(i), quantile(bin, share))).collect()
+            bins.iter_mut().enumerate().map(|(i, bin)| (at(i), quantile(bin, fraction))).collect()
         };
         let measured = [("measured: median", 0.5), ("a tenth is below", 0.1), ("a tenth is above", 0.9)];
         let strokes = [Stroke { weight: Weight::Rival, ..Stroke::SIGNAL }, Stroke::THIRD, Stroke::SECOND];
         let mut curves: Vec<Series> = measured
             .into_iter()
             .zip(strokes)
-            .map(|((label, share), stroke)| series(label, stroke, of(share)))
+            .map(|((label, fraction), stroke)| series(label, stroke, of(fraction)))
             .collect();
         curves.push(series("fitted", FITTED, line(0.0)));
         let band = Band { label: "95 %".to_owned(), colour: RANGE, lower: line(-2.0), upper: line(2.0) };

@@ -27,8 +27,8 @@ pub struct StudyPage {
 const CURVE_POINTS: u32 = 200;
 /// Factors whose effect is drawn.
 const DRAWN_FACTORS: usize = 6;
-/// Share of the runs that a drawn distribution reaches to.
-const DRAWN_SHARE: f64 = 0.99;
+/// Fraction of the runs that a drawn distribution reaches to.
+const DRAWN_FRACTION: f64 = 0.99;
 /// Where the axis of the distributions ends if there are none, Pa.
 const NO_RUNS_REACH_PA: f64 = 1e5;
 
@@ -103,7 +103,7 @@ fn short(value: f64) -> String {
     format!("{:.3e}", value).parse::<f64>().map_or_else(|_| value.to_string(), |rounded| rounded.to_string())
 }
 
-/// The share of the runs in which a factor is, in per cent, and its value in the others, if it is not in all of them.
+/// The fraction of the runs in which a factor is, in per cent, and its value in the others, if it is not in all of them.
 fn sometimes(values: &Values) -> Option<[String; 2]> {
     match values {
         Values::Sometimes(s) => Some([number(100.0 * s.chance, 0), short(s.otherwise)]),
@@ -177,7 +177,7 @@ fn coverage((covered, all): (u64, u64)) -> String {
     if all == 0 { "–".to_owned() } else { format!("{covered} of {all}") }
 }
 
-/// Share of the runs whose error is smaller, for each observer.
+/// Fraction of the runs whose error is smaller, for each observer.
 fn distributions(summary: &Summary, study: &Study) -> Figure {
     let observers = summary.layout.observers.len();
     let all = (0..observers).flat_map(|o| (0..PHASES.len()).map(move |p| (o, p)));
@@ -190,7 +190,7 @@ fn distributions(summary: &Summary, study: &Study) -> Figure {
             points: (0..=CURVE_POINTS)
                 .filter(|_| summary.rms(observer, i).count() > 0)
                 .map(|n| reach * f64::from(n) / f64::from(CURVE_POINTS))
-                .map(|x| (mpa(x), 100.0 * summary.rms(observer, i).share_below(x)))
+                .map(|x| (mpa(x), 100.0 * summary.rms(observer, i).fraction_below(x)))
                 .collect(),
         });
         panel(&format!("{}: runs (%)", phase_name(phase)), 170.0, Axis::Fixed(0.0, 100.0), series.collect())
@@ -206,7 +206,7 @@ fn distributions(summary: &Summary, study: &Study) -> Figure {
 /// Where the axis of the distributions ends, Pa: it holds nearly all runs of every observer, but no error ten times as large
 /// as is usual for the best, which a diverged observer has.
 fn reach<'a>(errors: impl Iterator<Item = &'a Distribution>) -> f64 {
-    let of_one = |d: &Distribution| d.quantile(DRAWN_SHARE).min(10.0 * d.quantile(0.5));
+    let of_one = |d: &Distribution| d.quantile(DRAWN_FRACTION).min(10.0 * d.quantile(0.5));
     let reaches: Vec<f64> = errors.map(of_one).filter(|reach| reach.is_finite() && *reach > 0.0).collect();
     let least = reaches.iter().copied().fold(f64::INFINITY, f64::min);
     reaches.into_iter().filter(|&reach| reach <= 10.0 * least).reduce(f64::max).unwrap_or(NO_RUNS_REACH_PA)
@@ -258,10 +258,10 @@ fn panel(y_label: &str, height: f64, axis: Axis, series: Vec<Series>) -> Panel {
 fn effect_rows(summary: &Summary, phase: usize) -> Vec<Value> {
     let observers = 0..summary.layout.observers.len();
     let effects: Vec<_> = observers.map(|observer| summary.effects(observer, phase)).collect();
-    // A share that is not known has no shade.
-    let shade = |share: f64| format!("{:.2}", 0.6 * if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) });
-    // A negative estimate is chance: the share is zero.
-    let percent = |share: f64| number(if share < 0.0 { 0.0 } else { 100.0 * share }, 0);
+    // A fraction that is not known has no shade.
+    let shade = |fraction: f64| format!("{:.2}", 0.6 * if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) });
+    // A negative estimate is chance: the fraction is zero.
+    let percent = |fraction: f64| number(if fraction < 0.0 { 0.0 } else { 100.0 * fraction }, 0);
     (summary.layout.factors.iter().enumerate())
         .map(|(i, factor)| {
             let cells = effects.iter().map(|effects| {

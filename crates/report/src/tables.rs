@@ -52,9 +52,9 @@ pub fn health_meaning(health: Health) -> &'static str {
     }
 }
 
-/// A share in per cent, rounded down: 100 % is all of it.
-pub fn coverage(share: f64) -> String {
-    format!("{:.1} %", (1000.0 * share).floor() / 10.0)
+/// A fraction in per cent, rounded down: 100 % is all of it.
+pub fn coverage(fraction: f64) -> String {
+    format!("{:.1} %", (1000.0 * fraction).floor() / 10.0)
 }
 
 /// Name of a phase for people.

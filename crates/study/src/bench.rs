@@ -34,7 +34,7 @@ pub struct BenchCell {
     pub chatter_pa: f64,
     /// RMS error of the drive-shaft torque over both phases, N m, if it estimates that.
     pub shaft_rms_n_m: Option<f64>,
-    /// Share of the samples at which pressure and clutch torque lie in their guaranteed ranges, if there are any.
+    /// Fraction of the samples at which pressure and clutch torque lie in their guaranteed ranges, if there are any.
     pub range_coverage: Option<f64>,
     /// The same of the drive-shaft torque in its expected range.
     pub shaft_range_coverage: Option<f64>,
@@ -117,15 +117,15 @@ pub struct BenchConsistency {
     pub observer: String,
     /// Over the scenarios that were completed, each with one draw of the sensors' noise.
     pub all: Consistency,
-    /// The scenario with the least share of samples in the filter's 95 % band, and this share.
+    /// The scenario with the least fraction of samples in the filter's 95 % band, and this fraction.
     pub least: (String, f64),
 }
 
 impl BenchConsistency {
     fn of(observer: &str, scenarios: &[(String, Consistency)]) -> Option<Self> {
         let all = scenarios.iter().fold(Consistency::default(), |all, (_, one)| all.with(one));
-        let shares = scenarios.iter().map(|(name, one)| (name.clone(), one.inside_share()));
-        let least = shares.filter(|(_, share)| share.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let fractions = scenarios.iter().map(|(name, one)| (name.clone(), one.inside_fraction()));
+        let least = fractions.filter(|(_, fraction)| fraction.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(Self { observer: observer.to_owned(), all, least })
     }
 }
@@ -293,9 +293,9 @@ fn over_draws<'a>(draws: impl Iterator<Item = &'a BenchCell>) -> BenchCell {
         diverged: draws.iter().any(|cell| cell.diverged),
         chatter_pa: mean(&|cell| cell.chatter_pa),
         shaft_rms_n_m: some(|cell| cell.shaft_rms_n_m.map(|rms| rms * rms)).map(|squares| mean_of(squares).sqrt()),
-        range_coverage: some(|cell| cell.range_coverage).and_then(|shares| shares.into_iter().reduce(f64::min)),
+        range_coverage: some(|cell| cell.range_coverage).and_then(|fractions| fractions.into_iter().reduce(f64::min)),
         shaft_range_coverage: some(|cell| cell.shaft_range_coverage)
-            .and_then(|shares| shares.into_iter().reduce(f64::min)),
+            .and_then(|fractions| fractions.into_iter().reduce(f64::min)),
         range_width_pa: some(|cell| cell.range_width_pa).map(mean_of),
         torque_range_width_n_m: some(|cell| cell.torque_range_width_n_m).map(mean_of),
         shaft_range_width_n_m: some(|cell| cell.shaft_range_width_n_m).map(mean_of),

@@ -14,8 +14,8 @@ use crate::sampling::{sampled, through_sensors};
 use crate::score::{score_ranges, size};
 use crate::{PhaseScore, RangeScore, RunColumns, ShiftQuality, score, simulate_drive, simulate_shift, true_phases};
 
-/// Share of the range within which a pressure error counts as settled.
-const SETTLED_SHARE: f64 = 0.05;
+/// Fraction of the range within which a pressure error counts as settled.
+const SETTLED_FRACTION: f64 = 0.05;
 /// Clutch-torque error that counts as settled, N m.
 const SETTLED_CLUTCH_N_M: f64 = 10.0;
 /// Shaft-torque error that counts as settled, N m.
@@ -202,7 +202,7 @@ fn run_observer(
     let phases = true_phases(trace).unwrap_or_default();
     let time = &trace.time_s;
     let truth_pa = trace.require(signal::ONCOMING_PRESSURE)?;
-    let settled_pa = SETTLED_SHARE * experiment.shift.line_pressure_pa;
+    let settled_pa = SETTLED_FRACTION * experiment.shift.line_pressure_pa;
     let clutch = trace.require(signal::ONCOMING_TORQUE)?;
     let shaft = trace.require(signal::SHAFT_TORQUE)?;
     // Where an observer gives no shaft torque there is nothing to hold against the truth.
@@ -258,7 +258,7 @@ impl Comparison {
         self.runs.iter().find(|run| run.entry.kind == ObserverKind::OpenLoop)
     }
 
-    /// Share of the samples with a bound at which the error of the first observer lies within it, and
+    /// Fraction of the samples with a bound at which the error of the first observer lies within it, and
     /// the largest excess over it, Pa.
     pub fn bound_coverage(&self, phase: Phase) -> Option<(f64, f64)> {
         let run = self.runs.first()?;
@@ -267,7 +267,7 @@ impl Comparison {
             .filter_map(|((estimate, truth), bound)| bound.map(|b| size(truth - estimate.pressure_pa) - b))
             .collect();
         let inside = excesses.iter().filter(|&&excess| excess <= 1e-9).count();
-        let share = inside as f64 / excesses.len().max(1) as f64;
-        (!excesses.is_empty()).then(|| (share, excesses.iter().copied().fold(0.0, f64::max)))
+        let fraction = inside as f64 / excesses.len().max(1) as f64;
+        (!excesses.is_empty()).then(|| (fraction, excesses.iter().copied().fold(0.0, f64::max)))
     }
 }

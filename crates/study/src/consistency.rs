@@ -104,8 +104,8 @@ impl Consistency {
         self
     }
 
-    /// Share of the samples with the truth in the filter's own 95 % band.
-    pub fn inside_share(&self) -> f64 {
+    /// Fraction of the samples with the truth in the filter's own 95 % band.
+    pub fn inside_fraction(&self) -> f64 {
         self.inside as f64 / self.samples as f64
     }
 
@@ -119,12 +119,12 @@ impl Consistency {
         core::array::from_fn(|k| self.squared_innovations[k] / self.readings[k] as f64)
     }
 
-    /// Share of the samples with less than 1 kPa between single and double precision.
-    pub fn same_share(&self) -> f64 {
+    /// Fraction of the samples with less than 1 kPa between single and double precision.
+    pub fn same_fraction(&self) -> f64 {
         self.same as f64 / self.compared as f64
     }
 
-    /// By how much the RMS error in single precision exceeds that in double, as a share.
+    /// By how much the RMS error in single precision exceeds that in double, as a fraction.
     pub fn excess_in_single(&self) -> f64 {
         (self.squares_pa2[1] / self.squares_pa2[0]).sqrt() - 1.0
     }

@@ -32,7 +32,7 @@ pub const PARTS: [&str; 4] = [
 const GUARD_SAMPLES: usize = 2;
 /// Directions in which the outermost samples of a run are kept.
 const DIRECTIONS: usize = 26;
-/// A maximum has settled when it grows no more than by this share.
+/// A maximum has settled when it grows no more than by this fraction.
 const SETTLED: f64 = 0.02;
 
 /// How large something was over the runs.
@@ -147,8 +147,8 @@ fn size(of_runs: &[f64]) -> Size {
     let reached = of_runs.iter().position(|&value| value * (1.0 + SETTLED) >= largest);
     let mut sorted = of_runs.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let quantile = |share: f64| {
-        let at = (share * sorted.len() as f64).ceil() as usize;
+    let quantile = |fraction: f64| {
+        let at = (fraction * sorted.len() as f64).ceil() as usize;
         sorted.get(at.saturating_sub(1)).copied().unwrap_or(f64::NAN)
     };
     Size { largest, quantiles: [0.5, 0.95, 0.99].map(quantile), settled_after: reached.map_or(0, |at| at as u64 + 1) }

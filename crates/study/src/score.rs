@@ -134,11 +134,11 @@ pub fn score(
 pub struct RangeScore {
     /// The phase, by the truth.
     pub phase: Phase,
-    /// Share of the samples with the true pressure in the range.
+    /// Fraction of the samples with the true pressure in the range.
     pub pressure_inside: f64,
-    /// Share of the samples with the true clutch torque in the range.
+    /// Fraction of the samples with the true clutch torque in the range.
     pub torque_inside: f64,
-    /// Share of the samples with the true shaft torque in the range, of those that have one.
+    /// Fraction of the samples with the true shaft torque in the range, of those that have one.
     pub shaft_inside: f64,
     /// Mean width of the range of the pressure, Pa.
     pub width_pa: f64,
@@ -149,7 +149,7 @@ pub struct RangeScore {
 }
 
 impl RangeScore {
-    /// The least share of samples inside of the two guaranteed ranges, of pressure and clutch torque.
+    /// The least fraction of samples inside of the two guaranteed ranges, of pressure and clutch torque.
     pub fn inside(&self) -> f64 {
         self.pressure_inside.min(self.torque_inside)
     }

@@ -133,12 +133,12 @@ fn shaft_known(vehicle: &Vehicle, phase: Phase) -> PhaseSensitivity {
 /// Errors that both models have: offgoing clutch, friction, readings.
 fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2]) -> Vec<Column> {
     let bounds = &vehicle.error_bounds;
-    let share = bounds.friction_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max);
+    let fraction = bounds.friction_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max);
     let mut columns: Vec<Column> = Vec::new();
     if phase == Phase::InertiaPhase {
         columns.push(("remaining torque of the offgoing clutch", "N m", bounds.offgoing_torque_n_m, offgoing));
     }
-    columns.push(("friction", "%", 100.0 * share, pressure.map(|g| 0.01 * g * bounds.shift_pressure_pa)));
+    columns.push(("friction", "%", 100.0 * fraction, pressure.map(|g| 0.01 * g * bounds.shift_pressure_pa)));
     // Old speeds tell what the pressure was.
     columns.push((
         "sampling delay",
@@ -156,7 +156,7 @@ fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2
     columns
 }
 
-/// What an error of the valve does to the pressure of the open loop, which an observer replaces by a share of the others.
+/// What an error of the valve does to the pressure of the open loop, which an observer replaces by a fraction of the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ValveEffect {
     /// The error.

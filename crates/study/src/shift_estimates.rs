@@ -141,7 +141,7 @@ pub struct MeasuredError {
     pub mean: f64,
     /// Largest size.
     pub peak: f64,
-    /// Share of the values within the guaranteed range, 0 to 1, where there is one.
+    /// Fraction of the values within the guaranteed range, 0 to 1, where there is one.
     pub inside: Option<f64>,
 }
 
@@ -164,7 +164,7 @@ pub struct EstimatedShift {
     pub pressure_error_pa: Option<MeasuredError>,
     /// The same of the clutch torque, N m.
     pub torque_error_n_m: Option<MeasuredError>,
-    /// Share of the samples of each health but good, 0 to 1, worst first.
+    /// Fraction of the samples of each health but good, 0 to 1, worst first.
     pub unhealthy: Vec<(Health, f64)>,
 }
 
@@ -284,7 +284,7 @@ pub const COLUMNS: &[Column] = &[
     ("torque_error_mean_n_m", |s| estimated(s, |e| Some(e.torque_error_n_m?.mean))),
     ("torque_error_peak_n_m", |s| estimated(s, |e| Some(e.torque_error_n_m?.peak))),
     ("torque_inside_range", |s| estimated(s, |e| e.torque_error_n_m?.inside)),
-    ("good_share", |s| estimated(s, |e| Some(1.0 - e.unhealthy.iter().map(|(_, share)| share).sum::<f64>()))),
+    ("good_share", |s| estimated(s, |e| Some(1.0 - e.unhealthy.iter().map(|(_, fraction)| fraction).sum::<f64>()))),
     ("worst_health", |s| {
         let worst = s.estimated.as_ref().map(|e| e.unhealthy.first().map_or(Health::Good, |(health, _)| *health));
         Cell::Word(worst.map_or("", Health::name))
@@ -414,8 +414,8 @@ impl SpeedAt {
         };
         let (after_s, after_rad_s) = samples[at..].iter().find_map(reading).unwrap_or((before_s, before_rad_s));
         let span_s = after_s - before_s;
-        let share = if span_s > 0.0 { (samples[at].time_s - before_s) / span_s } else { 0.0 };
-        let rad_s = before_rad_s + share * (after_rad_s - before_rad_s);
+        let fraction = if span_s > 0.0 { (samples[at].time_s - before_s) / span_s } else { 0.0 };
+        let rad_s = before_rad_s + fraction * (after_rad_s - before_rad_s);
         let around_rad_s = if span_s > HOLE_S { [before_rad_s, after_rad_s] } else { [rad_s; 2] };
         Self { rad_s, around_rad_s }
     }
@@ -439,9 +439,9 @@ impl MeasuredError {
             let now = estimate(&samples[before.map_or(at, |before| before + 1)]).value;
             let value = before.map_or(now, |before| {
                 let [from_s, to_s] = [samples[before].time_s, samples[before + 1].time_s];
-                let share = ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0);
+                let fraction = ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0);
                 let from = estimate(&samples[before]).value;
-                from + share * (now - from)
+                from + fraction * (now - from)
             });
             let error = reading.value - value;
             count += 1;
@@ -465,12 +465,12 @@ impl MeasuredError {
 }
 
 fn unhealthy(samples: &[LogSample]) -> Vec<(Health, f64)> {
-    let share = |health: Health| {
-        let share = samples.iter().filter(|sample| sample.estimate.health == health).count() as f64
+    let fraction = |health: Health| {
+        let fraction = samples.iter().filter(|sample| sample.estimate.health == health).count() as f64
             / samples.len().max(1) as f64;
-        (health, share)
+        (health, fraction)
     };
-    Health::ALL.into_iter().skip(1).rev().map(share).filter(|(_, share)| *share > 0.0).collect()
+    Health::ALL.into_iter().skip(1).rev().map(fraction).filter(|(_, fraction)| *fraction > 0.0).collect()
 }
 
 #[cfg(test)]

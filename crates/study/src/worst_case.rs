@@ -10,7 +10,7 @@ use crate::campaign::plan::{place_of, value_at};
 use crate::campaign::{Campaign, Metric, Row, run_seed};
 use crate::{StudyError, execute};
 
-/// Edge of the first simplex, in shares of each factor's range.
+/// Edge of the first simplex, in fractions of each factor's range.
 const FIRST_STEP: f64 = 0.15;
 /// The search ends when the simplex differs by less than this, Pa.
 const FLAT_PA: f64 = 1.0;

@@ -56,7 +56,7 @@ fn every_plan_fills_the_ranges_of_its_factors() {
             let values: Vec<f64> = (0..240).map(|run| factor_values(&study, run)[i]).collect();
             let [low, high] = factor.values.ends();
             assert!(values.iter().all(|value| (low..=high).contains(value)), "{plan}: {}", factor.name);
-            let share = |from: f64, to: f64| {
+            let fraction = |from: f64, to: f64| {
                 let place = |value: &f64| match factor.values {
                     config::Values::LogUniform(..) => (value / low).ln() / (high / low).ln(),
                     _ => (value - low) / (high - low),
@@ -65,7 +65,7 @@ fn every_plan_fills_the_ranges_of_its_factors() {
             };
             // Of 240 runs 60 belong in each quarter; four standard deviations for the random ones.
             for quarter in 0..4 {
-                let count = share(0.25 * f64::from(quarter), 0.25 * f64::from(quarter + 1) + 1e-12);
+                let count = fraction(0.25 * f64::from(quarter), 0.25 * f64::from(quarter + 1) + 1e-12);
                 assert!((33..=87).contains(&count), "{plan}: {} has {count} in quarter {quarter}", factor.name);
             }
         }
@@ -86,7 +86,7 @@ fn a_full_factorial_plan_makes_every_combination_once() {
 }
 
 #[test]
-fn a_factor_by_chance_is_in_its_share_of_the_runs_and_neutral_in_the_rest() {
+fn a_factor_by_chance_is_in_its_fraction_of_the_runs_and_neutral_in_the_rest() {
     for plan in ["sobol", "latin-hypercube", "random"] {
         let study = study_of("combined.toml", &[("plan = \"sobol\"", &format!("plan = \"{plan}\""))]);
         let runs: Vec<Vec<f64>> = (0..2000).map(|run| factor_values(&study, run)).collect();
@@ -99,12 +99,12 @@ fn a_factor_by_chance_is_in_its_share_of_the_runs_and_neutral_in_the_rest() {
             assert!(here.iter().all(|value| (low..=high).contains(value)));
             let upper = here.iter().filter(|value| **value > 0.5 * (low + high)).count();
             // A range of values is filled evenly; of 1, 2, 3 one third is above the middle, and of one value none.
-            let share = match factor.name.as_str() {
+            let fraction = match factor.name.as_str() {
                 "missing_share" | "piston_stroke" => 0.0,
                 "outliers" => 1.0 / 3.0,
                 _ => 0.5,
             };
-            assert!((upper as f64 / here.len() as f64 - share).abs() < 5.0 * 0.5 / 1000.0_f64.sqrt());
+            assert!((upper as f64 / here.len() as f64 - fraction).abs() < 5.0 * 0.5 / 1000.0_f64.sqrt());
         }
         // Two of them are together in a quarter of the runs.
         let at = |name: &str| study.factors.iter().position(|factor| factor.name == name).unwrap();
@@ -155,22 +155,22 @@ fn the_errors_over_those_of_the_open_loop_are_of_runs_and_of_quantiles() {
         let mut row = made_up(&campaign, run, [1.0; 2]);
         let reference = (run + 1) as f64;
         let factor = if run < 190 { 0.5 } else { 3.0 };
-        for (metric, share) in [(Metric::PressureRms, factor), (Metric::TorqueRms, 2.0 * factor)] {
-            row.numbers[campaign.layout.score(0, 0, metric)] = share * reference;
+        for (metric, fraction) in [(Metric::PressureRms, factor), (Metric::TorqueRms, 2.0 * factor)] {
+            row.numbers[campaign.layout.score(0, 0, metric)] = fraction * reference;
             row.numbers[campaign.layout.score(1, 0, metric)] = reference;
         }
         summary.push(&row);
     }
     // Quantiles are good to half a per cent, and a ratio of two of them to one.
     let near = |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 0.011, "{value} {expected}");
-    for (compared, share) in [(0, 1.0), (1, 2.0)] {
+    for (compared, fraction) in [(0, 1.0), (1, 2.0)] {
         let relative = summary.relative(compared, 0, 0).unwrap();
-        near(relative.median, 0.5 * share);
-        near(relative.high, 0.5 * share);
-        near(relative.largest, 3.0 * share);
+        near(relative.median, 0.5 * fraction);
+        near(relative.high, 0.5 * fraction);
+        near(relative.largest, 3.0 * fraction);
         // Of the 200 errors the ten largest are those of the last runs: 95 % of them are below half of 190.
-        near(relative.high_over_high, 0.5 * share);
-        near(relative.worst_over_worst, 3.0 * share);
+        near(relative.high_over_high, 0.5 * fraction);
+        near(relative.worst_over_worst, 3.0 * fraction);
     }
     assert!((summary.relative(0, 0, 0).unwrap().better - 0.95).abs() < 1e-12);
     assert_eq!(summary.relative(1, 0, 0).unwrap().better, 0.0);
@@ -318,7 +318,10 @@ fn an_observer_that_diverges_is_worse_than_all_others() {
         let (wild, sound) = (summary.rms(0, phase), summary.rms(1, phase));
         assert_eq!((wild.count(), wild.diverged(), sound.diverged()), (12, 12, 0));
         assert_eq!((wild.quantile(0.5), wild.largest()), (f64::INFINITY, f64::INFINITY));
-        assert_eq!((summary.ratio(0, phase).largest(), summary.ratio(0, phase).share_below(1.0)), (f64::INFINITY, 0.0));
+        assert_eq!(
+            (summary.ratio(0, phase).largest(), summary.ratio(0, phase).fraction_below(1.0)),
+            (f64::INFINITY, 0.0)
+        );
         assert!(sound.quantile(0.95).is_finite() && summary.effects(1, phase)[0].means.iter().any(|x| x.is_finite()));
     }
 }

@@ -37,16 +37,16 @@ fn every_statement_has_numbers_and_any_number_of_threads_gives_the_same_rows() {
         assert!(row.ours.is_finite() && row.figures.iter().all(|figure| figure.value.is_finite()), "{row:?}");
         assert!(!row.claim.is_empty() && !row.criterion.is_empty() && !row.because.contains("NaN"), "{row:?}");
         assert!(row.agrees.is_some() || row.bound.is_some(), "a row says something: {row:?}");
-        let shares = row.share_of_settings.unwrap();
-        assert_eq!(shares.agrees.is_some(), row.agrees.is_some(), "{row:?}");
-        assert_eq!(shares.holds_at_start.is_some(), row.bound.is_some(), "{row:?}");
+        let fractions = row.share_of_settings.unwrap();
+        assert_eq!(fractions.agrees.is_some(), row.agrees.is_some(), "{row:?}");
+        assert_eq!(fractions.holds_at_start.is_some(), row.bound.is_some(), "{row:?}");
     }
     for experiment in ["E1", "E2", "E3", "E4"] {
         assert!(first.statements.iter().any(|row| row.experiment == experiment));
     }
 }
 
-/// A study that changes nothing must find what the files give: each share is none or all.
+/// A study that changes nothing must find what the files give: each fraction is none or all.
 #[test]
 fn the_setting_of_the_files_gives_the_verdicts_of_the_files() {
     let folder = std::env::temp_dir().join(format!("wetclutch-same-{}", std::process::id()));
@@ -63,13 +63,13 @@ fn the_setting_of_the_files_gives_the_verdicts_of_the_files() {
     std::fs::remove_dir_all(&folder).unwrap();
     let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let chapter = reproduce(&vehicle, &ExperimentFile::built_in().unwrap(), &study, 1, 1, || ()).unwrap();
-    let share = |verdict: Option<bool>| verdict.map(|yes| f64::from(u8::from(yes)));
+    let fraction = |verdict: Option<bool>| verdict.map(|yes| f64::from(u8::from(yes)));
     for row in &chapter.statements {
-        let shares = row.share_of_settings.unwrap();
-        assert_eq!(shares.agrees, share(row.agrees), "{row:?}");
+        let fractions = row.share_of_settings.unwrap();
+        assert_eq!(fractions.agrees, fraction(row.agrees), "{row:?}");
         let bound = row.bound.as_ref();
-        assert_eq!(shares.holds, bound.and_then(|bound| share(bound.holds)), "{row:?}");
-        assert_eq!(shares.holds_at_start, bound.and_then(|bound| share(Some(bound.holds_at_start))), "{row:?}");
+        assert_eq!(fractions.holds, bound.and_then(|bound| fraction(bound.holds)), "{row:?}");
+        assert_eq!(fractions.holds_at_start, bound.and_then(|bound| fraction(Some(bound.holds_at_start))), "{row:?}");
     }
 }
 

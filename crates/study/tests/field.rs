@@ -230,10 +230,10 @@ fn the_filter_is_as_sure_as_it_may_be_and_the_same_in_single_precision() {
         let columns = RunColumns::of(&measured, &field.vehicle).unwrap();
         all = all.with(&Consistency::of(&filter, &measured, &columns).unwrap());
     }
-    assert!(all.inside_share() > 0.93, "{all:?}");
+    assert!(all.inside_fraction() > 0.93, "{all:?}");
     // From above alone: a budget is wider than any one car.
     assert!(all.nees() < 1.2 && all.nis().iter().all(|nis| *nis < 1.2), "{all:?}");
-    assert!(all.same_share() > 0.99 && all.excess_in_single().abs() < 0.02 && all.restarts == 0, "{all:?}");
+    assert!(all.same_fraction() > 0.99 && all.excess_in_single().abs() < 0.02 && all.restarts == 0, "{all:?}");
 }
 
 #[test]

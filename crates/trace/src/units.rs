@@ -42,7 +42,7 @@ pub enum Quantity {
     /// Electric current, A.
     Current,
     /// A part of a whole, from 0 to 1.
-    Share,
+    Fraction,
     /// Pressure, Pa.
     Pressure,
     /// Torque, N m.
@@ -133,8 +133,8 @@ const UNITS: &[(&str, &[&str], Quantity, f64, f64)] = &[
     ("g", &["g", "g0"], Quantity::Acceleration, 9.806_65, 0.0),
     ("A", &["A", "amp", "ampere"], Quantity::Current, 1.0, 0.0),
     ("mA", &["mA", "milliampere"], Quantity::Current, 1e-3, 0.0),
-    ("%", &["%", "percent", "prozent", "pct"], Quantity::Share, 1e-2, 0.0),
-    ("1", &["1", "-", "ratio"], Quantity::Share, 1.0, 0.0),
+    ("%", &["%", "percent", "prozent", "pct"], Quantity::Fraction, 1e-2, 0.0),
+    ("1", &["1", "-", "ratio"], Quantity::Fraction, 1.0, 0.0),
     ("Pa", &["Pa"], Quantity::Pressure, 1.0, 0.0),
     ("hPa", &["hPa", "mbar"], Quantity::Pressure, 1e2, 0.0),
     ("kPa", &["kPa"], Quantity::Pressure, 1e3, 0.0),

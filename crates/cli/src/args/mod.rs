@@ -264,7 +264,7 @@ pub(crate) enum Command {
     ///
     /// Of a vehicle file it lists what the file leaves to defaults, and which of them matter most: the RMS change of the estimated
     /// pressure and clutch torque in the torque and inertia phase of a simulated upshift, where each default is off by as much as the
-    /// error budget or a stated share allows. --all shows every one.
+    /// error budget or a stated fraction allows. --all shows every one.
     ///
     /// Of a gearbox file, or of a vehicle file that names one, it prints the gears with ratios and holding torques, the capacity of
     /// the elements, and the shifts with their elements. Warns of elements of a car that slip at full throttle. With -o it draws

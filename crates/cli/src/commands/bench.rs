@@ -156,10 +156,10 @@ fn consistent(filter: &BenchConsistency) -> String {
          in single precision: within 1 kPa of double precision at {} of the samples, at most {:.2} kPa; RMS error {:+.2} %; \
          {} restarts",
         filter.observer,
-        coverage(all.inside_share()),
+        coverage(all.inside_fraction()),
         coverage(*least),
         all.nees(),
-        coverage(all.same_share()),
+        coverage(all.same_fraction()),
         1e-3 * all.largest_pa,
         100.0 * all.excess_in_single(),
         all.restarts,

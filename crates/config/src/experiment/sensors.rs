@@ -79,10 +79,10 @@ impl Keys<'_> {
         missing_share: Option<f64>,
     ) -> Result<ReadingErrors, ConfigError> {
         let base = base.unwrap_or(ReadingErrors::NONE);
-        let share = missing_share.unwrap_or(base.missing_share);
+        let fraction = missing_share.unwrap_or(base.missing_share);
         Ok(ReadingErrors {
             scale: self.number("scale", scale, Some(base.scale), SCALES)?,
-            missing_share: self.number("missing_share", missing, Some(share), SHARES)?,
+            missing_share: self.number("missing_share", missing, Some(fraction), FRACTIONS)?,
             burst_s: self.number("burst_s", burst, Some(base.burst_s), SPANS_S)?,
             frozen_s: self.number("frozen_s", frozen, Some(base.frozen_s), SPANS_S)?,
             outliers: self.count("outliers", outliers, Some(base.outliers), COUNTS)?,
@@ -108,12 +108,13 @@ pub(crate) fn sensors(
     let keys = Keys { check, table: table.to_owned(), at: raw.span().start };
     let raw = raw.get_ref();
     let seed = raw.seed.as_ref().map(|seed| *seed.get_ref()).or(base.map(|base| base.seed));
-    let missing_share = raw.missing_share.as_ref().map(|share| check.number(keys.key("missing_share"), share, SHARES));
+    let missing_share =
+        raw.missing_share.as_ref().map(|fraction| check.number(keys.key("missing_share"), fraction, FRACTIONS));
     let missing_share = missing_share.transpose()?;
     let speed = |name: &str, raw: &Option<Spanned<RawSpeedSensor>>, base: Option<&SpeedSensor>| {
         let mut base = base.copied();
-        if let (Some(base), Some(share)) = (&mut base, missing_share) {
-            base.errors.missing_share = share;
+        if let (Some(base), Some(fraction)) = (&mut base, missing_share) {
+            base.errors.missing_share = fraction;
         }
         match raw {
             Some(raw) => speed_sensor(check, keys.key(name).to_string(), raw, base, missing_share),
@@ -121,8 +122,8 @@ pub(crate) fn sensors(
         }
     };
     let mut current = base.and_then(|base| base.current);
-    if let (Some(current), Some(share)) = (&mut current, missing_share) {
-        current.errors.missing_share = share;
+    if let (Some(current), Some(fraction)) = (&mut current, missing_share) {
+        current.errors.missing_share = fraction;
     }
     if let Some(raw) = &raw.current {
         // What a scenario changes where the file has no sensor, it changes in an exact one.
@@ -165,8 +166,8 @@ pub(super) fn changed(
     sensors(check, table, raw, Some(of_file))
 }
 
-/// Shares of the readings.
-const SHARES: RangeInclusive<f64> = 0.0..=1.0;
+/// Fractions of the readings.
+const FRACTIONS: RangeInclusive<f64> = 0.0..=1.0;
 /// Numbers of outliers.
 const COUNTS: RangeInclusive<f64> = 0.0..=1000.0;
 /// Factors on a reading.

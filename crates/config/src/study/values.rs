@@ -18,14 +18,14 @@ pub enum Values {
     /// Normally distributed with this mean and standard deviation, cut off at three deviations; the number of
     /// levels.
     Normal(f64, f64, usize),
-    /// Any of other values in a share of the runs, and one value in the rest of them.
+    /// Any of other values in a fraction of the runs, and one value in the rest of them.
     Sometimes(Sometimes),
 }
 
 /// The values of a factor that is not in every run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sometimes {
-    /// Share of the runs with one of `values`, between 0 and 1.
+    /// Fraction of the runs with one of `values`, between 0 and 1.
     pub chance: f64,
     /// The value in the other runs.
     pub otherwise: f64,
@@ -153,12 +153,12 @@ fn sometimes(check: &Check<'_>, key: &str, raw: &RawFactor, values: Values) -> R
             wrong(otherwise, "`otherwise` is for a factor with a `chance`", hint)
         }
         (Some(chance), Some(otherwise)) => {
-            let share = check.number("chance", chance, 0.0..=1.0)?;
-            if share <= 0.0 || share >= 1.0 {
+            let fraction = check.number("chance", chance, 0.0..=1.0)?;
+            if fraction <= 0.0 || fraction >= 1.0 {
                 return wrong(chance, "`chance` must be between 0 and 1", "for example chance = 0.5");
             }
             let otherwise = check.number("otherwise", otherwise, f64::MIN..=f64::MAX)?;
-            Ok(Values::Sometimes(Sometimes { chance: share, otherwise, values: Box::new(values) }))
+            Ok(Values::Sometimes(Sometimes { chance: fraction, otherwise, values: Box::new(values) }))
         }
     }
 }

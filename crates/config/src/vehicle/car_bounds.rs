@@ -42,17 +42,17 @@ pub(super) fn of_car(
     raw: &RawCarErrorBounds,
     elements: Vec<ElementErrorBounds>,
 ) -> Result<CarErrorBounds, ConfigError> {
-    let share = |key: &str, value: &Option<Number>| {
+    let fraction = |key: &str, value: &Option<Number>| {
         value.as_ref().map(|value| check.number(format_args!("error_bounds.{key}"), value, 0.0..=0.9)).transpose()
     };
     let scale = |value: &Number| check.number("error_bounds.valve_error_scale", value, 0.1..=10.0);
     Ok(CarErrorBounds {
-        converter_share: share("converter_share", &raw.converter_share)?,
-        engine_torque_share: share("engine_torque_share", &raw.engine_torque_share)?,
-        inertia_share: share("inertia_share", &raw.inertia_share)?,
-        shaft_stiffness_share: share("shaft_stiffness_share", &raw.shaft_stiffness_share)?,
-        wheel_scale_share: share("wheel_scale_share", &raw.wheel_scale_share)?,
-        mass_share: share("mass_share", &raw.mass_share)?,
+        converter_share: fraction("converter_share", &raw.converter_share)?,
+        engine_torque_share: fraction("engine_torque_share", &raw.engine_torque_share)?,
+        inertia_share: fraction("inertia_share", &raw.inertia_share)?,
+        shaft_stiffness_share: fraction("shaft_stiffness_share", &raw.shaft_stiffness_share)?,
+        wheel_scale_share: fraction("wheel_scale_share", &raw.wheel_scale_share)?,
+        mass_share: fraction("mass_share", &raw.mass_share)?,
         valve_error_scale: raw.valve_error_scale.as_ref().map(scale).transpose()?,
         elements,
     })

@@ -31,7 +31,7 @@ impl CarFile {
         Some(format!("{said}\nhint: {}", self.how_to_hold(least, pressure_pa)))
     }
 
-    /// What to change where elements hold the share `least` of what is asked of them, and all of it at this line pressure.
+    /// What to change where elements hold the fraction `least` of what is asked of them, and all of it at this line pressure.
     fn how_to_hold(&self, least: f64, pressure_pa: f64) -> String {
         let map = "engine.torque.torque_n_m";
         let is_default = self.defaults_taken.iter().any(|taken| taken.key == map);

@@ -43,8 +43,8 @@ fn a_scenario_changes_what_it_names_of_the_sensors_and_nothing_that_observers_ar
     let varied = experiment.with_scenario(experiment.scenarios.last().unwrap());
     let (before, after) = (experiment.sensors.unwrap(), varied.sensors.unwrap());
     assert_eq!((after.wheel.errors.scale, after.wheel.delay_s, after.wheel.teeth), (1.01, 0.02, before.wheel.teeth));
-    let share = |sensor: &car::SpeedSensor| sensor.errors.missing_share;
-    assert_eq!([&after.engine, &after.turbine, &after.output, &after.wheel].map(share), [0.03, 0.0, 0.03, 0.03]);
+    let fraction = |sensor: &car::SpeedSensor| sensor.errors.missing_share;
+    assert_eq!([&after.engine, &after.turbine, &after.output, &after.wheel].map(fraction), [0.03, 0.0, 0.03, 0.03]);
     assert_eq!(after.current.unwrap().errors.missing_share, 0.03);
     assert_eq!(varied.sensors_told, experiment.sensors_told);
     for (entry, before) in varied.observers.iter().zip(&experiment.observers) {

@@ -16,7 +16,7 @@ fn factor_error(name: &str, lines: &str) -> String {
 }
 
 #[test]
-fn a_factor_by_chance_has_a_share_of_the_runs_and_a_value_for_the_others() {
+fn a_factor_by_chance_has_a_fraction_of_the_runs_and_a_value_for_the_others() {
     assert_eq!(factor_error("chance-good", "chance = 0.5\notherwise = 1.0\n"), "good");
     let error = factor_error("chance-alone", "chance = 0.5\n");
     assert!(error.starts_with("s.toml:9: ") && error.contains("hint: add the value that changes nothing"), "{error}");

@@ -41,7 +41,7 @@ const GAIN_UNIT: f64 = 30.0;
 const WITHIN: [f64; 2] = [0.2, 0.02];
 /// Times that the gain is sought for a `lambda` and then the best `lambda` for the gain, at most.
 const PASSES: usize = 4;
-/// A tangent, and a pass, is the last if it reduces the bound by less than this share.
+/// A tangent, and a pass, is the last if it reduces the bound by less than this fraction.
 const SETTLED: f64 = 5e-4;
 /// Part of the way to the next gain that is tried at least.
 const SHORTEST_WAY: f64 = 0.2;
@@ -214,7 +214,7 @@ impl Design<'_> {
         let unknowns = if sought { t_at + readings } else { g_at + 1 };
         let mut blocks: Vec<Block> = Vec::new();
         // The check takes the smaller lambda on both sides, which leaves room for rounding in the decay too.
-        let share = lambda * (1.0 - RESERVE) * (1.0 - 1e-6);
+        let fraction = lambda * (1.0 - RESERVE) * (1.0 - 1e-6);
         let one = |value: f64| DMatrix::from_element(1, 1, value);
         let of_y = g_at + 1..if sought { t_at } else { g_at + 1 };
         for (i, inequality) in self.inequalities.iter().enumerate() {
@@ -226,7 +226,7 @@ impl Design<'_> {
                 matrix.per_unknown[k][(states + j, states + j)] = 1.0;
             }
             blocks.push(matrix);
-            let room = |x: &[f64]| one(share * x[g_at] - self.a(x, i).iter().sum::<f64>());
+            let room = |x: &[f64]| one(fraction * x[g_at] - self.a(x, i).iter().sum::<f64>());
             blocks.push(block_of(unknowns, of_a.chain([g_at]), room));
         }
         let mut pressure = DMatrix::zeros(1, states);

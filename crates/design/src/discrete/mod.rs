@@ -68,7 +68,7 @@ pub enum Quantity {
     Pressure,
 }
 
-/// Errors are made larger by this share in a program than in the check, which leaves room for rounding.
+/// Errors are made larger by this fraction in a program than in the check, which leaves room for rounding.
 const RESERVE: f64 = 1e-4;
 /// A bound must beat the open loop's by this factor.
 pub(crate) const WORTH_A_GAIN: f64 = 0.999;
@@ -347,7 +347,7 @@ pub(crate) fn open_loop_bound(system: &ErrorSystem) -> f64 {
     system.corners.iter().map(at_corner).fold(0.0, f64::max)
 }
 
-/// The largest share of an error of the pressure that is left after a sample of the valve alone.
+/// The largest fraction of an error of the pressure that is left after a sample of the valve alone.
 pub(crate) fn slowest(system: &ErrorSystem) -> f64 {
     let pressure = system.states() - 1;
     system.corners.iter().map(|corner| corner.phi[(pressure, pressure)]).fold(0.0, f64::max)

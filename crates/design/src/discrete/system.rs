@@ -53,7 +53,7 @@ pub(crate) struct ErrorSystem {
     pub(crate) corners: Vec<Corner>,
     /// The readings' errors at their bounds, a column for each output that has one.
     pub(crate) readings: DMatrix<f64>,
-    /// Largest change of the friction coefficient of the observer's model from one sample to the next, as a share of its range.
+    /// Largest change of the friction coefficient of the observer's model from one sample to the next, as a fraction of its range.
     pub(crate) friction_step: f64,
     /// Errors of the accelerations alone, a column for each cause: `H`.
     pub(crate) h: DMatrix<f64>,
@@ -170,7 +170,7 @@ fn readings(vehicle: &Vehicle, outputs: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(outputs.len(), columns.len(), |i, j| columns[j][i])
 }
 
-/// Largest change of the friction coefficient of the observer's model from one sample to the next, as a share of the range
+/// Largest change of the friction coefficient of the observer's model from one sample to the next, as a fraction of the range
 /// that a gain follows. The coefficient follows from the reading of the slip: it changes by the slope of its map times the
 /// change of the slip, which the budget gives for the age of a reading, and the reading's own error.
 fn friction_step(vehicle: &Vehicle, sample_time_s: f64) -> f64 {
@@ -337,8 +337,8 @@ fn seen(vehicle: &Vehicle, quantity: Quantity, g_psi: &DMatrix<f64>) -> Vec<Caus
 /// Pressure that a friction error at its bound is worth in a shift, Pa.
 fn friction_pa(vehicle: &Vehicle) -> f64 {
     let bounds = &vehicle.error_bounds;
-    let share = bounds.friction_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max);
-    share * bounds.shift_pressure_pa
+    let fraction = bounds.friction_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max);
+    fraction * bounds.shift_pressure_pa
 }
 
 /// Errors of the valve model at this corner, and of the twist of the shafts that follows from the readings. An error of the
@@ -364,7 +364,7 @@ fn direct(vehicle: &Vehicle, model: Model, quantity: Quantity, corner: &Corner, 
         on("float32 rounding", pressure, rounding * bounds.pressure_max_pa),
     ];
     if quantity == Quantity::ClutchTorque {
-        // With another friction the same pressure is another torque: the valve model is off by that share.
+        // With another friction the same pressure is another torque: the valve model is off by that fraction.
         causes.push(on("friction", pressure, (1.0 - phi) * friction_pa(vehicle)));
     }
     if model == Model::Compliant {

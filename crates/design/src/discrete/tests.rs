@@ -81,18 +81,18 @@ fn each_method_is_as_good_as_its_freedom_allows() {
     }
 }
 
-/// Friction over time, as shares of its range: held anywhere, or elsewhere from sample to sample; each sample at most `step`
+/// Friction over time, as fractions of its range: held anywhere, or elsewhere from sample to sample; each sample at most `step`
 /// from the one before.
 fn frictions(step: f64) -> Vec<Vec<f64>> {
-    let held = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| vec![share; SAMPLES]);
+    let held = [0.0, 0.25, 0.5, 0.75, 1.0].map(|fraction| vec![fraction; SAMPLES]);
     let alternating = [1, 2, 3, 7].map(|n| (0..SAMPLES).map(|k| if (k / n) % 2 == 0 { 0.0 } else { 1.0 }).collect());
     let wandering = (0..SAMPLES).map(|k| (0.618 * k as f64).fract()).collect();
     let wanted = held.into_iter().chain(alternating).chain([wandering]);
     let reached = |wanted: Vec<f64>| {
-        let mut share = wanted[0];
+        let mut fraction = wanted[0];
         let next = wanted.into_iter().map(|wanted| {
-            share += (wanted - share).clamp(-step, step);
-            share
+            fraction += (wanted - fraction).clamp(-step, step);
+            fraction
         });
         next.collect()
     };
@@ -104,19 +104,19 @@ const SAMPLES: usize = 1500;
 
 /// The largest error of the normalised pressure that an adversary who knows the gain reaches: friction over time as given, every
 /// error at its bound with the sign that hurts most at the end, every reading within its bound. Backwards in time.
-fn worst_error(system: &ErrorSystem, gain: &dyn Fn(usize) -> DMatrix<f64>, shares: &[f64]) -> f64 {
+fn worst_error(system: &ErrorSystem, gain: &dyn Fn(usize) -> DMatrix<f64>, fractions: &[f64]) -> f64 {
     let states = system.states();
-    let mixed = |a: &DMatrix<f64>, b: &DMatrix<f64>, share: f64| a * (1.0 - share) + b * share;
+    let mixed = |a: &DMatrix<f64>, b: &DMatrix<f64>, fraction: f64| a * (1.0 - fraction) + b * fraction;
     let [weak, strong] = &system.corners[..] else { panic!("two corners") };
     let mut response = DMatrix::zeros(1, states);
     response[(0, states - 1)] = 1.0;
     let mut sum = 0.0;
     // How the reading at the end of a step shows in what came after it.
     let mut later = DMatrix::zeros(1, system.h.nrows());
-    for &share in shares {
-        let gain = mixed(&gain(0), &gain(1), share);
-        let a = mixed(&weak.phi, &strong.phi, share) - &gain * mixed(&weak.g_psi, &strong.g_psi, share);
-        let through = mixed(&weak.columns, &strong.columns, share);
+    for &fraction in fractions {
+        let gain = mixed(&gain(0), &gain(1), fraction);
+        let a = mixed(&weak.phi, &strong.phi, fraction) - &gain * mixed(&weak.g_psi, &strong.g_psi, fraction);
+        let through = mixed(&weak.columns, &strong.columns, fraction);
         let of_gain = &response * &gain;
         sum += ((&later - &of_gain) * &system.readings).abs().sum();
         sum += (&of_gain * through).abs().sum() + (&response * &weak.direct_columns).abs().sum();
@@ -144,7 +144,7 @@ fn no_adversary_exceeds_the_bound() {
         };
         // Only a gain that follows the friction depends on how fast that changes.
         let step = if method == GainMethod::Scheduled { system.friction_step } else { 1.0 };
-        let worst = |shares: Vec<f64>| worst_error(&system, &gain, &shares);
+        let worst = |fractions: Vec<f64>| worst_error(&system, &gain, &fractions);
         let largest = frictions(step).into_iter().map(worst).fold(0.0, f64::max);
         let bound = certificate.bound_pa / PRESSURE_UNIT_PA;
         let case = format!("{model:?} {method:?} {sample_s} s");

@@ -11,7 +11,7 @@ use super::{ENGINE_RAD_S, input, over_a_sample};
 /// Slip below which the inertia phase is taken to be over, rad/s.
 const LEAST_SLIP_RAD_S: f64 = 20.0;
 
-/// What disturbs a sample, as shares of the bounds of the budget.
+/// What disturbs a sample, as fractions of the bounds of the budget.
 #[derive(Debug, Clone)]
 pub(crate) struct Disturbance {
     pub(crate) turbine: f64,
@@ -22,10 +22,10 @@ pub(crate) struct Disturbance {
 }
 
 pub(crate) fn disturbance() -> impl Strategy<Value = Disturbance> {
-    let shares = prop::array::uniform6(-1.0..1.0_f64);
+    let fractions = prop::array::uniform6(-1.0..1.0_f64);
     // Now and then the worst case at once: everything at its limit.
-    (shares, any::<bool>()).prop_map(|(shares, worst)| {
-        let [turbine, output, first, second, age, valve] = shares.map(|x| if worst { x.signum() } else { x });
+    (fractions, any::<bool>()).prop_map(|(fractions, worst)| {
+        let [turbine, output, first, second, age, valve] = fractions.map(|x| if worst { x.signum() } else { x });
         Disturbance { turbine, output, readings: [first, second], age, valve }
     })
 }

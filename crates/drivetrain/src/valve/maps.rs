@@ -67,8 +67,8 @@ impl<T: Real> ValveMaps<T> {
             [shortest * lag_factor[0], longest * lag_factor[1]]
         };
         // It cannot get further than at its first speed, which tells what lags it meets.
-        let share = (dt_s / lags(settled_pa)[0]).at_most(T::one());
-        let reach = pressure_pa + share * (settled_pa - pressure_pa);
+        let fraction = (dt_s / lags(settled_pa)[0]).at_most(T::one());
+        let reach = pressure_pa + fraction * (settled_pa - pressure_pa);
         let [shortest, longest] = lags(reach);
         let lag_s = if furthest { shortest } else { longest };
         settled_pa + (pressure_pa - settled_pa) * (-dt_s / lag_s).exp()

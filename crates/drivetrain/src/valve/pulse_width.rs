@@ -46,8 +46,8 @@ impl<T: Real> PulseWidth<T> {
     pub fn rate_per_drop(&self, drop_pa: T) -> T {
         let laminar = T::of(Self::LAMINAR_DROP_PA);
         let root = drop_pa.abs().at_least(laminar).sqrt();
-        let share = if drop_pa.abs() < laminar { T::one() } else { T::of(0.5) };
-        share * self.flow_sqrt_pa_s / root
+        let fraction = if drop_pa.abs() < laminar { T::one() } else { T::of(0.5) };
+        fraction * self.flow_sqrt_pa_s / root
     }
 
     /// The same valve, this many times as slow.
@@ -60,7 +60,7 @@ impl<T: Real> PulseWidth<T> {
     #[inline]
     pub fn moved(&self, pressure_pa: T, settled_pa: T, dt_s: T) -> T {
         let drop = settled_pa - pressure_pa;
-        settled_pa - self.fall(drop, dt_s).drop_share * drop
+        settled_pa - self.fall(drop, dt_s).drop_fraction * drop
     }
 
     /// Time by which the pressure lags behind its settled value while it moves at this rate, s.
@@ -87,8 +87,8 @@ impl<T: Real> PulseWidth<T> {
     pub fn step(&self, duty_percent: T, pressure_pa: T, dt_s: T) -> ValveStep<T> {
         let settled_pa = self.settled_pressure(duty_percent);
         let drop = settled_pa - pressure_pa;
-        let Fall { drop_share, drop_integral_s, phi, psi } = self.fall(drop, dt_s);
-        let (end_pa, integral_pa_s) = (settled_pa - drop_share * drop, settled_pa * dt_s - drop_integral_s * drop);
+        let Fall { drop_fraction, drop_integral_s, phi, psi } = self.fall(drop, dt_s);
+        let (end_pa, integral_pa_s) = (settled_pa - drop_fraction * drop, settled_pa * dt_s - drop_integral_s * drop);
         ValveStep {
             phi,
             psi,
@@ -116,7 +116,7 @@ impl<T: Real> PulseWidth<T> {
         let stays = (-decay_per_s * (dt_s - turbulent_s)).exp();
         let lasts_s = (one - stays) / decay_per_s;
         Fall {
-            drop_share: r * r * stays,
+            drop_fraction: r * r * stays,
             drop_integral_s: drop_integral_s + r * r * lasts_s,
             phi: r * stays,
             psi: psi + r * lasts_s,
@@ -132,9 +132,9 @@ impl<T: Real> PulseWidth<T> {
 
 /// A pressure drop after some time.
 struct Fall<T> {
-    /// Share of it that is left.
-    drop_share: T,
-    /// Integral of that share, s.
+    /// Fraction of it that is left.
+    drop_fraction: T,
+    /// Integral of that fraction, s.
     drop_integral_s: T,
     /// Derivative of the pressure at the end by that at the start.
     phi: T,

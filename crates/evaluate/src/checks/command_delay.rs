@@ -32,9 +32,9 @@ const SPARSE_S: f64 = 0.055;
 const HOLDS_RAD_S: f64 = 5.0;
 /// Points of a shift with a slip that are needed.
 const ENOUGH_POINTS: u32 = 5;
-/// By how much the torques may differ in a car within its error budget, as a share and beside it, N m; a difference counts up to so many
+/// By how much the torques may differ in a car within its error budget, as a fraction and beside it, N m; a difference counts up to so many
 /// times this \[chosen\].
-const SHARE: f64 = 0.15;
+const FRACTION: f64 = 0.15;
 const BESIDE_N_M: f64 = 5.0;
 const MOST: f64 = 3.0;
 /// Shifts up and shifts down that are needed to judge, each \[chosen\]: an error of friction, gain or torque moves them in opposite directions.
@@ -47,7 +47,7 @@ const REPORTED_S: f64 = 0.065;
 const DEFAULT_DELAY_S: f64 = 0.015;
 const DEFAULT_LAG: f64 = 0.5;
 const LAG_S: f64 = 0.04;
-/// Share of the difference that the delay leaves at most \[chosen\].
+/// Fraction of the difference that the delay leaves at most \[chosen\].
 const LEFT: f64 = 0.9;
 
 /// Errors of the gain of the valves, over its bound, and offsets of the pressures, over the bound of the hysteresis or half of what the error of the
@@ -72,9 +72,9 @@ struct Point {
 }
 
 impl Point {
-    /// Between two points, at a share of the way to the other.
-    fn between(&self, other: &Self, share: f64) -> Self {
-        let mix = |a: f64, b: f64| a + share * (b - a);
+    /// Between two points, at a fraction of the way to the other.
+    fn between(&self, other: &Self, fraction: f64) -> Self {
+        let mix = |a: f64, b: f64| a + fraction * (b - a);
         Self {
             time_s: mix(self.time_s, other.time_s),
             turbine_rad_s: mix(self.turbine_rad_s, other.turbine_rad_s),
@@ -240,7 +240,7 @@ impl<'c> CommandDelay<'c> {
                 of.alpha.abs() * clutch.torque_per_force(of.alpha * slips[c]) * slips[c].signum()
             });
             let balance = Balance { needed_n_m, per_force, holds };
-            let scale = (SHARE * needed_n_m.abs().max(point.turbine_n_m.abs()) + BESIDE_N_M).recip();
+            let scale = (FRACTION * needed_n_m.abs().max(point.turbine_n_m.abs()) + BESIDE_N_M).recip();
             for (sums, forces) in sums.iter_mut().zip(&forces) {
                 for (sum, forces) in sums.iter_mut().zip(&forces[at - TO_ONE_SIDE..]) {
                     *sum += (scale * balance.difference_n_m(*forces)).min(MOST);

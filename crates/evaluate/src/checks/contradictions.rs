@@ -11,7 +11,7 @@ use observer::gearbox::MAX_ELEMENTS;
 
 /// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.
 const STEADY_S: f64 = 1.0;
-/// The turbine fits the gear within this share \[chosen\]: readings that are 20 ms apart differ by 1 % while the car accelerates.
+/// The turbine fits the gear within this fraction \[chosen\]: readings that are 20 ms apart differ by 1 % while the car accelerates.
 const FITS: f64 = 0.02;
 /// Output speed below which an element may be left open, as in idle, rad/s.
 const OUTPUT_LEAST_RAD_S: f64 = 20.0;

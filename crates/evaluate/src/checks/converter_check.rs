@@ -81,8 +81,8 @@ mod tests {
     use observer::Reading;
     use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
 
-    /// A log in which the engine has this share of the torque that the converter takes; its speed changes at this rate, rad/s^2.
-    fn said(share: f64, rate: f64, lock_up_applied: bool, rows: u32) -> Option<String> {
+    /// A log in which the engine has this fraction of the torque that the converter takes; its speed changes at this rate, rad/s^2.
+    fn said(fraction: f64, rate: f64, lock_up_applied: bool, rows: u32) -> Option<String> {
         let car = CarFile::eight_speed().unwrap();
         let mut check = ConverterCheck::default();
         for row in 0..rows {
@@ -100,7 +100,7 @@ mod tests {
                 commands: [None; MAX_ELEMENTS],
                 gear: GearCommand { from: 1, to: 1 },
             };
-            let reported_n_m = (row % 4 == 0).then(|| Reading::now(share * torque));
+            let reported_n_m = (row % 4 == 0).then(|| Reading::now(fraction * torque));
             let step = LogStep { reported_n_m, ..LogStep::of(time_s, input) };
             check.push(&car, &step, [engine, turbine]);
         }
@@ -109,14 +109,14 @@ mod tests {
 
     #[test]
     fn a_converter_that_does_not_take_the_reported_torque_is_named() {
-        for share in [0.55, 0.75, 1.35, 2.0] {
-            let said = said(share, 0.0, false, 1000).unwrap();
+        for fraction in [0.55, 0.75, 1.35, 2.0] {
+            let said = said(fraction, 0.0, false, 1000).unwrap();
             let (_, found) = said.split_once("reported_engine_torque is ").unwrap();
             let found: f64 = found.split_once(' ').unwrap().0.parse().unwrap();
-            assert!((found / share - 1.0).abs() < 0.015, "{said}");
+            assert!((found / fraction - 1.0).abs() < 0.015, "{said}");
         }
-        for share in [0.85, 1.0, 1.18] {
-            assert_eq!(said(share, 0.0, false, 1000), None);
+        for fraction in [0.85, 1.0, 1.18] {
+            assert_eq!(said(fraction, 0.0, false, 1000), None);
         }
     }
 

@@ -8,10 +8,10 @@ use crate::checks::ratio_histogram::RatioHistogram;
 use crate::checks::ratio_scale::{RatioScale, WrongScale};
 use crate::checks::swapped_speeds::SwappedSpeeds;
 
-/// Speed of the output by any of the speeds from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they
+/// Speed of the output by any of the speeds from which on the ratio of a gear is compared with the speeds, rad/s, and fraction by which they
 /// may differ.
 const RATIO_FROM_RAD_S: f64 = 20.0;
-const RATIO_SHARE: f64 = 0.1;
+const RATIO_FRACTION: f64 = 0.1;
 /// Output speed above which the car moves where the turbine is at speed, rad/s \[chosen\]: a slow walk.
 const MOVES_RAD_S: f64 = 5.0;
 /// From fewer rows nothing is said of all of them \[chosen\]: one second at 100 Hz.
@@ -107,7 +107,7 @@ impl<'c> InGear<'c> {
         self.swapped.push(engine, turbine, &[by_output]);
         self.scale.push(row.gear, ratio, row.came_rad_s);
         self.rows[0] += 1;
-        self.rows[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
+        self.rows[1] += u64::from((turbine - by_output).abs() > RATIO_FRACTION * by_output.abs());
         if let (Some(output), Some(wheel)) = (row.output.filter(|reading| reading.value.is_finite()), wheel) {
             self.output_over_wheel.push(output.value / wheel.value);
             self.wheel_rows.0 += 1;

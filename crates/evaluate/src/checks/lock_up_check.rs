@@ -9,9 +9,9 @@ use crate::LogStep;
 
 /// Speed ratio from which on the lock-up clutch may be closed or slip \[chosen\]: a slip-controlled one slips by some rad/s.
 const LEAST_SPEED_RATIO: f64 = 0.9;
-/// What the reported torque is above that of the pump, N m and as a share of it \[chosen\]: more than the engine's inertia takes, and than both may err by.
+/// What the reported torque is above that of the pump, N m and as a fraction of it \[chosen\]: more than the engine's inertia takes, and than both may err by.
 const MORE_N_M: f64 = 25.0;
-const MORE_SHARE: f64 = 0.4;
+const MORE_FRACTION: f64 = 0.4;
 /// Difference of speeds that are alike, rad/s, and for how long without a break, s \[chosen\]: a car that drives without torque soon pulls or coasts.
 const ALIKE_RAD_S: f64 = 1.5;
 const ALIKE_S: f64 = 10.0;
@@ -56,7 +56,7 @@ impl LockUpCheck {
         if let Some(reported_n_m) = self.reported_n_m
             && is_driven
             && self.is_slow
-            && reported_n_m - pump_n_m > MORE_N_M + MORE_SHARE * pump_n_m
+            && reported_n_m - pump_n_m > MORE_N_M + MORE_FRACTION * pump_n_m
         {
             self.by_torque_s += dt_s;
         }

@@ -19,7 +19,7 @@ const OLDEST_S: f64 = 0.25;
 const AROUND_S: f64 = 0.45;
 /// Speeds that are kept at most: those of a shift of ten minutes at 100 Hz.
 const MOST_SPEEDS: usize = 60_000;
-/// Rows of an element's measured pressure from which on, and share of them outside of the range above which, the log is doubted.
+/// Rows of an element's measured pressure from which on, and fraction of them outside of the range above which, the log is doubted.
 const LEAST_ROWS: u64 = 50;
 const DOUBTED: f64 = 0.1;
 
@@ -62,8 +62,8 @@ impl CarriedPressures {
         let after = self.models.partition_point(|(time_s, _)| *time_s < since_s);
         let then = match (after.checked_sub(1).and_then(|before| self.models.get(before)), self.models.get(after)) {
             (Some(before), Some(next)) => {
-                let share = (since_s - before.0) / (next.0 - before.0);
-                of(before)? + share * (of(next)? - of(before)?)
+                let fraction = (since_s - before.0) / (next.0 - before.0);
+                of(before)? + fraction * (of(next)? - of(before)?)
             }
             (None, Some(first)) => of(first)?,
             _ => now,
@@ -97,9 +97,9 @@ impl DoubtedPressures {
     /// A warning that names the elements whose pressures contradict their commands.
     pub(crate) fn warning(&self, car: &Car) -> Option<String> {
         let doubted = self.rows.iter().enumerate().filter_map(|(element, [all, outside])| {
-            let share = *outside as f64 / *all as f64;
+            let fraction = *outside as f64 / *all as f64;
             let name = &car.gearbox.elements.get(element)?.name;
-            (*all >= LEAST_ROWS && share > DOUBTED).then(|| format!("{name} ({:.0} %)", 100.0 * share))
+            (*all >= LEAST_ROWS && fraction > DOUBTED).then(|| format!("{name} ({:.0} %)", 100.0 * fraction))
         });
         let doubted: Vec<String> = doubted.collect();
         (!doubted.is_empty()).then(|| {

@@ -25,7 +25,7 @@ impl<const FINE: u32> RatioHistogram<FINE> {
 
     /// Counts a ratio.
     pub fn push(&mut self, ratio: f64) {
-        /// Share by which a ratio near the end of a bin may be taken for one in the next.
+        /// Fraction by which a ratio near the end of a bin may be taken for one in the next.
         const ROUNDING: f64 = 1e-9;
         if !self.within.contains(&ratio) {
             let place = Real::ln(ratio) * Self::FINE + Self::ONE;
@@ -42,8 +42,8 @@ impl<const FINE: u32> RatioHistogram<FINE> {
         self.counts[self.last] = self.counts[self.last].saturating_add(1);
     }
 
-    /// Share of the ratios that are within this share of one.
-    pub fn share_near(&self, ratio: f64, within: f64) -> f64 {
+    /// Fraction of the ratios that are within this fraction of one.
+    pub fn fraction_near(&self, ratio: f64, within: f64) -> f64 {
         let place = |ratio: f64| Real::ln(ratio) * Self::FINE + Self::ONE;
         let [least, most] = [1.0 - within, 1.0 + within].map(|factor| place(ratio * factor));
         let (mut all, mut near) = (0.0, 0.0);
@@ -101,7 +101,7 @@ mod tests {
             (0..times).for_each(|_| histogram.push(ratio));
         }
         assert!((histogram.middle() / 2.8123 - 1.0).abs() < 0.0006, "{}", histogram.middle());
-        assert!((histogram.share_near(2.8123, 0.01) - 100.0 / 190.0).abs() < 1e-9);
-        assert!((histogram.share_near(2.8123, 0.03) - 150.0 / 190.0).abs() < 1e-9);
+        assert!((histogram.fraction_near(2.8123, 0.01) - 100.0 / 190.0).abs() < 1e-9);
+        assert!((histogram.fraction_near(2.8123, 0.03) - 150.0 / 190.0).abs() < 1e-9);
     }
 }

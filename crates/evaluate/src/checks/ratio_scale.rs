@@ -7,12 +7,12 @@ use crate::checks::ratio_histogram::RatioHistogram;
 /// Rows that are needed to judge, and those of a gear that counts \[chosen\].
 const ENOUGH: u64 = 200;
 const ENOUGH_OF_GEAR: u64 = 50;
-/// Share of the rows of a gear whose ratio is near the middle one of it, and share of all rows in gears whose middle ratios are the same
+/// Fraction of the rows of a gear whose ratio is near the middle one of it, and fraction of all rows in gears whose middle ratios are the same
 /// \[chosen\].
 const MOST: f64 = 0.6;
-/// Share by which two ratios are the same.
+/// Fraction by which two ratios are the same.
 const SAME: f64 = 0.02;
-/// Share by which the middle ratio is off before it is said \[chosen\]: gearbox files have ratios to three digits.
+/// Fraction by which the middle ratio is off before it is said \[chosen\]: gearbox files have ratios to three digits.
 const OFF: f64 = 0.03;
 /// Turbine over engine speed, in the middle, of a turbine speed with the right scale: a converter slips.
 const TURBINE_OVER_ENGINE: std::ops::Range<f64> = 0.6..1.06;
@@ -55,7 +55,7 @@ impl RatioScale {
         let is_alike = |(of_gear, rows): &&(RatioHistogram<300>, u64)| {
             *rows >= ENOUGH_OF_GEAR
                 && is_same(of_gear.middle(), factor, SAME)
-                && of_gear.share_near(factor, SAME) >= MOST
+                && of_gear.fraction_near(factor, SAME) >= MOST
         };
         let alike: Vec<u64> = self.gears.iter().filter(is_alike).map(|(_, rows)| *rows).collect();
         let rows = alike.iter().sum();
@@ -108,8 +108,8 @@ pub struct WrongScale {
     pub is_output: bool,
 }
 
-fn is_same(one: f64, other: f64, share: f64) -> bool {
-    (one / other - 1.0).abs() <= share
+fn is_same(one: f64, other: f64, fraction: f64) -> bool {
+    (one / other - 1.0).abs() <= fraction
 }
 
 /// What an output speed likely is that has to be multiplied by this factor.
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use config::CarFile;
 
-    /// What is said where output and turbine speed are so many times the true ones, and the turbine turns at this share of the engine.
+    /// What is said where output and turbine speed are so many times the true ones, and the turbine turns at this fraction of the engine.
     fn said(scales: [f64; 2], over_engine: f64, has_wheels: bool) -> Option<String> {
         let car = CarFile::eight_speed().unwrap();
         let mut scale = RatioScale::new(&CarFile::eight_speed().unwrap());

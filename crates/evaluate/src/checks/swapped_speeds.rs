@@ -3,10 +3,10 @@
 //! In a gear the turbine turns with the gearbox output, times the ratio of that gear. The engine does so only where the converter
 //! hardly slips, and then the turbine does too. Times at which the engine fits a gear and the turbine none contradict the channels.
 
-/// A speed fits a gear within this share: readings that are 20 ms apart differ by 1 % while the car accelerates, teeth are
+/// A speed fits a gear within this fraction: readings that are 20 ms apart differ by 1 % while the car accelerates, teeth are
 /// counted to 1 % \[chosen\].
 const FITS: f64 = 0.02;
-/// And it does not fit beyond this share \[chosen\]: twice as much.
+/// And it does not fit beyond this fraction \[chosen\]: twice as much.
 const DIFFERS: f64 = 0.04;
 /// Samples that are needed to judge \[chosen\]: a second at 100 Hz.
 const ENOUGH: u64 = 100;
@@ -30,7 +30,7 @@ impl SwappedSpeeds {
     /// Takes the speeds at one time, rad/s: engine, turbine, and what the turbine would turn at in the gears that are possible.
     pub fn push(&mut self, engine_rad_s: f64, turbine_rad_s: f64, in_gears_rad_s: &[f64]) {
         let fits =
-            |speed: f64, share: f64| in_gears_rad_s.iter().any(|gear| (speed - gear).abs() <= share * gear.abs());
+            |speed: f64, fraction: f64| in_gears_rad_s.iter().any(|gear| (speed - gear).abs() <= fraction * gear.abs());
         let (turbine, engine) = (fits(turbine_rad_s, FITS), fits(engine_rad_s, FITS));
         self.engine[0] += u64::from(engine_rad_s.is_finite());
         self.engine[1] += u64::from(engine);

@@ -102,7 +102,7 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
         speed_ratio,
         capacity_n_m_s2: solution.unknowns[i],
         sd_n_m_s2: Real::hypot(sd[i], bends[i]),
-        time_s: per_moment_s * shares(&some, &knots, i),
+        time_s: per_moment_s * fractions(&some, &knots, i),
     };
     let all: Vec<Knot> = knots.iter().enumerate().map(knot).collect();
     drives_no_engine(&all)?;
@@ -152,8 +152,8 @@ impl ConverterFit {
     pub fn capacity(&self, speed_ratio: f64) -> Option<[f64; 2]> {
         let after = self.knots.iter().position(|knot| knot.speed_ratio >= speed_ratio)?;
         let (low, high) = (&self.knots[after.checked_sub(1)?], &self.knots[after]);
-        let share = (speed_ratio - low.speed_ratio) / (high.speed_ratio - low.speed_ratio);
-        let line = |from: f64, to: f64| from + share * (to - from);
+        let fraction = (speed_ratio - low.speed_ratio) / (high.speed_ratio - low.speed_ratio);
+        let line = |from: f64, to: f64| from + fraction * (to - from);
         Some([line(low.capacity_n_m_s2, high.capacity_n_m_s2), line(low.sd_n_m_s2, high.sd_n_m_s2)])
     }
 
@@ -186,19 +186,19 @@ fn bends(knots: &[f64], capacities: &[f64]) -> Vec<f64> {
 fn knots_with_data(moments: &[Moment]) -> Vec<f64> {
     let mut knots = KNOTS.to_vec();
     // A knot without data takes its part of its neighbours', so they are looked at again.
-    while let Some(without) = (0..knots.len()).find(|i| shares(moments, &knots, *i) < MOMENTS_AT_KNOT) {
+    while let Some(without) = (0..knots.len()).find(|i| fractions(moments, &knots, *i) < MOMENTS_AT_KNOT) {
         knots.remove(without);
     }
     knots
 }
 
 /// Parts of the moments that belong to a knot.
-fn shares(moments: &[Moment], knots: &[f64], knot: usize) -> f64 {
-    moments.iter().map(|moment| share(knots, moment.speed_ratio(), knot)).sum()
+fn fractions(moments: &[Moment], knots: &[f64], knot: usize) -> f64 {
+    moments.iter().map(|moment| fraction(knots, moment.speed_ratio(), knot)).sum()
 }
 
 /// How much a knot counts at a speed ratio, 0 to 1. Below the first knot the capacity stays.
-fn share(knots: &[f64], speed_ratio: f64, knot: usize) -> f64 {
+fn fraction(knots: &[f64], speed_ratio: f64, knot: usize) -> f64 {
     let here = knots[knot];
     if speed_ratio <= here {
         match knot.checked_sub(1) {
@@ -223,7 +223,7 @@ struct Solution {
 /// How a moment depends on the unknowns.
 fn row(knots: &[f64], moment: &Moment, j: usize) -> f64 {
     if j < knots.len() {
-        share(knots, moment.speed_ratio(), j) * Real::powi(moment.engine_rad_s, 2)
+        fraction(knots, moment.speed_ratio(), j) * Real::powi(moment.engine_rad_s, 2)
     } else {
         moment.engine_rad_s2
     }

@@ -49,8 +49,8 @@ pub struct ShiftTorque {
     pub reduction: Option<[f64; 2]>,
     /// Mean size of the difference of engine torque and request while it was asked for, N m.
     pub reduction_error_n_m: Option<f64>,
-    /// Share of the inertia phase without slip of the converter, 0 to 1.
-    pub no_slip_share: f64,
+    /// Fraction of the inertia phase without slip of the converter, 0 to 1.
+    pub no_slip_fraction: f64,
 }
 
 /// Least, middle and greatest of some values.
@@ -95,7 +95,7 @@ impl ConverterFit {
             work_j: None,
             reduction: None,
             reduction_error_n_m: None,
-            no_slip_share: 0.0,
+            no_slip_fraction: 0.0,
         };
         if let Some(inertia_s) = shift.inertia_s {
             let moments: Vec<&Moment> = within(inertia_s).collect();
@@ -115,7 +115,7 @@ impl ConverterFit {
                     let work = [work(0), work(1), work(2)];
                     (!record.output.is_empty()).then(|| three(work))
                 });
-                found.no_slip_share = known.iter().map(|(m, _)| f64::from(u8::from(m.no_slip))).sum::<f64>() / count;
+                found.no_slip_fraction = known.iter().map(|(m, _)| f64::from(u8::from(m.no_slip))).sum::<f64>() / count;
             }
         }
         found.reduction(record);

@@ -18,10 +18,10 @@ use crate::fitted_file::SIDES;
 
 /// Fewest reversals: their scatter is part of the interval.
 const REVERSALS: usize = 4;
-/// Deviation of the stiffness before the fit, as a share \[chosen\].
+/// Deviation of the stiffness before the fit, as a fraction \[chosen\].
 const STIFFNESS: f64 = 0.15;
-/// Error of the torque in overrun, as a share: the overrun half of a converter's map is rarely measured \[chosen\].
-const OVERRUN_SHARE: f64 = 0.3;
+/// Error of the torque in overrun, as a fraction: the overrun half of a converter's map is rarely measured \[chosen\].
+const OVERRUN_FRACTION: f64 = 0.3;
 /// Deviation of a backlash of which nothing is known but that it is anywhere between 0 and 0.1 rad at the wheels \[chosen\]. The fit itself has none: a
 /// mean would pull.
 const BEFORE_RAD: f64 = 0.1 / 3.464;
@@ -122,6 +122,6 @@ pub(crate) fn fit_backlash<'a>(
     let torques = stretches.iter().copied().flatten().map(|cell| cell.wheels_n_m);
     let (count, sum) =
         torques.filter(|torque| *torque < 0.0).fold((0.0, 0.0), |(n, sum), torque| (n + 1.0, sum - torque));
-    let by_overrun = OVERRUN_SHARE * sum / f64::max(count, 1.0) / stiffness;
+    let by_overrun = OVERRUN_FRACTION * sum / f64::max(count, 1.0) / stiffness;
     Ok(BacklashFit { rad: rad.max(0.0), sd_rad: Real::hypot(sd_rad, by_overrun), reversals })
 }

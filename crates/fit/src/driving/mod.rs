@@ -39,10 +39,10 @@ pub(crate) use usable::{Usable, usable};
 pub use wheel::WheelFit;
 pub(crate) use wheel::fit_wheel;
 
-/// What the torque at the gearbox input has beside its model: drag of the open elements, N m \[chosen\], and a share of the torque by the shape of the
+/// What the torque at the gearbox input has beside its model: drag of the open elements, N m \[chosen\], and a fraction of the torque by the shape of the
 /// converter's maps \[chosen, as in the filter\].
 pub(crate) const DRAG_SD_N_M: f64 = 1.0;
-pub(crate) const INPUT_SD_SHARE: f64 = 0.03;
+pub(crate) const INPUT_SD_FRACTION: f64 = 0.03;
 /// Unit of the unknown of a drag, N m.
 pub(crate) const DRAG_UNIT_N_M: f64 = 1.0;
 /// Step for the derivatives by a delay in its unit.
@@ -53,7 +53,7 @@ const MISFIT: f64 = 3.0;
 /// Bounds of rolling resistance and air drag \[chosen\].
 pub(crate) const ROLLING: f64 = 0.5;
 pub(crate) const AIR: f64 = 0.3;
-/// Least deviations of rolling resistance, as a mean grade over the weight, and of air drag, as a share \[chosen: a mean wind\].
+/// Least deviations of rolling resistance, as a mean grade over the weight, and of air drag, as a fraction \[chosen: a mean wind\].
 pub(crate) const MEAN_GRADE_RAD: f64 = 0.005;
 pub(crate) const WIND: f64 = 0.1;
 

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::car::{CAPACITIES, DrivenCar};
 use super::stretch::{Driving, FINE_S, HalfStep, STEP_S, Stretch, means};
 use super::whitening::{Passing, Step, Whitening};
-use super::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_SHARE, Places, Term};
+use super::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_FRACTION, Places, Term};
 use crate::parameters::DELAY_UNIT_S;
 use crate::weights::{ChannelWeights, FACTOR, HUBER};
 
@@ -19,9 +19,9 @@ const GRADE_M: f64 = 100.0;
 const READING_LEAST_RAD_S: f64 = 0.01;
 /// Time over which the error of a torque lasts, s \[chosen, as in the filter\].
 const TORQUE_S: f64 = 3.0;
-/// Error of the reported engine torque beside its scale, N m and as a share \[chosen\].
+/// Error of the reported engine torque beside its scale, N m and as a fraction \[chosen\].
 const REPORTED_N_M: f64 = 3.0;
-const REPORTED_SHARE: f64 = 0.04;
+const REPORTED_FRACTION: f64 = 0.04;
 
 /// Factors on the time over which the error of a torque changes: from the errors themselves.
 const LASTING: [f64; 6] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
@@ -309,7 +309,7 @@ impl<'a> DrivingModel<'a> {
             reading: self.body_speed(stretch, ratio, &torque, [body, wheels].map(|part| part / inertia)),
             sd_rad_s2: [
                 by_step(&|_| GRADE_RAD * weight),
-                by_step(&|k| ratio * Real::hypot(DRAG_SD_N_M, INPUT_SD_SHARE * input[k]) / inertia),
+                by_step(&|k| ratio * Real::hypot(DRAG_SD_N_M, INPUT_SD_FRACTION * input[k]) / inertia),
             ],
             white_rad_s2: ratio * self.noise_n_m[0] / inertia,
             rate,
@@ -358,7 +358,7 @@ impl<'a> DrivingModel<'a> {
         let pump = by_step(&|k| capacity * steps[k].pump_n_m);
         let rate = by_step(&|k| (scale * torque[k] - pump[k]) / inertia);
         let error_n_m = |k: usize| {
-            Real::hypot(Real::hypot(REPORTED_N_M, REPORTED_SHARE * torque[k]), INPUT_SD_SHARE * pump[k]) / inertia
+            Real::hypot(Real::hypot(REPORTED_N_M, REPORTED_FRACTION * torque[k]), INPUT_SD_FRACTION * pump[k]) / inertia
         };
         Lines {
             reading: means(&stretch.halves, |half| half.engine_rad_s),

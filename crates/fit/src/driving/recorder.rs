@@ -12,14 +12,14 @@ const SETTLES_S: f64 = 0.5;
 const GAP_S: f64 = 0.1;
 /// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
 const OUTPUT_LEAST_RAD_S: f64 = 15.0;
-/// The engine pulls where the turbine turns slower than this share of its speed, and until it turns faster than the second one \[chosen\] ...
+/// The engine pulls where the turbine turns slower than this fraction of its speed, and until it turns faster than the second one \[chosen\] ...
 const PULLS: [f64; 2] = [0.97, 0.99];
 /// ... and it is not idling, rad/s \[chosen: with a foot on the brake it idles, cold too\].
 const ENGINE_LEAST_RAD_S: f64 = 120.0;
 /// Without a converter it pulls with this torque, and until it has less than the second one, N m \[chosen\].
 const PULLS_N_M: [f64; 2] = [15.0, 5.0];
-/// Share and speed, rad/s, by which the turbine may be off the ratio of the gear.
-const RATIO_SHARE: f64 = 0.03;
+/// Fraction and speed, rad/s, by which the turbine may be off the ratio of the gear.
+const RATIO_FRACTION: f64 = 0.03;
 const RATIO_RAD_S: f64 = 2.0;
 /// The end of a stretch is left out, s: from the release of the accelerator until the engine does not pull any more the brake may be on
 /// already.
@@ -171,5 +171,5 @@ impl DrivingRecorder {
 /// Whether turbine and output turn by a ratio.
 pub(crate) fn turns_by(ratio: f64, turbine_rad_s: f64, output_rad_s: f64) -> bool {
     let by_output = ratio * output_rad_s;
-    (turbine_rad_s - by_output).abs() <= RATIO_RAD_S + RATIO_SHARE * by_output.abs()
+    (turbine_rad_s - by_output).abs() <= RATIO_RAD_S + RATIO_FRACTION * by_output.abs()
 }

@@ -133,7 +133,7 @@ impl Stretch {
     pub(crate) fn reported_n_m(&self, halves: &[HalfStep], step_s: f64, late_s: f64) -> Vec<f64> {
         let mean = |(half, weight): (&HalfStep, Weight)| {
             points([half.time_s - 0.5 * step_s, step_s], weight)
-                .map(|(time_s, share)| share * self.reported.at(time_s - late_s))
+                .map(|(time_s, fraction)| fraction * self.reported.at(time_s - late_s))
                 .sum::<f64>()
         };
         halves.iter().zip(WEIGHTS.into_iter().cycle()).map(mean).collect()
@@ -154,37 +154,37 @@ enum Weight {
 
 const WEIGHTS: [Weight; 2] = [Weight::Falling, Weight::Rising];
 
-/// Times in a step with this begin and length, and their shares in its mean.
+/// Times in a step with this begin and length, and their fractions in its mean.
 fn points([begin_s, step_s]: [f64; 2], weight: Weight) -> impl Iterator<Item = (f64, f64)> {
     let points = (step_s / POINT_S).round() as u32;
     (0..points).map(move |point| {
         let passed = (f64::from(point) + 0.5) / f64::from(points);
-        let share = if weight == Weight::Rising { passed } else { 1.0 - passed };
-        (begin_s + step_s * passed, 2.0 * share / f64::from(points))
+        let fraction = if weight == Weight::Rising { passed } else { 1.0 - passed };
+        (begin_s + step_s * passed, 2.0 * fraction / f64::from(points))
     })
 }
 
 fn half(car: &DrivenCar, open: &[OpenElement], readings: &StretchReadings, span: [f64; 2], weight: Weight) -> HalfStep {
     let mut mean = HalfStep { time_s: span[0] + 0.5 * span[1], ..HalfStep::default() };
-    for (time_s, share) in points(span, weight) {
+    for (time_s, fraction) in points(span, weight) {
         let [engine, turbine, output] =
             [&readings.engine, &readings.turbine, &readings.output].map(|series| series.at(time_s));
-        mean.engine_rad_s += share * engine;
-        mean.output_rad_s += share * output;
+        mean.engine_rad_s += fraction * engine;
+        mean.output_rad_s += fraction * output;
         if let Some(converter) = &car.converter {
             let torques = converter.torques(engine, turbine);
-            mean.turbine_n_m += share * torques.turbine_n_m;
-            mean.pump_n_m += share * torques.pump_n_m;
-            mean.above_one_n_m += share * (torques.turbine_n_m - torques.pump_n_m);
+            mean.turbine_n_m += fraction * torques.turbine_n_m;
+            mean.pump_n_m += fraction * torques.pump_n_m;
+            mean.above_one_n_m += fraction * (torques.turbine_n_m - torques.pump_n_m);
             let changes = car.capacity_changes(turbine / engine);
             for (sum, change) in mean.by_capacity_n_m.iter_mut().zip(changes) {
-                *sum += share * change * torques.turbine_n_m;
+                *sum += fraction * change * torques.turbine_n_m;
             }
         }
         for OpenElement { at, slip, drag_n_m } in open {
             let of_one = -slip * drag_torque(1.0, slip * turbine);
-            mean.drag_n_m += share * drag_n_m * of_one;
-            mean.drag_of_one_n_m[*at] += share * of_one;
+            mean.drag_n_m += fraction * drag_n_m * of_one;
+            mean.drag_of_one_n_m[*at] += fraction * of_one;
         }
     }
     mean

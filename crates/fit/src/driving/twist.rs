@@ -114,17 +114,17 @@ fn cell(car: &DrivenCar, gear: usize, speeds: &[Series; 4], begin_s: f64) -> Opt
     let final_ratio = car.driveline.final_ratio;
     let [engine, turbine, output, wheel] = speeds;
     let points = (CELL_S / POINT_S).round() as u32;
-    let share = f64::from(points).recip();
+    let fraction = f64::from(points).recip();
     let mut cell = Cell::default();
     for point in 0..points {
         let time_s = begin_s + POINT_S * (f64::from(point) + 0.5);
         let wheel_rad_s = wheel.at(time_s);
-        cell.wheel_rad_s += share * wheel_rad_s;
+        cell.wheel_rad_s += fraction * wheel_rad_s;
         cell.ahead_rad += POINT_S * (output.at(time_s) / final_ratio - wheel_rad_s);
         cell.turned_rad += POINT_S * wheel_rad_s;
         let torques = converter.torques(engine.at(time_s), turbine.at(time_s));
-        cell.turbine_n_m += share * torques.turbine_n_m;
-        cell.above_one_n_m += share * final_ratio * gear.ratio * (torques.turbine_n_m - torques.pump_n_m);
+        cell.turbine_n_m += fraction * torques.turbine_n_m;
+        cell.above_one_n_m += fraction * final_ratio * gear.ratio * (torques.turbine_n_m - torques.pump_n_m);
     }
     cell.converter_n_m = final_ratio * gear.ratio * cell.turbine_n_m;
     let rate = (output.at(begin_s + CELL_S) - output.at(begin_s)) / CELL_S;
@@ -220,8 +220,8 @@ pub(crate) fn changes(
     (all, reversals)
 }
 
-/// What changes tell of scale, delay, compliance and backlash, with the compliance of before and its deviation as a share; none if the equations have no finite
+/// What changes tell of scale, delay, compliance and backlash, with the compliance of before and its deviation as a fraction; none if the equations have no finite
 /// solution.
-pub(crate) fn told(changes: &[Line<UNKNOWNS>], compliance: f64, share: f64) -> Option<Told<UNKNOWNS>> {
-    Told::of(changes, [0.0, 0.0, compliance, 0.0], [SCALE, DELAY_S, share * compliance, FREE_RAD])
+pub(crate) fn told(changes: &[Line<UNKNOWNS>], compliance: f64, fraction: f64) -> Option<Told<UNKNOWNS>> {
+    Told::of(changes, [0.0, 0.0, compliance, 0.0], [SCALE, DELAY_S, fraction * compliance, FREE_RAD])
 }

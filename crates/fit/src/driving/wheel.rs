@@ -99,7 +99,7 @@ impl WheelFit {
     }
 }
 
-/// The wheel speed and the drive shafts of a car in the gears of its logs; `stiffness_sd` is what is known of the stiffness before, as a share.
+/// The wheel speed and the drive shafts of a car in the gears of its logs; `stiffness_sd` is what is known of the stiffness before, as a fraction.
 ///
 /// # Errors
 /// What the logs lack for it.

@@ -26,21 +26,21 @@ impl GearboxFit {
         let edge = |sd: f64| 3.0_f64.sqrt() * sd;
         let comment = "what the fit leaves open: the edge of a uniform distribution of the stated deviation";
         if car.converter.is_some() {
-            let share = edge(self.input_sd()).min(given.converter);
-            text.put(&["error_bounds"], "converter_share", &number(share), comment)?;
+            let fraction = edge(self.input_sd()).min(given.converter);
+            text.put(&["error_bounds"], "converter_share", &number(fraction), comment)?;
         }
         if self.is_told(Quantity::Mass) {
-            let share = edge(self.sd(Quantity::Mass));
-            text.put(&["error_bounds"], "mass_share", &number(share), comment)?;
+            let fraction = edge(self.sd(Quantity::Mass));
+            text.put(&["error_bounds"], "mass_share", &number(fraction), comment)?;
         }
         if let Some(wheel) = self.wheel.as_ref().ok().filter(|wheel| wheel.tells_stiffness()) {
-            let share = edge(wheel.stiffness.sd).min(given.stiffness);
-            text.put(&["error_bounds"], "shaft_stiffness_share", &number(share), comment)?;
+            let fraction = edge(wheel.stiffness.sd).min(given.stiffness);
+            text.put(&["error_bounds"], "shaft_stiffness_share", &number(fraction), comment)?;
         }
         // One number for all shifts: that of the pair of gears that is known least.
         let inertias = (0..self.quantities.pairs.len()).map(|at| edge(self.sd(Quantity::Inertia(at))));
-        let share = inertias.fold(0.0, f64::max).min(given.inertia);
-        text.put(&["error_bounds"], "inertia_share", &number(share), comment)?;
+        let fraction = inertias.fold(0.0, f64::max).min(given.inertia);
+        text.put(&["error_bounds"], "inertia_share", &number(fraction), comment)?;
         // Without a check the scale of an earlier fit is not that of this one.
         let unchecked =
             car.error_bounds.valve_error_scale.map(|_| (1.0, "not checked on shifts that were held out".to_owned()));

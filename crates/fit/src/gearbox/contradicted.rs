@@ -8,9 +8,9 @@ use super::quantities::Quantities;
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 
-/// RMS difference from the pressures by the vehicle file above which a measured pressure contradicts them: a share of these \[chosen: several times
+/// RMS difference from the pressures by the vehicle file above which a measured pressure contradicts them: a fraction of these \[chosen: several times
 /// what gain, lag and hysteresis make together\], and least, Pa.
-const SHARE: f64 = 0.5;
+const FRACTION: f64 = 0.5;
 const LEAST_PA: f64 = 30e3;
 
 /// Places of the elements whose measured pressures, over all shifts, cannot be those of their commands.
@@ -29,7 +29,7 @@ pub(super) fn contradicted(car: &Car, tables: &ShiftTables<f64>, shifts: &[Shift
     }
     let contradicts = |[rows, differences, pressures]: &[f64; 3]| {
         let [difference, pressure] = [differences, pressures].map(|sum| (sum / rows).sqrt());
-        difference > SHARE * pressure + LEAST_PA
+        difference > FRACTION * pressure + LEAST_PA
     };
     sums.iter().enumerate().filter(|(_, sums)| contradicts(sums)).map(|(place, _)| place).collect()
 }

@@ -72,7 +72,7 @@ pub struct GearboxFit {
     /// Channels of output and engine speed against the turbine speed.
     pub channels: ChannelFits,
     /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the fitted shifts.
-    pub(crate) above_one_share: f64,
+    pub(crate) above_one_fraction: f64,
     /// Pairs of gears whose inertia is taken to be that of the file, and the unknown that the logs draw it to.
     pub(crate) drawn_off: Vec<(usize, f64)>,
     /// Which balances of it were fitted.
@@ -159,7 +159,7 @@ fn fit_with(
     let mut fit = GearboxFit {
         fills: Vec::new(),
         torque_misfit: (squares / models.len() as f64).sqrt(),
-        above_one_share: above_one_share(&models),
+        above_one_fraction: above_one_fraction(&models),
         at_limit,
         unknowns,
         drawn_off,
@@ -211,7 +211,7 @@ fn drawn_off(quantities: &Quantities, at: &mut [f64], stated: &mut DMatrix<f64>)
 }
 
 /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the shifts.
-fn above_one_share(models: &[ShiftModel]) -> f64 {
+fn above_one_fraction(models: &[ShiftModel]) -> f64 {
     let squares = models.iter().map(|model| model.input_squares());
     let [all, above] = squares.fold([0.0; 2], |[all, above], more| [all + more[0], above + more[1]]);
     if all > 0.0 { (above / all).sqrt() } else { 0.0 }
@@ -305,7 +305,7 @@ impl GearboxFit {
     /// Standard deviation of the logarithm of the torque at the gearbox input in shifts: the torque ratio acts on what is above 1 alone.
     pub(crate) fn input_sd(&self) -> f64 {
         let mut along = DVector::zeros(self.unknowns.len());
-        for (quantity, weight) in [(Quantity::Input, 1.0), (Quantity::TorqueRatio, self.above_one_share)] {
+        for (quantity, weight) in [(Quantity::Input, 1.0), (Quantity::TorqueRatio, self.above_one_fraction)] {
             self.quantities.place(quantity).into_iter().for_each(|place| along[place] = weight);
         }
         along.dot(&(&self.stated * &along)).max(0.0).sqrt()

@@ -22,7 +22,7 @@ const DRAG_N_M: f64 = 1.0;
 /// Part of the variance that friction elements, their drags, valves or inertias have in common \[chosen\]: oil, temperature, the shaft at the input, the
 /// channel of the currents.
 const COMMON: f64 = 1.0 / 3.0;
-/// Bound of the torque ratio above 1, as a share \[chosen\].
+/// Bound of the torque ratio above 1, as a fraction \[chosen\].
 const TORQUE_RATIO: f64 = 0.10;
 
 /// Bound of the delay of the reported engine torque, and of the engine speed in front of a converter, s: one cycle of a bus, and whether it is held or interpolated.
@@ -258,12 +258,12 @@ impl Known<'_> {
             Quantity::InputDelay | Quantity::EngineDelay => deviation_of(INPUT_DELAY_S / DELAY_UNIT_S),
             Quantity::Delay(at) => of(at).valve_delay_s / DELAY_UNIT_S,
             Quantity::Drag(_) => DRAG_N_M / DRAG_UNIT_N_M,
-            Quantity::Torque(at) => of(at).torque_share,
+            Quantity::Torque(at) => of(at).torque_fraction,
             Quantity::Kiss(at) => Real::hypot(of(at).kiss_point_pa / KISS_UNIT_PA, self.kiss_by_gain(at)),
             Quantity::Gain(at) => of(at).valve_gain,
             Quantity::PressureScale => PRESSURE_SCALE,
             Quantity::PressureOffset(_) => sd_before_pa() / OFFSET_UNIT_PA,
-            Quantity::Lag(at) => of(at).valve_lag_share,
+            Quantity::Lag(at) => of(at).valve_lag_fraction,
             Quantity::Inertia(_) => self.filter.uncertainty.inertia_share,
             Quantity::Mass => deviation_of(self.mass_share),
             Quantity::Rolling => deviation_of(ROLLING),

@@ -17,9 +17,9 @@ const AFTER_S: f64 = 0.5;
 const LONGEST_S: f64 = 5.0;
 /// Readings of a channel above which old ones are dropped.
 const READINGS_KEPT: usize = 4000;
-/// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they may differ.
+/// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and fraction by which they may differ.
 const RATIO_FROM_RAD_S: f64 = 20.0;
-const RATIO_SHARE: f64 = 0.1;
+const RATIO_FRACTION: f64 = 0.1;
 
 /// The shifts of a log, and the driving between them.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -211,7 +211,7 @@ impl<'a> Recorder<'a> {
         if self.last_output > RATIO_FROM_RAD_S {
             let by_output = gear.ratio * self.last_output;
             self.found.in_gear[0] += 1;
-            self.found.in_gear[1] += u64::from((turbine.value - by_output).abs() > RATIO_SHARE * by_output.abs());
+            self.found.in_gear[1] += u64::from((turbine.value - by_output).abs() > RATIO_FRACTION * by_output.abs());
         }
     }
 

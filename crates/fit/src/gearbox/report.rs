@@ -64,7 +64,7 @@ impl GearboxFit {
             measure,
             value: si(x),
             interval: [si(x - half), si(x + half)],
-            share: sd / self.quantities.sd_before(place),
+            fraction: sd / self.quantities.sd_before(place),
             verdict: self.verdict(quantity),
         }
     }

@@ -11,7 +11,7 @@ use super::clutch::{AtValve, ClutchModel};
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift_log::ShiftLog;
 use crate::Series;
-use crate::driving::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_SHARE};
+use crate::driving::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_FRACTION};
 use crate::pressure::{Grid, Hydraulics};
 
 /// Step of the integrals, s.
@@ -121,7 +121,7 @@ impl ShiftModel {
             drag_of_one_n_m,
             inertia_kg_m2: row.mass_kg_m2[0][0],
             by_output,
-            own_sd: [START_SD_RAD_S, Real::hypot(DRAG_SD_N_M, INPUT_SD_SHARE * mean)],
+            own_sd: [START_SD_RAD_S, Real::hypot(DRAG_SD_N_M, INPUT_SD_FRACTION * mean)],
             time_s,
             reading,
         })

@@ -162,10 +162,10 @@ pub(crate) struct Problem<'a> {
 
 impl<'a> Problem<'a> {
     pub(crate) fn new(quantities: &'a Quantities) -> Result<Self, FitError> {
-        /// Share of its standard deviation in which a quantity is held; none would make it a constant, with which nothing is correlated.
-        const HELD_SHARE: f64 = 0.1;
+        /// Fraction of its standard deviation in which a quantity is held; none would make it a constant, with which nothing is correlated.
+        const HELD_FRACTION: f64 = 0.1;
         let mut before = quantities.before.clone();
-        quantities.held().for_each(|place| before[(place, place)] *= HELD_SHARE * HELD_SHARE);
+        quantities.held().for_each(|place| before[(place, place)] *= HELD_FRACTION * HELD_FRACTION);
         Ok(Self { quantities, precision: before.cholesky().ok_or_else(not_finite)?.inverse() })
     }
 

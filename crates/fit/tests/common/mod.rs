@@ -36,12 +36,12 @@ impl Draw {
 
     /// Between two numbers.
     pub(crate) fn between(&mut self, least: f64, greatest: f64) -> f64 {
-        let share: f64 = StandardUniform.sample(&mut self.0);
-        least + share * (greatest - least)
+        let fraction: f64 = StandardUniform.sample(&mut self.0);
+        least + fraction * (greatest - least)
     }
 
-    fn factor(&mut self, share: f64) -> f64 {
-        self.between(1.0 - share, 1.0 + share)
+    fn factor(&mut self, fraction: f64) -> f64 {
+        self.between(1.0 - fraction, 1.0 + fraction)
     }
 
     fn normal(&mut self) -> f64 {
@@ -105,12 +105,12 @@ fn draw_fill(clutch: &mut ShiftClutch, draw: &mut Draw) -> f64 {
     let cylinder = &mut clutch.cylinder;
     let flow = cylinder.flow(DROP_PA);
     let (volume, passages) = (draw.between(0.75, 1.25), draw.between(0.8, 1.25));
-    let share = draw.between(0.9, 1.1) * cylinder.preload_pa / cylinder.kiss_pa;
+    let fraction = draw.between(0.9, 1.1) * cylinder.preload_pa / cylinder.kiss_pa;
     cylinder.stroke_m3 *= volume;
     cylinder.supply = cylinder.supply.with_resistance_factor(passages);
     cylinder.exhaust = cylinder.exhaust.with_resistance_factor(passages);
     cylinder.kiss_pa = clutch.clutch.kiss_pressure();
-    cylinder.preload_pa = share * cylinder.kiss_pa;
+    cylinder.preload_pa = fraction * cylinder.kiss_pa;
     volume * flow / cylinder.flow(DROP_PA)
 }
 
@@ -285,7 +285,7 @@ impl TestCar {
     /// Slips, pressures and commands at which the shapes of the maps count.
     fn points(&self) -> ([f64; 5], [f64; 3], [f64; 3]) {
         let kiss_pa = self.file.oncoming.clutch.kiss_pressure();
-        let pressures = [0.0, 0.5, 1.5].map(|share| kiss_pa + share * self.file.error_bounds.shift_pressure_pa);
+        let pressures = [0.0, 0.5, 1.5].map(|fraction| kiss_pa + fraction * self.file.error_bounds.shift_pressure_pa);
         let commands = pressures.map(|p| self.file.oncoming.valve.command_for(p));
         ([0.0, 30.0, 100.0, 200.0, 300.0], pressures, commands)
     }
@@ -445,7 +445,7 @@ impl TestCar {
     /// Gives the car another rolling resistance and air drag than the file has.
     pub(crate) fn on_another_road(mut self) -> Self {
         let mut draw = Draw::new(!self.sensors.seed ^ self.seed << 32);
-        let [rolling, air] = [0.3, 0.2].map(|share| draw.factor(share));
+        let [rolling, air] = [0.3, 0.2].map(|fraction| draw.factor(fraction));
         self.car.road.rolling_moment_n_m *= rolling;
         self.car.road.drag_coefficient *= air;
         self.truth.retain(|(parameter, _)| !matches!(parameter, Parameter::Rolling | Parameter::Air));

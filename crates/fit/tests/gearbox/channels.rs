@@ -49,8 +49,8 @@ fn scale_and_delay_of_the_wheel_speed_and_the_stiffness_lie_in_their_intervals()
     assert!(holds(&engine, channels.late_s[0]) && engine.verdict() == Verdict::Measured, "{engine:?} {channels:?}");
     let file = written(&drawn, &fit);
     assert!((stiffness(&file) / stiffness(&drawn.file) / found.stiffness.value.exp() - 1.0).abs() < 1e-3);
-    let share = file.error_bounds.shaft_stiffness_share.unwrap();
-    assert!((share / (3.0_f64.sqrt() * found.stiffness.sd) - 1.0).abs() < 1e-3, "{share}");
+    let fraction = file.error_bounds.shaft_stiffness_share.unwrap();
+    assert!((fraction / (3.0_f64.sqrt() * found.stiffness.sd) - 1.0).abs() < 1e-3, "{fraction}");
     let said = fit.statements().join("\n");
     for words in [
         format!("multiply `scale` of its channel in the channel map by {:.4}", 1.0 + found.scale.value),

@@ -18,7 +18,7 @@ use study::gearbox::matrix::Random;
 use study::gearbox::measured::{MeasuredRow, SensedDrive};
 use study::gearbox::recording::reported_engine_n_m;
 
-/// Bounds of what is drawn: as shares, and of the kiss point in Pa.
+/// Bounds of what is drawn: as fractions, and of the kiss point in Pa.
 const FRICTION: f64 = 0.15;
 const GAIN: f64 = 0.08;
 const CONVERTER: f64 = 0.08;
@@ -38,7 +38,7 @@ const AIR: f64 = 0.2;
 const ENGINE_INERTIA: f64 = 0.1;
 const STIFFNESS: f64 = 0.2;
 const TYRE: f64 = 0.25;
-/// Of a reported engine torque: scale, an error that comes and goes, both as shares, noise, N m, and by how much it is ahead, s.
+/// Of a reported engine torque: scale, an error that comes and goes, both as fractions, noise, N m, and by how much it is ahead, s.
 const REPORTED: f64 = 0.08;
 const REPORTED_SLOWLY: f64 = 0.03;
 const REPORTED_N_M: f64 = 1.0;
@@ -178,11 +178,11 @@ pub(crate) struct ReportedErrors {
 }
 
 impl ReportedErrors {
-    fn of(seed: u64, share: f64) -> Self {
+    fn of(seed: u64, fraction: f64) -> Self {
         let mut random = Random(!seed ^ ROAD_STREAM);
         Self {
-            factor: 1.0 + share * REPORTED * (2.0 * random.uniform() - 1.0),
-            slowly: share * REPORTED_SLOWLY,
+            factor: 1.0 + fraction * REPORTED * (2.0 * random.uniform() - 1.0),
+            slowly: fraction * REPORTED_SLOWLY,
             noise_n_m: REPORTED_N_M,
             ahead_s: AHEAD_S[0] + (AHEAD_S[1] - AHEAD_S[0]) * random.uniform(),
         }
@@ -201,8 +201,8 @@ impl Drawn {
     /// A car drawn by this seed.
     pub(crate) fn of(file: CarFile, seed: u64, case: Case) -> Self {
         let mut random = Random(seed);
-        let share = if case == Case::Right { 0.0 } else { 1.0 };
-        let mut within = |bound: f64| share * bound * (2.0 * random.uniform() - 1.0);
+        let fraction = if case == Case::Right { 0.0 } else { 1.0 };
+        let mut within = |bound: f64| fraction * bound * (2.0 * random.uniform() - 1.0);
         let none = ShiftDraw::none(&file);
         let draw = ShiftDraw {
             friction: none.friction.iter().map(|_| 1.0 + within(FRICTION)).collect(),
@@ -227,12 +227,12 @@ impl Drawn {
         }
         let mut fills = Random(!seed ^ TIMING_STREAM);
         let fill: Vec<f64> =
-            truth.clutches.iter().map(|_| 1.0 + share * FILL * (2.0 * fills.uniform() - 1.0)).collect();
+            truth.clutches.iter().map(|_| 1.0 + fraction * FILL * (2.0 * fills.uniform() - 1.0)).collect();
         for (clutch, fill) in truth.clutches.iter_mut().zip(&fill) {
             clutch.iter_mut().for_each(|clutch| clutch.cylinder.stroke_m3 *= fill);
         }
         for clutch in truth.clutches.iter_mut().flatten() {
-            clutch.drag_n_m *= 1.0 + share * DRAG * (2.0 * drags.uniform() - 1.0);
+            clutch.drag_n_m *= 1.0 + fraction * DRAG * (2.0 * drags.uniform() - 1.0);
         }
         // The simulated gear train has its own inertia; that of the file is what is wrong.
         let mut file = file;
@@ -249,7 +249,7 @@ impl Drawn {
             }
         }
         let mut roads = Random(seed ^ ROAD_STREAM);
-        let mut factor = |bound: f64| 1.0 + share * bound * (2.0 * roads.uniform() - 1.0);
+        let mut factor = |bound: f64| 1.0 + fraction * bound * (2.0 * roads.uniform() - 1.0);
         // Without a converter the engine's inertia is part of `M11`.
         let engine = if file.converter.is_some() { ENGINE_INERTIA } else { 0.0 };
         let vehicle = [factor(MASS), factor(ROLLING), factor(AIR), factor(engine)];
@@ -296,8 +296,8 @@ impl Drawn {
 
     /// With a reported engine torque.
     pub(crate) fn with_reported(self, case: Case) -> Self {
-        let share = if case == Case::Right { 0.0 } else { 1.0 };
-        Self { reported: Some(ReportedErrors::of(self.seed, share)), ..self }
+        let fraction = if case == Case::Right { 0.0 } else { 1.0 };
+        Self { reported: Some(ReportedErrors::of(self.seed, fraction)), ..self }
     }
 
     pub(crate) fn tables(&self) -> ShiftTables<f64> {

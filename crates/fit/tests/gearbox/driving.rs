@@ -90,7 +90,7 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
         let file = with.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
         let factor = with.unknown(Quantity::Mass).exp();
         assert!((file.road.mass_kg / drawn.file.road.mass_kg / factor - 1.0).abs() < 1e-3);
-        assert!(file.error_bounds.mass_share.is_some_and(|share| share < 0.25), "{:?}", file.error_bounds);
+        assert!(file.error_bounds.mass_share.is_some_and(|fraction| fraction < 0.25), "{:?}", file.error_bounds);
         // What is not told stays as it is in the text.
         for (quantity, key) in
             [(Quantity::EngineInertia, "inertia_kg_m2 = "), (Quantity::Rolling, "rolling_moment_n_m")]

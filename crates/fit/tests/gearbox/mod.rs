@@ -37,7 +37,7 @@ fn fit_of_rows(drawn: &Drawn, rows: &[(f64, ShiftInput<f64>)]) -> (GearboxFit, u
     (fitted(drawn, &recorded.shifts), recorded.skipped.len())
 }
 
-/// Share of the true values that lie in their stated intervals.
+/// Fraction of the true values that lie in their stated intervals.
 fn held(drawn: &Drawn, fit: &GearboxFit) -> f64 {
     let tables = drawn.tables();
     let known: Vec<Quantity> = fit
@@ -66,8 +66,8 @@ fn fitted_files_of_drawn_cars_have_smaller_torque_errors_on_shifts_that_were_hel
         let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
         let [given, found] = [&drawn.file, &file].map(|car| truth.squared_error(car, &held_out).sqrt());
         assert!(found < 0.6 * given, "{vehicle}: {given} {found}");
-        let share = held(&drawn, &fit);
-        assert!(share > 0.85, "{vehicle}: {share}");
+        let fraction = held(&drawn, &fit);
+        assert!(fraction > 0.85, "{vehicle}: {fraction}");
         let checked = fit.validate((&drawn.file, &drawn.tables()), (&file, &tables(&file)), &held_out).unwrap();
         assert!(
             checked.turbine_rad_s[1] < checked.turbine_rad_s[0] && 2 * checked.better > checked.shifts,
@@ -271,7 +271,7 @@ fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     let of_trusted = drawn::tables(&trusted);
     let place = of_trusted.place(at).unwrap();
     let [usual, half] = [&tables[1], &of_trusted].map(|tables| tables.tables().elements[place].uncertainty);
-    assert_eq!([half.torque_share, half.kiss_point_pa], [0.5 * usual.torque_share, 0.5 * usual.kiss_point_pa]);
+    assert_eq!([half.torque_fraction, half.kiss_point_pa], [0.5 * usual.torque_fraction, 0.5 * usual.kiss_point_pa]);
     assert_eq!([half.valve_delay_s, half.pressure_pa], [0.5 * usual.valve_delay_s, 0.5 * usual.pressure_pa]);
     assert_eq!(half.slow_part, usual.slow_part);
     assert_eq!(element_uncertainty(ErrorBudget::of_car(&trusted).element(at).unwrap(), 1.0), usual);

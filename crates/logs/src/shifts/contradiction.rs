@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 const STEADY_S: f64 = 1.0;
 /// And when it stays the same for so long, s \[chosen\]: or a signal may change when the shift has ended.
 const STAYS_S: f64 = 2.0;
-/// A ratio is that of a gear within this share \[chosen\]: tyres are known to 3 %, and gears are further apart than twice as much.
+/// A ratio is that of a gear within this fraction \[chosen\]: tyres are known to 3 %, and gears are further apart than twice as much.
 const FITS: f64 = 0.05;
 /// Points of a gear that are needed to judge \[chosen\]; more than half of them have to contradict.
 const ENOUGH: usize = 100;

@@ -11,7 +11,7 @@ use crate::Role;
 
 /// The load is that of so long before the shift, s.
 const LOAD_S: f64 = 0.3;
-/// Slip of the converter that tells who drives: share of the turbine speed, and least size, rad/s.
+/// Slip of the converter that tells who drives: fraction of the turbine speed, and least size, rad/s.
 const SLIP: f64 = 0.02;
 const SLIP_RAD_S: f64 = 3.0;
 /// Engine torque that tells who drives, N m.

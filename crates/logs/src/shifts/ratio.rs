@@ -14,7 +14,7 @@ const OUTPUT_MIN_RAD_S: f64 = 8.0;
 const TURBINE_MIN_RAD_S: f64 = 20.0;
 /// A ratio is in gear within this part of the way to the next gear.
 const BAND: f64 = 0.2;
-/// And within this share.
+/// And within this fraction.
 const BAND_MAX: f64 = 0.04;
 /// A gear counts when the ratio was in it for so long, s, and for so many points.
 const IN_GEAR_S: f64 = 0.1;

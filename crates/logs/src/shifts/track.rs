@@ -69,8 +69,8 @@ impl Track {
             return Some(after_value);
         }
         let &(before_s, before_value) = self.values.get(after.checked_sub(1)?)?;
-        let share = (time_s - before_s) / (after_s - before_s);
-        (after_s - before_s <= apart_s).then_some(before_value + share * (after_value - before_value))
+        let fraction = (time_s - before_s) / (after_s - before_s);
+        (after_s - before_s <= apart_s).then_some(before_value + fraction * (after_value - before_value))
     }
 
     /// The newest time.

@@ -1,6 +1,6 @@
 //! Extended Kalman filter on the powertrain with elastic shafts and unknown torques.
 //!
-//! States: turbine speed `w_t`, output speed `w_0`, torque `T_k` of the shafts' spring, pressure `p`, share `e` by which
+//! States: turbine speed `w_t`, output speed `w_0`, torque `T_k` of the shafts' spring, pressure `p`, fraction `e` by which
 //! the turbine torque differs from the converter's maps, torque `T_ca` of the offgoing clutch.
 //!
 //! ```text
@@ -28,7 +28,7 @@ use crate::{CompliantModel, Estimate, Health, Interval, Phase, Sample, SampleEst
 const WHEEL_AVERAGE_S: f64 = 0.05;
 
 /// Deviation of the speeds' model over a sample, in deviations of a reading \[chosen\]: small beside it.
-const MODEL_SHARE: f64 = 0.1;
+const MODEL_FRACTION: f64 = 0.1;
 
 /// Deviations beside their own size that shaft and offgoing torque may begin with, N m \[chosen\].
 const SHAFT_START_N_M: f64 = 100.0;
@@ -42,7 +42,7 @@ const TURBINE: usize = 0;
 const OUTPUT: usize = 1;
 const SPRING: usize = 2;
 pub(crate) const PRESSURE: usize = 3;
-const SHARE: usize = 4;
+const FRACTION: usize = 4;
 const OFFGOING: usize = 5;
 
 /// Standard deviations of what the filter does not know.
@@ -54,17 +54,17 @@ pub struct FilterNoise<T> {
     pub output_rad_s: T,
     /// Of a reading of the wheel speed, rad/s.
     pub wheel_rad_s: T,
-    /// Of the turbine torque, as a share.
+    /// Of the turbine torque, as a fraction.
     pub turbine_share: T,
-    /// Time after which that share is another during a shift, s.
+    /// Time after which that fraction is another during a shift, s.
     pub turbine_share_s: T,
     /// Of the rate of twist outside a shift, rad/s: with it the shaft torque follows the turbine torque.
     pub twist_rate_rad_s: T,
     /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
     pub output_least_rad_s: T,
-    /// Of the rate of the pressure while it moves, as a share of that rate: errors of lag and delay.
+    /// Of the rate of the pressure while it moves, as a fraction of that rate: errors of lag and delay.
     pub valve_moving: T,
-    /// The same at rest, as a share of the pressure, 1/s: an error of the gain.
+    /// The same at rest, as a fraction of the pressure, 1/s: an error of the gain.
     pub valve_resting_per_s: T,
     /// Time for which an error of the rate persists, s. The filter takes it as white noise of the same power.
     pub valve_rate_s: T,
@@ -207,8 +207,8 @@ impl<T: Real> ExtendedFilter<T> {
     #[inline]
     pub(crate) fn follow(&self, running: &mut Running<T>, interval: &Interval<T>, sample: &Sample<T>) {
         let wheel = T::of(0.5) * (running.last.wheel_rad_s + sample.wheel_rad_s);
-        let share = (interval.dt_s / T::of(WHEEL_AVERAGE_S)).at_most(T::one());
-        running.slow_wheel = running.slow_wheel + share * (wheel - running.slow_wheel);
+        let fraction = (interval.dt_s / T::of(WHEEL_AVERAGE_S)).at_most(T::one());
+        running.slow_wheel = running.slow_wheel + fraction * (wheel - running.slow_wheel);
         let rate = interval.start_rate(running.mean[PRESSURE]).abs();
         running.motion_pa_s = rate.at_least(running.motion_pa_s * lasting(interval.dt_s, self.noise.valve_rate_s));
     }
@@ -289,8 +289,8 @@ impl<T: Real> ExtendedFilter<T> {
         let square = |x: T| x * x;
         let dt = c.interval.dt_s;
         [
-            square(T::of(MODEL_SHARE) * noise.turbine_rad_s),
-            square(T::of(MODEL_SHARE) * noise.output_rad_s),
+            square(T::of(MODEL_FRACTION) * noise.turbine_rad_s),
+            square(T::of(MODEL_FRACTION) * noise.output_rad_s),
             square(c.twist)
                 * (square(noise.wheel_rad_s) + if c.shifting { zero } else { square(noise.twist_rate_rad_s) }),
             T::of(2.0)
@@ -316,10 +316,10 @@ impl<T: Real> ExtendedFilter<T> {
         running.acting = acting;
         let zero = T::zero();
         if before && !now {
-            running.mean[SHARE] = zero;
+            running.mean[FRACTION] = zero;
             for i in 0..N {
-                running.covariance[SHARE][i] = zero;
-                running.covariance[i][SHARE] = zero;
+                running.covariance[FRACTION][i] = zero;
+                running.covariance[i][FRACTION] = zero;
             }
         }
         if now && !before {

@@ -2,7 +2,7 @@
 
 use drivetrain::{AccelerationRow, Real};
 
-use super::{N, OFFGOING, OUTPUT, PRESSURE, SHARE, SPRING, TURBINE};
+use super::{FRACTION, N, OFFGOING, OUTPUT, PRESSURE, SPRING, TURBINE};
 use crate::Interval;
 
 /// What the powertrain does over one interval.
@@ -50,7 +50,7 @@ impl<T: Real> Passage<T> {
         let dt = self.interval.dt_s;
         let oncoming = self.per_pressure * above_kiss_pa;
         let free = |row: &AccelerationRow<T>| {
-            row.per_turbine_torque * self.turbine_n_m * (T::one() + x[SHARE])
+            row.per_turbine_torque * self.turbine_n_m * (T::one() + x[FRACTION])
                 + row.per_oncoming_torque * oncoming
                 + row.per_offgoing_torque * x[OFFGOING]
         };
@@ -64,7 +64,7 @@ impl<T: Real> Passage<T> {
             output,
             x[SPRING] + self.turn * (x[OUTPUT] + output) - self.twist * self.wheel_rad_s,
             self.interval.pressure(x[PRESSURE]),
-            self.stay * x[SHARE],
+            self.stay * x[FRACTION],
             self.keep * x[OFFGOING],
         ]
     }

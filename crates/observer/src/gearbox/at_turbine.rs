@@ -42,7 +42,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let [(turbine_rate, turbine_variance), (output_rate, output_variance)] =
             [self.rate(state, TURBINE)?, self.rate(state, OUTPUT)?];
         let torque_n_m = input.turbine_n_m - m11 * turbine_rate - m12 * output_rate;
-        let variance = square(input.share * input.turbine_n_m.abs().at_least(T::of(LEAST_N_M)))
+        let variance = square(input.fraction * input.turbine_n_m.abs().at_least(T::of(LEAST_N_M)))
             + input.noise
             + square(m11) * (turbine_variance + square(self.uncertainty.inertia_share * turbine_rate))
             + square(m12) * (output_variance + square(self.uncertainty.inertia_share * output_rate));

@@ -2,10 +2,10 @@
 
 use super::running::TURBINE_ACTS;
 use super::{
-    Compared, FIRST_S, GATE, Gate, Gaussian, GearCommand, GearboxFilter, GearboxState, Health, LOAD, LOAD_START,
-    LOST_S, MISFIT, N, NOT_CAUGHT, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR,
-    SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, Slip, TURBINE, WHEEL, WHEEL_START_RAD_S,
-    at_start, square, turbine,
+    Compared, FIRST_S, FRACTION, GATE, Gate, Gaussian, GearCommand, GearboxFilter, GearboxState, Health, LOAD,
+    LOAD_START, LOST_S, MISFIT, N, NOT_CAUGHT, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SLIPS_IN_GEAR,
+    SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, Slip, TURBINE, WHEEL,
+    WHEEL_START_RAD_S, at_start, square, turbine,
 };
 use drivetrain::Real;
 
@@ -193,21 +193,21 @@ impl<T: Real> GearboxFilter<'_, T> {
         deviations[SPRING] = at_start(SHAFT_START, shaft);
         deviations[LOAD] = at_start(LOAD_START, shaft);
         deviations[RATE] = u.rate_rad_s;
-        deviations[SHARE] = u.turbine_share;
+        deviations[FRACTION] = u.turbine_share;
         let mut x = Gaussian::of(mean, deviations);
         let [scale, scale_variance] = state.learnt.known_wheel_scale();
         x.renew(SCALE, u.wheel_scale * scale, square(u.wheel_scale) * scale_variance);
         let known = self.known(&state.learnt, &self.acting_in_gear());
-        x.renew(SLOW_SHARE, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
+        x.renew(SLOW_FRACTION, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
         // Turbine and output are tied.
         let output_variance = square(deviations[OUTPUT]);
         x.add(TURBINE, TURBINE, ratio * ratio * output_variance);
         x.add(TURBINE, OUTPUT, ratio * output_variance);
         // An error of the turbine torque is one of the shaft torque in balance with it.
-        for (share, per) in [(SHARE, shaft), (SLOW_SHARE, torque.share * shaft)] {
-            let variance = x.covariance[share][share];
+        for (fraction, per) in [(FRACTION, shaft), (SLOW_FRACTION, torque.fraction * shaft)] {
+            let variance = x.covariance[fraction][fraction];
             x.add(SPRING, SPRING, variance * per * per);
-            x.add(SPRING, share, variance * per);
+            x.add(SPRING, fraction, variance * per);
         }
         x
     }

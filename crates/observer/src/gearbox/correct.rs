@@ -82,8 +82,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         let mut look = running.x.look(&measured);
         let variance = look.variance;
         if k != WHEEL {
-            let share = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
-            running.misfit = running.misfit + share * (innovation * innovation / variance - running.misfit);
+            let fraction = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
+            running.misfit = running.misfit + fraction * (innovation * innovation / variance - running.misfit);
         }
         match running.gates[k].judge(innovation, variance) {
             Verdict::Refused => return ChannelHealth::Refused,
@@ -101,11 +101,11 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Whether the wheel speed is that of the output within the bound of its scale, over more than a swing of the drive shafts. What is
     /// further off is no speed of these wheels: of others that slip, or of a car with another final ratio.
     fn is_of_this_car(&self, running: &mut Running<T>, reading: &Reading<T>, age_s: T) -> bool {
-        let share = running.silent_s[WHEEL] / (running.silent_s[WHEEL] + T::of(WHEEL_S));
+        let fraction = running.silent_s[WHEEL] / (running.silent_s[WHEEL] + T::of(WHEEL_S));
         running.silent_s[WHEEL] = T::zero();
         let by_output = (running.x.mean[OUTPUT] - age_s * running.rates[OUTPUT]) / self.driveline.final_ratio;
         let off = reading.value - by_output;
-        running.wheel_off_rad_s = running.wheel_off_rad_s + share * (off - running.wheel_off_rad_s);
+        running.wheel_off_rad_s = running.wheel_off_rad_s + fraction * (off - running.wheel_off_rad_s);
         let scale = T::of(EDGE) * self.uncertainty.wheel_scale * by_output.abs();
         running.wheel_off_rad_s.abs() <= scale + T::of(TWIST_RAD / WHEEL_S)
     }

@@ -161,12 +161,12 @@ impl<T: Real> Gaussian<T> {
         PressureError { pressure: self.mean[x], kiss: self.mean[k], variance: [p[x][x], p[k][k]], covariance: p[x][k] }
     }
 
-    /// Makes the first state the second times a ratio; the second becomes the sum of both with these shares.
-    pub(super) fn tie(&mut self, ratio: T, share: [T; 2]) {
-        let joined = |a: T, b: T| share[0] * a + share[1] * b;
+    /// Makes the first state the second times a ratio; the second becomes the sum of both with these fractions.
+    pub(super) fn tie(&mut self, ratio: T, fraction: [T; 2]) {
+        let joined = |a: T, b: T| fraction[0] * a + fraction[1] * b;
         let output = joined(self.mean[TURBINE], self.mean[OUTPUT]);
         (self.mean[TURBINE], self.mean[OUTPUT]) = (ratio * output, output);
-        self.timing.tie(ratio, share);
+        self.timing.tie(ratio, fraction);
         let p = &mut self.covariance;
         for row in p.iter_mut() {
             let output = joined(row[TURBINE], row[OUTPUT]);

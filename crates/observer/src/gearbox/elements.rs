@@ -121,7 +121,7 @@ pub(super) struct ElementState<T> {
     /// Pressure by the valve model, Pa, and its rate over the last step, Pa/s.
     pub(super) valve_pa: T,
     rate_pa_s: T,
-    /// Change of the pressure per share by which the lag is longer, Pa: `q' = -q/tau - p'`, with the other sign.
+    /// Change of the pressure per fraction by which the lag is longer, Pa: `q' = -q/tau - p'`, with the other sign.
     per_lag_pa: T,
     /// What is learnt of lag and delay.
     timing: ValveTiming<T>,
@@ -154,7 +154,7 @@ impl<T: Real> ElementState<T> {
     pub(super) fn take_timing(&mut self, element: &FrictionElement<T>, timing: &ValveTiming<T>) {
         let ([lag, delay], u) = (timing.mean, &element.uncertainty);
         self.timing = *timing;
-        self.lag = (T::one() + u.valve_lag_share * lag).at_least(T::of(LAG_LEAST));
+        self.lag = (T::one() + u.valve_lag_fraction * lag).at_least(T::of(LAG_LEAST));
         self.delay_s = (element.valve.delay_s + u.valve_delay_s * delay).at_least(T::zero());
     }
 
@@ -299,7 +299,7 @@ impl<T: Real> ElementState<T> {
 
     /// Change of the pressure by a lag and a delay that are longer by one deviation, Pa.
     fn by_timing_pa(&self, u: &ElementUncertainty<T>) -> [T; 2] {
-        [-u.valve_lag_share * self.per_lag_pa / self.lag, -u.valve_delay_s * self.rate_pa_s]
+        [-u.valve_lag_fraction * self.per_lag_pa / self.lag, -u.valve_delay_s * self.rate_pa_s]
     }
 
     /// The pressure on the plates, by what is known of its errors. The plates do not pull: near the kiss point the mean of the
@@ -338,7 +338,7 @@ impl<T: Real> ElementState<T> {
         ClutchTorque {
             ratio: shift.ratio,
             base_n_m: per_pa * (pressed_pa - slope * error_pa - by_fill_pa),
-            per_friction_n_m: u.torque_share * per_pa * pressed_pa,
+            per_friction_n_m: u.torque_fraction * per_pa * pressed_pa,
             per_kiss_n_m: -per_pa * slope * kiss_pa,
             per_pressure_n_m: per_pa * per_pressure_pa,
             by_timing: self.by_timing_pa(u).map(|by_pa| per_timing * by_pa),
@@ -359,7 +359,7 @@ impl<T: Real> ElementState<T> {
         let clutch = &element.clutch;
         let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
         let per_pa = shift.alpha.abs() * friction * clutch.lever() * clutch.piston_area_m2;
-        per_pa * self.pressing(element, wrong).pressed_pa * (T::one() + element.uncertainty.torque_share * factor)
+        per_pa * self.pressing(element, wrong).pressed_pa * (T::one() + element.uncertainty.torque_fraction * factor)
     }
 
     /// Guaranteed range of the pressure, Pa.

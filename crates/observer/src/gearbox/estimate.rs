@@ -6,12 +6,12 @@ use super::elements::{ElementState, PressureError};
 use super::phases::Slip;
 use super::powertrain::{ClutchTorque, Torques};
 use super::{
-    ClutchesAtTurbine, FRICTION, GearCommand, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS, N, Newest,
-    OUTPUT, PRESSURE, SHARE, SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+    ClutchesAtTurbine, FRACTION, FRICTION, GearCommand, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS,
+    N, Newest, OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
 };
 use crate::{ChannelHealth, Channels, Health};
 
-/// Share of the valve model's uncertainty above which the speeds have shown nothing of a clutch's torque \[chosen\].
+/// Fraction of the valve model's uncertainty above which the speeds have shown nothing of a clutch's torque \[chosen\].
 const HIDDEN: f64 = 0.9;
 
 /// Pressure and torque of one clutch of a shift.
@@ -123,7 +123,9 @@ impl<T: Real> GearboxFilter<'_, T> {
                 let (x, line) = (&running.x.mean, &self.driveline);
                 let damper = line.shaft_damping_n_m_s_rad * line.twist_rate(x[OUTPUT], x[WHEEL]);
                 let turbine_n_m = running.torques.map_or(running.slow_n_m, |torques| {
-                    torques.turbine_n_m + x[SHARE] * torques.share_n_m + x[SLOW_SHARE] * torques.slow_share_n_m
+                    torques.turbine_n_m
+                        + x[FRACTION] * torques.fraction_n_m
+                        + x[SLOW_FRACTION] * torques.slow_fraction_n_m
                 });
                 estimate.gear = Some(match &running.shift {
                     Some(shift) => GearCommand { from: shift.from, to: shift.to },

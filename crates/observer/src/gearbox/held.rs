@@ -59,7 +59,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let [by_turbine, by_output] = shift.mass_kg_m2[0];
         let inertia_n_m = by_turbine * turbine + by_output * output;
         let turbine_n_m = torque.map_or(T::zero(), |found| {
-            found.turbine_n_m.abs() * (T::one() + T::of(BOUND) * found.share) + T::of(NOISE) * found.noise.sqrt()
+            found.turbine_n_m.abs() * (T::one() + T::of(BOUND) * found.fraction) + T::of(NOISE) * found.noise.sqrt()
         });
         let [off, on] = shift.clutches.each_ref().map(|clutch| {
             let ranges = self

@@ -20,7 +20,7 @@
 //! ```
 //!
 //! **Stiffness.** The scale of all torques that the speeds show is that of the twist of the drive shafts. A shaft that is
-//! softer by a share shows turbine torque, torque factors and inertia larger by that share, in each shift alike: the
+//! softer by a fraction shows turbine torque, torque factors and inertia larger by that fraction, in each shift alike: the
 //! direction `s`. Without `e` the shifts together would find the torque factors and inertias with a certainty that they do not have.
 //!
 //! **Another car, or a bad log.** What is learnt is one of two hypotheses; the other is that the car is any of the budget.
@@ -131,11 +131,11 @@ pub struct Learnt<T> {
 /// What is learnt of an element: error and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LearntElement<T> {
-    /// Of the torque that it carries at a pressure well above its kiss point, as a share: friction times gain.
-    pub torque_share: [T; 2],
+    /// Of the torque that it carries at a pressure well above its kiss point, as a fraction: friction times gain.
+    pub torque_fraction: [T; 2],
     /// Of its kiss point, Pa.
     pub kiss_pa: [T; 2],
-    /// Of the valve's gain, as a share. Speeds and commands do not tell it apart from a friction and a kiss point of the
+    /// Of the valve's gain, as a fraction. Speeds and commands do not tell it apart from a friction and a kiss point of the
     /// element: its deviation stays large.
     pub valve_gain: [T; 2],
 }
@@ -303,20 +303,20 @@ impl<T: Real> Learnt<T> {
         }
     }
 
-    /// Takes a measurement of the sum of two errors, as a share: of the converter's capacity and of the reported engine torque, whose deviations
+    /// Takes a measurement of the sum of two errors, as a fraction: of the converter's capacity and of the reported engine torque, whose deviations
     /// unlearnt are these. Where it is further from what is known than both may be, at their bounds and with three deviations of the noise,
     /// one of them is not that of this car, and nothing follows.
-    pub(super) fn take_capacity(&mut self, share: T, [capacity, reported]: [T; 2], noise: T) {
+    pub(super) fn take_capacity(&mut self, fraction: T, [capacity, reported]: [T; 2], noise: T) {
         let bound = T::of(EDGE) * (capacity + reported) + T::of(3.0) * noise.sqrt();
         let with = self.covariance.map(|row| capacity * row[TURBINE_AT] + reported * row[REPORTED_AT]);
         let variance = capacity * with[TURBINE_AT] + reported * with[REPORTED_AT] + noise;
         let expected = capacity * self.mean[TURBINE_AT] + reported * self.mean[REPORTED_AT];
-        if !(share.abs() <= bound && variance > T::zero()) {
+        if !(fraction.abs() <= bound && variance > T::zero()) {
             return;
         }
         let per = variance.sqrt().recip();
         let with = with.map(|covariance| per * covariance);
-        let innovation = per * (share - expected);
+        let innovation = per * (fraction - expected);
         for (k, (mean, with)) in self.mean.iter_mut().zip(&with).enumerate() {
             let edge = T::of(edge(k));
             *mean = (*mean + *with * innovation).max(-edge).min(edge);

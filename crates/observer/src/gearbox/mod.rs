@@ -6,9 +6,9 @@
 //! | `T_s` | `K_s (w_o/i_df - w_w + r)` | torque of the shafts' spring, N m |
 //! | `T_L` | random walk | load at the wheels: road, grade, mass, brake, tyre, N m |
 //! | `r` | random walk | error of the rate of twist: what a scale leaves of the wheel speed's error, as by a delay, rad/s |
-//! | `s` | constant | error of the scale of the wheel speed, as a share: its reading is that of `(1 + s) w_w` |
-//! | `b` | fades in seconds | share by which the turbine torque differs from its sources |
-//! | `c` | fades in hours, unit variance | the part of that share that lasts |
+//! | `s` | constant | error of the scale of the wheel speed, as a fraction: its reading is that of `(1 + s) w_w` |
+//! | `b` | fades in seconds | fraction by which the turbine torque differs from its sources |
+//! | `c` | fades in hours, unit variance | the part of that fraction that lasts |
 //! | `f_off`, `f_on` | random walk, unit variance | error of the clutch's torque: friction and valve gain, which show as one |
 //! | `k_off`, `k_on` | constant, unit variance | error of its kiss point |
 //! | `x_off`, `x_on` | fades in 0.15 s, unit variance | error of the valve model's pressure: lag and delay; and of the fill, which ends with it |
@@ -95,15 +95,15 @@ const SPRING: usize = 3;
 const LOAD: usize = 4;
 const RATE: usize = 5;
 const SCALE: usize = 6;
-const SHARE: usize = 7;
-const SLOW_SHARE: usize = 8;
+const FRACTION: usize = 7;
+const SLOW_FRACTION: usize = 8;
 /// Of the offgoing and of the oncoming clutch.
 const FRICTION: [usize; 2] = [9, 10];
 const KISS: [usize; 2] = [11, 12];
 const PRESSURE: [usize; 2] = [13, 14];
 const INERTIA: usize = 15;
 /// The states that are learnt. Lag and delay of the valves are learnt beside them, and are none.
-const LASTING: [usize; STATES_ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS[1], INERTIA, SLOW_SHARE];
+const LASTING: [usize; STATES_ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS[1], INERTIA, SLOW_FRACTION];
 
 /// Longest time that is predicted at once, s; a longer one is cut.
 const PIECE_S: f64 = 0.0125;
@@ -112,8 +112,8 @@ const MOST_PIECES: usize = 32;
 const GAP_S: f64 = 0.025;
 /// How old the first readings may be, s.
 const FIRST_S: f64 = 0.05;
-/// Low-pass of the turbine torque that the share `b` multiplies, s.
-const SHARE_S: f64 = 0.06;
+/// Low-pass of the turbine torque that the fraction `b` multiplies, s.
+const FRACTION_S: f64 = 0.06;
 /// How long the drive shafts twist in one direction, s: half a swing \[chosen\].
 const TWIST_S: f64 = 0.1;
 /// Time over which the wheel speed is compared with that of the output, s, and the largest twist of the drive shafts, rad \[chosen\].
@@ -122,11 +122,11 @@ const TWIST_RAD: f64 = 0.3;
 /// Deviation of the age of the last tooth, in the time between two.
 const TOOTH: f64 = 0.6;
 /// Deviation of the model of the speeds over 10 ms, in deviations of a reading.
-const MODEL_SHARE: f64 = 0.1;
+const MODEL_FRACTION: f64 = 0.1;
 /// Deviations of an innovation beyond which a reading is refused.
 const GATE: u8 = 5;
-/// Deviations at the start \[chosen\]: of the rate of twist, as an error of the wheel speed, rad/s; of the shaft torque beside the share
-/// `b`, and of the load about the shaft torque, each as a share and beside it, N m: the car may accelerate or brake.
+/// Deviations at the start \[chosen\]: of the rate of twist, as an error of the wheel speed, rad/s; of the shaft torque beside the fraction
+/// `b`, and of the load about the shaft torque, each as a fraction and beside it, N m: the car may accelerate or brake.
 const WHEEL_START_RAD_S: f64 = 0.3;
 const SHAFT_START: (f64, f64) = (0.3, 100.0);
 const LOAD_START: (f64, f64) = (1.0, 400.0);
@@ -469,9 +469,9 @@ fn pieces<T: Real>(dt_s: T) -> (usize, T) {
     (pieces, dt_s / T::of(pieces as f64))
 }
 
-/// A deviation as a share of a value and beside it.
-fn at_start<T: Real>((share, beside): (f64, f64), value: T) -> T {
-    T::of(share) * value.abs() + T::of(beside)
+/// A deviation as a fraction of a value and beside it.
+fn at_start<T: Real>((fraction, beside): (f64, f64), value: T) -> T {
+    T::of(fraction) * value.abs() + T::of(beside)
 }
 
 impl<T: Real> GearboxState<T> {

@@ -22,9 +22,9 @@ use drivetrain::Real;
 const THRESHOLD: (f64, f64) = (3.5, 0.3);
 /// Deviations of the slip above which it may be one: then no reading of turbine and output is taken while a clutch holds.
 const MAYBE: f64 = 2.0;
-/// Share of the threshold below which a clutch has caught, and samples in a row.
+/// Fraction of the threshold below which a clutch has caught, and samples in a row.
 const CAUGHT: (f64, u8) = (0.7, 2);
-/// Share of a new slip in the mean of those of a clutch that holds \[chosen\]: some five samples.
+/// Fraction of a new slip in the mean of those of a clutch that holds \[chosen\]: some five samples.
 const MEAN: f64 = 0.3;
 /// Readings in a row above the threshold after which a slip is believed.
 const BELIEVED: u8 = 3;
@@ -247,14 +247,14 @@ impl<T: Real> PhaseMemory<T> {
 
     /// Whether the slip of the clutch that holds is small and lasts: the mean of it is over a threshold of its own.
     fn slip_lasts(&mut self, slip: &Slip<T>) -> bool {
-        let share = T::of(MEAN);
+        let fraction = T::of(MEAN);
         if slip.value.is_finite() {
             // What is above the threshold is judged by itself.
             let limit = slip.threshold();
             let value = slip.value.at_least(-limit).at_most(limit);
-            self.mean_rad_s = self.mean_rad_s + share * (value - self.mean_rad_s);
+            self.mean_rad_s = self.mean_rad_s + fraction * (value - self.mean_rad_s);
         }
-        let deviation = slip.deviation * (share / (T::of(2.0) - share)).sqrt();
+        let deviation = slip.deviation * (fraction / (T::of(2.0) - fraction)).sqrt();
         Slip { value: self.mean_rad_s, deviation }.is_over()
     }
 

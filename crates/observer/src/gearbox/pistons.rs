@@ -43,12 +43,12 @@ pub struct Piston<T> {
 }
 
 impl Piston<f64> {
-    /// A piston in this cylinder. `fill_share` is the standard deviation of the time that a fill takes, as a share: volume of the
+    /// A piston in this cylinder. `fill_fraction` is the standard deviation of the time that a fill takes, as a fraction: volume of the
     /// stroke and resistance of the passages.
-    pub fn new(cylinder: Cylinder<f64>, fill_share: f64) -> Self {
+    pub fn new(cylinder: Cylinder<f64>, fill_fraction: f64) -> Self {
         let each = AWAY.map(|[late, more]| {
-            // A fill that is longer by a share has a longer stroke by it.
-            let longer = 1.0 + late.abs() * fill_share;
+            // A fill that is longer by a fraction has a longer stroke by it.
+            let longer = 1.0 + late.abs() * fill_fraction;
             [cylinder.stroke_m3 * if late < 0.0 { longer.recip() } else { longer }, more]
         });
         Self { cylinder, each }
@@ -221,7 +221,7 @@ mod tests {
     use drivetrain::{Clutch, Table1};
     use std::vec::Vec;
 
-    const FILL_SHARE: f64 = 0.16;
+    const FILL_FRACTION: f64 = 0.16;
     const ERROR_PA: f64 = 11e3;
 
     fn piston() -> Piston<f64> {
@@ -233,7 +233,7 @@ mod tests {
             friction: Table1::constant(0.13),
             static_friction: 0.14,
         };
-        Piston::new(Cylinder::of_clutch(&clutch), FILL_SHARE)
+        Piston::new(Cylinder::of_clutch(&clutch), FILL_FRACTION)
     }
 
     /// A pulse, a hold just above the kiss point, and a ramp: the pressure after so many steps of 10 ms, straight between them, Pa.
@@ -274,8 +274,8 @@ mod tests {
         (-10..=10).flat_map(|late| (-10..=10).map(move |more| [of(late), of(more)])).collect()
     }
 
-    /// By how much the share of nine pistons differs at most from that of all errors, on one side of any line through both.
-    fn largest_error_of_a_share(all: &[[f64; 2]]) -> f64 {
+    /// By how much the fraction of nine pistons differs at most from that of all errors, on one side of any line through both.
+    fn largest_error_of_a_fraction(all: &[[f64; 2]]) -> f64 {
         let mut most = 0.0_f64;
         for degrees in 0..180 {
             let (b, a) = f64::from(degrees).to_radians().sin_cos();
@@ -293,12 +293,12 @@ mod tests {
     #[test]
     fn as_many_pistons_touch_as_is_said() {
         let (piston, all) = (piston(), uniform_errors());
-        let bound = largest_error_of_a_share(&all);
+        let bound = largest_error_of_a_fraction(&all);
         assert!(bound < 0.18, "nine: {bound}");
         let mut touching = [0.0; 80];
         for [late, more] in &all {
             let cylinder =
-                Cylinder { stroke_m3: (1.0 + FILL_SHARE * late) * piston.cylinder.stroke_m3, ..piston.cylinder };
+                Cylinder { stroke_m3: (1.0 + FILL_FRACTION * late) * piston.cylinder.stroke_m3, ..piston.cylinder };
             let mut volume = 0.0;
             for (k, touching) in touching.iter_mut().enumerate() {
                 for part in 1..=10 {

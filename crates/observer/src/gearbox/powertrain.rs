@@ -14,7 +14,7 @@ use drivetrain::{Driveline, Real};
 use super::covariance::Gaussian;
 use super::timing::ByTiming;
 use super::{
-    FRICTION, INERTIA, KISS, LOAD, N, OUTPUT, PRESSURE, RATE, SHARE, SLOW_SHARE, SPEEDS, SPRING, TURBINE, WHEEL,
+    FRACTION, FRICTION, INERTIA, KISS, LOAD, N, OUTPUT, PRESSURE, RATE, SLOW_FRACTION, SPEEDS, SPRING, TURBINE, WHEEL,
 };
 
 /// States with a law of their own.
@@ -98,11 +98,11 @@ impl<T: Real> ClutchTorque<T> {
 pub(super) struct Torques<T> {
     /// Turbine torque by its sources, N m.
     pub(super) turbine_n_m: T,
-    /// The same low-passed: what the share `b` multiplies. With the raw one the noise of the speeds would be in reading
-    /// and factor, which pulls the share to one side.
-    pub(super) share_n_m: T,
+    /// The same low-passed: what the fraction `b` multiplies. With the raw one the noise of the speeds would be in reading
+    /// and factor, which pulls the fraction to one side.
+    pub(super) fraction_n_m: T,
     /// The same times the deviation of the part of its error that lasts.
-    pub(super) slow_share_n_m: T,
+    pub(super) slow_fraction_n_m: T,
     /// `M11 w_t'` times the deviation of `M11`.
     pub(super) inertia_n_m: T,
     pub(super) clutches: [ClutchTorque<T>; 2],
@@ -114,8 +114,8 @@ impl<T: Real> Torques<T> {
         let half = T::of(0.5);
         Self {
             turbine_n_m: half * (self.turbine_n_m + other.turbine_n_m),
-            share_n_m: half * (self.share_n_m + other.share_n_m),
-            slow_share_n_m: half * (self.slow_share_n_m + other.slow_share_n_m),
+            fraction_n_m: half * (self.fraction_n_m + other.fraction_n_m),
+            slow_fraction_n_m: half * (self.slow_fraction_n_m + other.slow_fraction_n_m),
             inertia_n_m: half * (self.inertia_n_m + other.inertia_n_m),
             clutches: [self.clutches[0].mean(&other.clutches[0]), self.clutches[1].mean(&other.clutches[1])],
         }
@@ -141,8 +141,8 @@ impl<T: Real> Torques<T> {
     pub(super) fn row(&self, per: [T; 2]) -> ([T; N], T) {
         let mut row = [T::zero(); N];
         let mut rest = per[0] * self.turbine_n_m;
-        row[SHARE] = per[0] * self.share_n_m;
-        row[SLOW_SHARE] = per[0] * self.slow_share_n_m;
+        row[FRACTION] = per[0] * self.fraction_n_m;
+        row[SLOW_FRACTION] = per[0] * self.slow_fraction_n_m;
         row[INERTIA] = -per[0] * self.inertia_n_m;
         for (c, clutch) in self.clutches.iter().enumerate() {
             let per_clutch = clutch.ratio * per[1] - per[0];
@@ -268,11 +268,11 @@ impl<T: Real> Motion<T> {
                 }
             }
             power = next;
-            let share = dt_s / T::of((n + 1) as f64);
+            let fraction = dt_s / T::of((n + 1) as f64);
             for ((phi, integral), power) in phi.iter_mut().zip(&mut integral).zip(&power) {
                 for ((phi, integral), power) in phi.iter_mut().zip(integral.iter_mut()).zip(power) {
                     *phi = *phi + *power;
-                    *integral = *integral + share * *power;
+                    *integral = *integral + fraction * *power;
                 }
             }
         }
@@ -324,11 +324,11 @@ mod tests {
             by_timing: [0.0; 2],
             open_loop_n_m: base_n_m,
         };
-        let (slow_share_n_m, inertia_n_m) = (6.0, -3.0);
+        let (slow_fraction_n_m, inertia_n_m) = (6.0, -3.0);
         Torques {
             turbine_n_m: 120.0,
-            share_n_m: 115.0,
-            slow_share_n_m,
+            fraction_n_m: 115.0,
+            slow_fraction_n_m,
             inertia_n_m,
             clutches: [clutch(4.7, -20.0), clutch(3.13, 90.0)],
         }
@@ -381,7 +381,8 @@ mod tests {
         let kinetic = x[TURBINE] * (MASS[0][0] * turbine + MASS[0][1] * output)
             + x[OUTPUT] * (MASS[1][0] * turbine + MASS[1][1] * output);
         let shaft = x[SPRING] + LINE.shaft_damping_n_m_s_rad * (x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE]);
-        let input = torques.turbine_n_m + x[SHARE] * torques.share_n_m + x[SLOW_SHARE] * torques.slow_share_n_m;
+        let input =
+            torques.turbine_n_m + x[FRACTION] * torques.fraction_n_m + x[SLOW_FRACTION] * torques.slow_fraction_n_m;
         let input = (input - x[INERTIA] * torques.inertia_n_m) * x[TURBINE];
         let heat: f64 = (0..2)
             .map(|c| {

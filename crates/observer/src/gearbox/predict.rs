@@ -1,8 +1,8 @@
 //! The prediction over a step, and the phase.
 
 use super::{
-    CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, GearboxFilter, LOAD, MAX_ELEMENTS,
-    MODEL_SHARE, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SCALE, SHARE, SHARE_S, SPRING, ShiftRow,
+    CORE, ClutchTorque, Contact, ElementState, FRACTION, FRACTION_S, FRICTION, FrictionElement, GearboxFilter, LOAD,
+    MAX_ELEMENTS, MODEL_FRACTION, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SCALE, SPRING, ShiftRow,
     TURBINE, TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
 };
 use crate::gearbox::elements::positive_part;
@@ -45,9 +45,9 @@ impl<T: Real> GearboxFilter<'_, T> {
                 }
             }
         }
-        let share_n_m = running.slow_n_m;
-        let slow_share_n_m = found.share * share_n_m;
-        Torques { turbine_n_m: found.turbine_n_m, share_n_m, slow_share_n_m, inertia_n_m, clutches }
+        let fraction_n_m = running.slow_n_m;
+        let slow_fraction_n_m = found.fraction * fraction_n_m;
+        Torques { turbine_n_m: found.turbine_n_m, fraction_n_m, slow_fraction_n_m, inertia_n_m, clutches }
     }
 
     pub(super) fn element<'s>(
@@ -68,8 +68,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         (speeds, read): ([T; 2], [bool; 2]),
         dt_s: T,
     ) {
-        let share = dt_s / (dt_s + T::of(SHARE_S));
-        running.slow_n_m = running.slow_n_m + share * (torque.turbine_n_m - running.slow_n_m);
+        let fraction = dt_s / (dt_s + T::of(FRACTION_S));
+        running.slow_n_m = running.slow_n_m + fraction * (torque.turbine_n_m - running.slow_n_m);
         for (c, clutch) in running.shift.iter().flat_map(|shift| &shift.clutches).enumerate() {
             let lasts = self.element(elements, clutch.element).and_then(|(memory, _)| memory.error_lasts());
             if let Some(lasts) = lasts {
@@ -101,16 +101,16 @@ impl<T: Real> GearboxFilter<'_, T> {
         let new = || Motion::new(response, &self.driveline, self.wheels_kg_m2, dt_s, u.fading_s());
         let motion = running.motion.get_or_insert_with(new);
         let (rows, rest) = motion.rows(torques);
-        let (by_torque, [share, pressure]) = (motion.per_turbine_torque(), motion.stay);
+        let (by_torque, [fraction, pressure]) = (motion.per_turbine_torque(), motion.stay);
         let x = &mut running.x;
         let twist_rate = self.driveline.twist_rate(x.mean[OUTPUT], x.mean[WHEEL]) + x.mean[RATE];
         let by_timing = torques.by_timing();
         x.timing.add_pressure(&by_timing);
         x.pass(&rows, &rest);
         x.timing.add_pressure(&by_timing.map(|by| by.map(|by| -by)));
-        x.fade(SHARE, share);
+        x.fade(FRACTION, fraction);
         // An error of the stiffness that does not last: in one direction of the torque it is another than in the other.
-        let by_stiffness = u.stiffness_share * self.driveline.shaft_stiffness_n_m_rad * twist_rate;
+        let by_stiffness = u.stiffness_fraction * self.driveline.shaft_stiffness_n_m_rad * twist_rate;
         x.add(SPRING, SPRING, T::of(2.0 * TWIST_S) * dt_s * square(by_stiffness));
         if let Some(shift) = running.shift {
             for (c, clutch) in shift.clutches.iter().enumerate() {
@@ -131,7 +131,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         for (state, walk) in [(LOAD, u.load_walk), (RATE, u.rate_walk), (SCALE, u.wheel_scale_walk)] {
             x.add(state, state, walk * walk * dt_s);
         }
-        x.add(SHARE, SHARE, u.turbine_share * u.turbine_share * (T::one() - share * share));
+        x.add(FRACTION, FRACTION, u.turbine_share * u.turbine_share * (T::one() - fraction * fraction));
         for i in 0..CORE {
             for j in i..CORE {
                 x.add(i, j, torque_noise * by_torque[i] * by_torque[j]);
@@ -139,7 +139,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         // What the model leaves out moves both speeds alike while a clutch ties them.
         let model =
-            |k: usize| T::of(MODEL_SHARE * MODEL_SHARE * 100.0) * dt_s * square(self.readings[k].deviation_rad_s);
+            |k: usize| T::of(MODEL_FRACTION * MODEL_FRACTION * 100.0) * dt_s * square(self.readings[k].deviation_rad_s);
         x.add(WHEEL, WHEEL, model(WHEEL));
         x.add(OUTPUT, OUTPUT, model(OUTPUT));
         match self.tied_ratio(running) {
@@ -229,8 +229,8 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// momentum of both along `(w_t, w_o) = (i, 1)`, whenever since the last sample it has gripped. Nothing else follows.
     pub(super) fn tie(running: &mut Running<T>, shift: &ShiftRow<T>, ratio: T) {
         let (m, per) = (&shift.mass_kg_m2, shift.inertia_at(ratio).recip());
-        let share = [TURBINE, OUTPUT].map(|k| per * (ratio * m[0][k] + m[1][k]));
-        running.x.tie(ratio, share);
+        let fraction = [TURBINE, OUTPUT].map(|k| per * (ratio * m[0][k] + m[1][k]));
+        running.x.tie(ratio, fraction);
     }
 
     /// The torque at the turbine with which a clutch holds, as a row over the states and what is left beside them:

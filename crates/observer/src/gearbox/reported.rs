@@ -7,7 +7,7 @@
 //! sum of (T_e dt - I_e dw_e) = (1 + c + q) sum of T_p dt          T_e: as reported, T_p: by the maps
 //! ```
 //!
-//! with the error `c` of the converter's capacity and the error `q` of the reported torque, both as shares. So the reported torque and
+//! with the error `c` of the converter's capacity and the error `q` of the reported torque, both as fractions. So the reported torque and
 //! the maps together are known better than either. The sums need no acceleration of the engine, which a filter of its speed has late
 //! and with noise; a reported torque that comes late errs at both ends of the time only. `q` is learnt beside `c`
 //! ([`super::Learnt`]): the same error in the next gear is no news.
@@ -17,7 +17,7 @@ use drivetrain::Real;
 use super::turbine::{InputSide, LEAST_N_M, TurbineTorque};
 use super::{GearboxFilter, Learnt, Running, square};
 
-/// Torques that are compared, in the torque below which an error is no share of it: 20 N m; and speed ratios up to which the pump's
+/// Torques that are compared, in the torque below which an error is no fraction of it: 20 N m; and speed ratios up to which the pump's
 /// torque is well known \[chosen\].
 const FROM: f64 = 2.0;
 const MOST_SPEED_RATIO: f64 = 0.9;
@@ -63,10 +63,10 @@ impl<T: Real> Compared<T> {
         }
     }
 
-    /// The sum of both errors, as a share, and the time that it is of, s.
+    /// The sum of both errors, as a fraction, and the time that it is of, s.
     fn errors(&self) -> Option<(T, T)> {
-        let share = self.engine_n_m_s / self.pump_n_m_s - T::one();
-        (self.time_s >= T::of(ENOUGH_S) && share.is_finite()).then_some((share, self.time_s))
+        let fraction = self.engine_n_m_s / self.pump_n_m_s - T::one();
+        (self.time_s >= T::of(ENOUGH_S) && fraction.is_finite()).then_some((fraction, self.time_s))
     }
 }
 
@@ -86,12 +86,12 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Learns what the time in a gear has shown of the converter's capacity. The parts of both errors that do not last are another in
     /// [`super::ShiftUncertainty::turbine_share_s`], and their mean over a longer time is smaller.
     pub(super) fn learn_capacity(&self, running: &Running<T>, learnt: &mut Learnt<T>) {
-        let Some((share, time_s)) = running.compared.errors() else { return };
+        let Some((fraction, time_s)) = running.compared.errors() else { return };
         let u = &self.uncertainty;
         let lasting = [self.turbine.converter_share, self.turbine.engine_share];
         let two = T::of(2.0);
         let noise = two * square(u.turbine_share) / (T::one() + time_s / (two * u.turbine_share_s));
-        learnt.take_capacity(share, lasting, noise);
+        learnt.take_capacity(fraction, lasting, noise);
     }
 }
 
@@ -140,13 +140,13 @@ mod tests {
         let never = |_: f64| false;
         let reported = |time_s: f64| Some(swinging(time_s)[1]);
         // What the inertia takes is reported 5 % low too, and not at the ends of whole swings.
-        let (share, time_s) = compared(10.0, reported, never).unwrap();
-        assert!((share - (1.1 * 0.95 - 1.0)).abs() < 0.003 && (time_s - 10.0).abs() < 0.02, "{share} {time_s}");
+        let (fraction, time_s) = compared(10.0, reported, never).unwrap();
+        assert!((fraction - (1.1 * 0.95 - 1.0)).abs() < 0.003 && (time_s - 10.0).abs() < 0.02, "{fraction} {time_s}");
         let (late, _) = compared(10.0, |time_s| reported(time_s - 0.03), never).unwrap();
-        assert!((late - share).abs() < 0.003, "{late} {share}");
+        assert!((late - fraction).abs() < 0.003, "{late} {fraction}");
         // Without the inertia of the engine a single second would be off by a tenth.
         let (second, _) = compared(1.5, reported, never).unwrap();
-        assert!((second - share).abs() < 0.01, "{second}");
+        assert!((second - fraction).abs() < 0.01, "{second}");
     }
 
     #[test]
@@ -154,15 +154,15 @@ mod tests {
         let now_and_then = |time_s: f64| time_s % 1.0 > 0.3;
         let wrong =
             |time_s: f64| Some(if now_and_then(time_s) { 10.0 * swinging(time_s)[1] } else { swinging(time_s)[1] });
-        let (share, time_s) = compared(20.0, wrong, now_and_then).unwrap();
-        assert!((share - 0.045).abs() < 0.01 && (5.0..7.0).contains(&time_s), "{share} {time_s}");
+        let (fraction, time_s) = compared(20.0, wrong, now_and_then).unwrap();
+        assert!((fraction - 0.045).abs() < 0.01 && (5.0..7.0).contains(&time_s), "{fraction} {time_s}");
         let holes = |time_s: f64| (!now_and_then(time_s)).then(|| swinging(time_s)[1]);
         assert_eq!(compared(20.0, holes, |_| false), compared(20.0, wrong, now_and_then));
         for nothing in [None, Some(f64::NAN), Some(5.0), Some(-100.0)] {
             assert_eq!(compared(5.0, |_| nothing, |_| false), None);
         }
         let huge = compared(5.0, |_| Some(f64::MAX), |_| false);
-        assert!(huge.is_none_or(|(share, _)| share > 1e300), "{huge:?}");
+        assert!(huge.is_none_or(|(fraction, _)| fraction > 1e300), "{huge:?}");
         assert_eq!(compared(0.5, |time_s| Some(swinging(time_s)[1]), |_| false), None);
     }
 

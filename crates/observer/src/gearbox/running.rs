@@ -4,7 +4,7 @@ use super::timing::ByTiming;
 use super::{
     ACTING, Acting, Compared, Correlations, ElementState, ElementUncertainty, FRICTION, GearboxFilter, IN_GEAR,
     INERTIA, KISS, Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, ONE_WAY, PRESSURE, PhaseMemory,
-    Running, SCALE, SLOW_SHARE, STATES_ACTING, ShiftPhase, ShiftRow, Slip,
+    Running, SCALE, SLOW_FRACTION, STATES_ACTING, ShiftPhase, ShiftRow, Slip,
 };
 use drivetrain::Real;
 
@@ -50,7 +50,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let element = self.tables.elements.get(at).filter(|_| at < MAX_ELEMENTS)?;
         let u = &element.uncertainty;
         let ([s, k], [[s_s, s_k], [_, k_k]]) = learnt.of_element(at)?;
-        let torque = u.torque_share * u.slow_part.sqrt();
+        let torque = u.torque_fraction * u.slow_part.sqrt();
         let kiss_pa = element.kiss_deviation_pa() * u.slow_part.sqrt();
         let [by_s, by_k] = element.gain_by(T::one());
         // Unlearnt both vary by one, with their correlation.
@@ -60,21 +60,21 @@ impl<T: Real> GearboxFilter<'_, T> {
             + by_k * by_k * (T::one() - k_k);
         let gain = (u.valve_gain * u.valve_gain - seen).max(T::zero()).sqrt();
         Some(LearntElement {
-            torque_share: [torque * s, torque * s_s.sqrt()],
+            torque_fraction: [torque * s, torque * s_s.sqrt()],
             kiss_pa: [kiss_pa * k, kiss_pa * k_k.sqrt()],
             valve_gain: [by_s * s + by_k * k, gain],
         })
     }
 
-    /// What is learnt of the turbine-side inertia between two gears: its error as a share, and the deviation; `None` if it is
+    /// What is learnt of the turbine-side inertia between two gears: its error as a fraction, and the deviation; `None` if it is
     /// not learnt.
     pub fn learnt_inertia(&self, learnt: &Learnt<T>, from: usize, to: usize) -> Option<[T; 2]> {
         let of = learnt.of_pair(self.tables.pair(from, to)?)?;
         Some(of.map(|value| self.uncertainty.inertia_share * value))
     }
 
-    /// What is learnt of the torque at the gearbox input, as a share of that by the converter's maps (without a converter, of the reported one);
-    /// and of the reported engine torque beside a converter, as a share of the true one: error and deviation.
+    /// What is learnt of the torque at the gearbox input, as a fraction of that by the converter's maps (without a converter, of the reported one);
+    /// and of the reported engine torque beside a converter, as a fraction of the true one: error and deviation.
     pub fn learnt_sources(&self, learnt: &Learnt<T>) -> [[T; 2]; 2] {
         let (of, turbine) = (learnt.of_sources(), &self.turbine);
         let first = if turbine.converter.is_some() { turbine.converter_share } else { turbine.engine_share };
@@ -82,17 +82,18 @@ impl<T: Real> GearboxFilter<'_, T> {
         [of[0].map(|x| shares[0] * x), of[1].map(|x| shares[1] * x)]
     }
 
-    /// What is learnt of the valve of an element: error of its lag as a share, and of its delay beside that of the tables, s, each with its
+    /// What is learnt of the valve of an element: error of its lag as a fraction, and of its delay beside that of the tables, s, each with its
     /// deviation; `None` if there is no such element.
     pub fn learnt_timing(&self, learnt: &Learnt<T>, at: usize) -> Option<[[T; 2]; 2]> {
         let ([lag, delay], [lag_variance, delay_variance]) = learnt.of_timing(at)?;
         let u = &self.tables.elements.get(at)?.uncertainty;
-        let [per_lag, per_delay] = [u.valve_lag_share, u.valve_delay_s].map(|deviation| u.slow_part.sqrt() * deviation);
+        let [per_lag, per_delay] =
+            [u.valve_lag_fraction, u.valve_delay_s].map(|deviation| u.slow_part.sqrt() * deviation);
         let of = |per: T, mean: T, variance: T| [per * mean, per * variance.sqrt()];
         Some([of(per_lag, lag, lag_variance), of(per_delay, delay, delay_variance)])
     }
 
-    /// What is learnt of the scale of the wheel speed: its error as a share, and the deviation.
+    /// What is learnt of the scale of the wheel speed: its error as a fraction, and the deviation.
     pub fn learnt_wheel_scale(&self, learnt: &Learnt<T>) -> [T; 2] {
         let [mean, variance] = learnt.of_wheel();
         [mean, variance.sqrt()].map(|value| self.uncertainty.wheel_scale * value)
@@ -130,11 +131,11 @@ impl<T: Real> GearboxFilter<'_, T> {
         let u = &self.uncertainty;
         let source =
             if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share };
-        let [off, on] = self.of_elements(elements, |u| u.torque_share);
-        let in_shares = [off, on, T::infinity(), T::infinity(), u.inertia_share, source];
+        let [off, on] = self.of_elements(elements, |u| u.torque_fraction);
+        let in_fractions = [off, on, T::infinity(), T::infinity(), u.inertia_share, source];
         let mut by = [T::zero(); ACTING];
-        for (by, share) in by.iter_mut().zip(in_shares).filter(|(_, share)| *share > T::zero()) {
-            *by = u.stiffness_share / share;
+        for (by, fraction) in by.iter_mut().zip(in_fractions).filter(|(_, fraction)| *fraction > T::zero()) {
+            *by = u.stiffness_fraction / fraction;
         }
         by
     }
@@ -168,13 +169,13 @@ impl<T: Real> GearboxFilter<'_, T> {
         let known = self.known(learnt, &self.acting(&shift));
         let x = &mut running.x;
         x.active = N;
-        let turbine = x.covariance[SLOW_SHARE][SLOW_SHARE];
+        let turbine = x.covariance[SLOW_FRACTION][SLOW_FRACTION];
         for (a, state) in LASTING.into_iter().enumerate().take(TURBINE_ACTS) {
             x.renew(state, known.mean[a], known.covariance[a][a]);
             // What goes with the turbine torque goes with all that the speeds have shown of it.
-            let share = known.covariance[a][TURBINE_ACTS] / turbine;
+            let fraction = known.covariance[a][TURBINE_ACTS] / turbine;
             for core in 0..IN_GEAR {
-                let covariance = share * x.covariance[SLOW_SHARE][core];
+                let covariance = fraction * x.covariance[SLOW_FRACTION][core];
                 x.add(state, core, covariance);
             }
             for (b, other) in LASTING.into_iter().enumerate().take(a) {
@@ -206,7 +207,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Makes the lasting part of the turbine torque's error what is learnt of it.
     fn take_turbine(&self, running: &mut Running<T>, learnt: &Learnt<T>) {
         let known = self.known(learnt, &self.acting_in_gear());
-        running.x.replace(SLOW_SHARE, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
+        running.x.replace(SLOW_FRACTION, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
     }
 
     /// Another shift. From a gear it begins with what is learnt; an element that takes part in both this shift and the one
@@ -246,8 +247,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         let acting = self.acting_in_gear();
         let before = self.known(learnt, &acting);
         let mut after = before;
-        after.mean[TURBINE_ACTS] = running.x.mean[SLOW_SHARE];
-        after.covariance[TURBINE_ACTS][TURBINE_ACTS] = running.x.covariance[SLOW_SHARE][SLOW_SHARE];
+        after.mean[TURBINE_ACTS] = running.x.mean[SLOW_FRACTION];
+        after.covariance[TURBINE_ACTS][TURBINE_ACTS] = running.x.covariance[SLOW_FRACTION][SLOW_FRACTION];
         learnt.take(&acting, &before, &after, &self.correlations());
     }
 

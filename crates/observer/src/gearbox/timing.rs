@@ -67,10 +67,10 @@ impl<T: Real> Timing<T> {
     }
 
     /// Turbine and output speed become one.
-    pub(super) fn tie(&mut self, ratio: T, share: [T; 2]) {
+    pub(super) fn tie(&mut self, ratio: T, fraction: [T; 2]) {
         let mut output = [T::zero(); TIMINGS];
-        add(&mut output, share[0], &self.off[TURBINE]);
-        add(&mut output, share[1], &self.off[OUTPUT]);
+        add(&mut output, fraction[0], &self.off[TURBINE]);
+        add(&mut output, fraction[1], &self.off[OUTPUT]);
         (self.off[TURBINE], self.off[OUTPUT]) = (output.map(|off| ratio * off), output);
     }
 

@@ -13,7 +13,7 @@ use drivetrain::{Converter, Real};
 
 use super::square;
 
-/// The torque below which an error is no longer a share of it, N m.
+/// The torque below which an error is no longer a fraction of it, N m.
 pub(super) const LEAST_N_M: f64 = 10.0;
 
 /// What is known of the torque at the gearbox input.
@@ -23,9 +23,9 @@ pub struct TurbineTorque<T> {
     pub converter: Option<Converter<T>>,
     /// Inertia of engine and pump in front of the converter, kg m^2.
     pub engine_inertia_kg_m2: T,
-    /// Standard deviation of the torque by the maps, as a share.
+    /// Standard deviation of the torque by the maps, as a fraction.
     pub converter_share: T,
-    /// Standard deviation of the torque that the engine's controller reports, as a share.
+    /// Standard deviation of the torque that the engine's controller reports, as a fraction.
     pub engine_share: T,
 }
 
@@ -40,11 +40,11 @@ pub(super) struct InputSide<T> {
     pub(super) lock_up_applied: bool,
 }
 
-/// The torque, N m, its variance from the noise of the speeds, and its deviation as a share.
+/// The torque, N m, its variance from the noise of the speeds, and its deviation as a fraction.
 pub(super) struct Found<T> {
     pub(super) turbine_n_m: T,
     pub(super) noise: T,
-    pub(super) share: T,
+    pub(super) fraction: T,
 }
 
 impl<T: Real> TurbineTorque<T> {
@@ -52,17 +52,17 @@ impl<T: Real> TurbineTorque<T> {
     #[inline]
     pub(super) fn at(&self, side: &InputSide<T>) -> Option<Found<T>> {
         let Some(converter) = &self.converter else {
-            let found = |turbine_n_m| Found { turbine_n_m, noise: T::zero(), share: self.engine_share };
+            let found = |turbine_n_m| Found { turbine_n_m, noise: T::zero(), fraction: self.engine_share };
             return side.reported_n_m.map(found);
         };
         let [engine, engine_variance, acceleration, acceleration_variance] = side.engine?;
         if side.lock_up_applied {
             let turbine_n_m = side.reported_n_m? - self.engine_inertia_kg_m2 * acceleration;
             let noise = square(self.engine_inertia_kg_m2) * acceleration_variance;
-            return Some(Found { turbine_n_m, noise, share: self.engine_share });
+            return Some(Found { turbine_n_m, noise, fraction: self.engine_share });
         }
         let (turbine_n_m, noise) = by_maps(converter, [engine, engine_variance], side.turbine);
-        Some(Found { turbine_n_m, noise, share: self.converter_share })
+        Some(Found { turbine_n_m, noise, fraction: self.converter_share })
     }
 
     /// The same in another precision.

@@ -8,18 +8,18 @@ use super::{FrictionElement, square};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftUncertainty<T> {
     /// Time after which the part of the error of a clutch's torque that does not last is another, s.
-    pub torque_share_s: T,
+    pub torque_fraction_s: T,
     /// Time after which an error of the pressure is another, s.
     pub pressure_s: T,
-    /// Of the turbine torque beside what lasts, as a share.
+    /// Of the turbine torque beside what lasts, as a fraction.
     pub turbine_share: T,
     /// Time after which it is another, s.
     pub turbine_share_s: T,
-    /// Of the turbine-side inertia `M11`, as a share.
+    /// Of the turbine-side inertia `M11`, as a fraction.
     pub inertia_share: T,
-    /// Of the stiffness of the drive shafts, as a share.
-    pub stiffness_share: T,
-    /// Of the scale of the wheel speed, as a share.
+    /// Of the stiffness of the drive shafts, as a fraction.
+    pub stiffness_fraction: T,
+    /// Of the scale of the wheel speed, as a fraction.
     pub wheel_scale: T,
     /// Its random walk, per root second.
     pub wheel_scale_walk: T,
@@ -36,16 +36,16 @@ pub struct ShiftUncertainty<T> {
 /// What the filter does not know of an element: standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElementUncertainty<T> {
-    /// `rho`: of its torque, as a share: friction, valve gain and valve map.
-    pub torque_share: T,
+    /// `rho`: of its torque, as a fraction: friction, valve gain and valve map.
+    pub torque_fraction: T,
     /// The part of its square that lasts from shift to shift: friction and gain. The same part of the kiss point's.
     pub slow_part: T,
-    /// Of the valve's gain, as a share: in `torque_share`, and in the kiss point.
+    /// Of the valve's gain, as a fraction: in `torque_fraction`, and in the kiss point.
     pub valve_gain: T,
     /// Of the kiss point beside the gain, Pa: what lasts.
     pub kiss_point_pa: T,
-    /// Of the valve's lag, as a share.
-    pub valve_lag_share: T,
+    /// Of the valve's lag, as a fraction.
+    pub valve_lag_fraction: T,
     /// Of the valve's delay, s: the pressure errs by this much of its rate.
     pub valve_delay_s: T,
     /// Error of the pressure at rest that does not last, Pa.
@@ -62,12 +62,12 @@ impl<T: Real> ShiftUncertainty<T> {
     pub fn cast<U: Real>(&self) -> ShiftUncertainty<U> {
         let to = |x: T| U::of(x.to_f64_exact());
         ShiftUncertainty {
-            torque_share_s: to(self.torque_share_s),
+            torque_fraction_s: to(self.torque_fraction_s),
             pressure_s: to(self.pressure_s),
             turbine_share: to(self.turbine_share),
             turbine_share_s: to(self.turbine_share_s),
             inertia_share: to(self.inertia_share),
-            stiffness_share: to(self.stiffness_share),
+            stiffness_fraction: to(self.stiffness_fraction),
             wheel_scale: to(self.wheel_scale),
             wheel_scale_walk: to(self.wheel_scale_walk),
             rate_rad_s: to(self.rate_rad_s),
@@ -83,11 +83,11 @@ impl<T: Real> ElementUncertainty<T> {
     pub fn cast<U: Real>(&self) -> ElementUncertainty<U> {
         let to = |x: T| U::of(x.to_f64_exact());
         ElementUncertainty {
-            torque_share: to(self.torque_share),
+            torque_fraction: to(self.torque_fraction),
             slow_part: to(self.slow_part),
             valve_gain: to(self.valve_gain),
             kiss_point_pa: to(self.kiss_point_pa),
-            valve_lag_share: to(self.valve_lag_share),
+            valve_lag_fraction: to(self.valve_lag_fraction),
             valve_delay_s: to(self.valve_delay_s),
             pressure_pa: to(self.pressure_pa),
         }
@@ -95,10 +95,10 @@ impl<T: Real> ElementUncertainty<T> {
 }
 
 impl<T: Real> ShiftUncertainty<T> {
-    /// Variance by which the error of a clutch's torque walks, of which this part lasts: after [`ShiftUncertainty::torque_share_s`] the rest
+    /// Variance by which the error of a clutch's torque walks, of which this part lasts: after [`ShiftUncertainty::torque_fraction_s`] the rest
     /// is another.
     pub(super) fn friction_walk(&self, slow_part: T, dt_s: T) -> T {
-        (T::one() - slow_part) * T::of(2.0) * dt_s / self.torque_share_s
+        (T::one() - slow_part) * T::of(2.0) * dt_s / self.torque_fraction_s
     }
 }
 
@@ -115,7 +115,7 @@ impl<T: Real> FrictionElement<T> {
         (square(self.kiss_deviation_pa()) + square(self.uncertainty.pressure_pa)).sqrt()
     }
 
-    /// Error of the valve's gain, as a share, that the factor of the torque `f` and the kiss point `k` speak for.
+    /// Error of the valve's gain, as a fraction, that the factor of the torque `f` and the kiss point `k` speak for.
     pub(super) fn gain_error(&self, f: T, k: T) -> T {
         let [by_f, by_k] = self.gain_by(self.uncertainty.slow_part.sqrt());
         by_f * f + by_k * k
@@ -127,7 +127,7 @@ impl<T: Real> FrictionElement<T> {
         let variance = u.valve_gain * u.valve_gain;
         // Covariances of the gain with both, and of these two.
         let per = variance * slow / u.slow_part.sqrt();
-        let with_f = per / u.torque_share;
+        let with_f = per / u.torque_fraction;
         let with_k = -per * self.clutch.kiss_pressure() / self.kiss_deviation_pa();
         let both = slow * slow * self.correlation();
         let left = T::one() - both * both;
@@ -137,7 +137,7 @@ impl<T: Real> FrictionElement<T> {
     /// Correlation of what lasts of torque factor and kiss point: a higher gain is more torque and an earlier kiss point.
     pub(super) fn correlation(&self) -> T {
         let u = &self.uncertainty;
-        let slow = u.torque_share * u.slow_part.sqrt();
+        let slow = u.torque_fraction * u.slow_part.sqrt();
         let by_gain = u.valve_gain * u.valve_gain * self.clutch.kiss_pressure();
         -by_gain / (slow * u.slow_part.sqrt() * self.kiss_deviation_pa())
     }

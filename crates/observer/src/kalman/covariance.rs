@@ -4,10 +4,10 @@ use drivetrain::Real;
 
 use super::past::SPEEDS;
 use super::powertrain::{COLUMNS, LAWS, Tangent};
-use super::{DELAY, FRICTION, GAIN, N, OFFGOING, PRESSURE, SCALE, SHARE, SKEW, WHEEL};
+use super::{DELAY, FRACTION, FRICTION, GAIN, N, OFFGOING, PRESSURE, SCALE, SKEW, WHEEL};
 
-/// States of which a correction may take a share only: the last ones, from [`SHARE`] on.
-pub(super) const CONSIDERED: usize = N - SHARE;
+/// States of which a correction may take a fraction only: the last ones, from [`FRACTION`] on.
+pub(super) const CONSIDERED: usize = N - FRACTION;
 
 const _: () = assert!(SPEEDS <= LAWS, "the speeds are the first states");
 
@@ -195,12 +195,12 @@ impl<T: Real> Covariance<T> {
         }
         p[PRESSURE][PRESSURE] = step.pressure(p[PRESSURE][PRESSURE], p[PRESSURE][GAIN]);
         self.fade::<OFFGOING>(step.keep);
-        self.fade::<SHARE>(step.stay);
+        self.fade::<FRACTION>(step.stay);
         self.fade::<FRICTION>(step.last);
         self.fade::<GAIN>(step.last);
     }
 
-    /// Leaves a share of a state.
+    /// Leaves a fraction of a state.
     #[inline]
     fn fade<const STATE: usize>(&mut self, left: T) {
         if left == T::one() {
@@ -251,25 +251,25 @@ impl<T: Real> Covariance<T> {
     }
 
     /// Corrects for a measurement by Joseph's form `P - K S' - S K' + K V K'`, which holds for any gain, and returns how all
-    /// moves by this innovation. Of the best gain each of the considered states gets a share; with none its uncertainty is
+    /// moves by this innovation. Of the best gain each of the considered states gets a fraction; with none its uncertainty is
     /// accounted for and stays.
     ///
-    /// With `K = a S/V`, each entry of `S` with its own share `a`, the form is `P - (S S' - R R')/V` with `R = (1 - a) S`.
+    /// With `K = a S/V`, each entry of `S` with its own fraction `a`, the form is `P - (S S' - R R')/V` with `R = (1 - a) S`.
     ///
     /// Of the earlier speeds only those from `kept` on are needed again. The others move as the speeds now.
     #[inline(always)]
     pub(super) fn correct(
         &mut self,
         measured: &Measured<T>,
-        shares: &[T; CONSIDERED],
+        fractions: &[T; CONSIDERED],
         kept: usize,
         innovation: T,
     ) -> Moves<T> {
         let (with, per_variance) = (measured.with, measured.variance.recip());
-        let left = core::array::from_fn(|a| (T::one() - shares[a]) * with[SHARE + a]);
+        let left = core::array::from_fn(|a| (T::one() - fractions[a]) * with[FRACTION + a]);
         subtract_square(&mut self.upper, &with, &left, per_variance);
         let by = innovation * per_variance;
-        let states = core::array::from_fn(|i| by * if i < SHARE { with[i] } else { with[i] - left[i - SHARE] });
+        let states = core::array::from_fn(|i| by * if i < FRACTION { with[i] } else { with[i] - left[i - FRACTION] });
         let mut moves = Moves { states, earlier: core::array::from_fn(|k| states[k]) };
         for k in kept..SPEEDS {
             let gain = measured.earlier[k] * per_variance;
@@ -318,10 +318,10 @@ fn subtract_square<T: Real>(upper: &mut [[T; N]; N], x: &[T; N], left: &[T; CONS
         for j in I..N {
             row[j] = row[j] - own * x[j];
         }
-        if I >= SHARE {
-            let own = factor * left[I - SHARE];
+        if I >= FRACTION {
+            let own = factor * left[I - FRACTION];
             for j in I..N {
-                row[j] = row[j] + own * left[j - SHARE];
+                row[j] = row[j] + own * left[j - FRACTION];
             }
         }
     }
@@ -410,7 +410,9 @@ mod tests {
                 let next = step.of(&core::array::from_fn(|i| if i == c { 1.0 } else { 0.0 }));
                 matrix.iter_mut().zip(next).for_each(|(row, next)| row[c] = next);
             }
-            for (state, left) in [(OFFGOING, step.keep), (SHARE, step.stay), (FRICTION, step.last), (GAIN, step.last)] {
+            for (state, left) in
+                [(OFFGOING, step.keep), (FRACTION, step.stay), (FRICTION, step.last), (GAIN, step.last)]
+            {
                 assert!(left < 1.0);
                 matrix[state][state] = left;
             }
@@ -426,7 +428,7 @@ mod tests {
 
     /// A reading of the speed `K`, by the matrices of the form.
     fn assert_corrects<const K: usize>(row: &Row<f64>, kept: usize) {
-        let (noise, shares, innovation) = (0.1, [0.0, 0.3, 0.0, 1.0, 0.05, 1.0], 0.7);
+        let (noise, fractions, innovation) = (0.1, [0.0, 0.3, 0.0, 1.0, 0.05, 1.0], 0.7);
         let mut covariance = any();
         let p = dense(&covariance);
         let mut h = [0.0; ALL];
@@ -434,8 +436,8 @@ mod tests {
         (h[SCALE], h[DELAY], h[SKEW]) = (row.learnt[0], row.learnt[1], row.learnt[2]);
         let with: [f64; ALL] = core::array::from_fn(|i| (0..ALL).map(|j| p[i][j] * h[j]).sum());
         let variance = noise + (0..ALL).map(|i| h[i] * with[i]).sum::<f64>();
-        let share = |i: usize| if (SHARE..N).contains(&i) { shares[i - SHARE] } else { 1.0 };
-        let gain: [f64; ALL] = core::array::from_fn(|i| share(i) * with[i] / variance);
+        let fraction = |i: usize| if (FRACTION..N).contains(&i) { fractions[i - FRACTION] } else { 1.0 };
+        let gain: [f64; ALL] = core::array::from_fn(|i| fraction(i) * with[i] / variance);
         let left: Dense =
             core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j)) - gain[i] * h[j]));
         let mut expected = product(&product(&left, &p), &transposed(&left));
@@ -444,7 +446,7 @@ mod tests {
         }
         let measured = covariance.measured::<K>(row, noise);
         assert!((measured.variance - variance).abs() < 1e-9 * variance);
-        let moves = covariance.correct(&measured, &shares, kept, innovation);
+        let moves = covariance.correct(&measured, &fractions, kept, innovation);
         assert_alike(&dense(&covariance), &expected, kept);
         for (moved, gain) in moves.states.iter().zip(gain) {
             assert!((moved - gain * innovation).abs() < 1e-9);

@@ -8,7 +8,7 @@ use drivetrain::Real;
 use super::covariance::CONSIDERED;
 use super::engine::Engine;
 use super::past::SPEEDS;
-use super::{KalmanFilter, KalmanState, SHARE, TURBINE};
+use super::{FRACTION, KalmanFilter, KalmanState, TURBINE};
 use crate::{ChannelHealth, Input, LOST_S, Reading};
 
 /// Time within which the filter of the engine speed finds a new acceleration, s \[chosen\].
@@ -22,8 +22,8 @@ const IMPOSSIBLE: f64 = 4.0;
 pub struct ReportedTorque<T> {
     /// Inertia of engine and pump, kg m^2.
     pub engine_kg_m2: T,
-    /// Standard deviation of the reported torque, as a share of it.
-    pub share: T,
+    /// Standard deviation of the reported torque, as a fraction of it.
+    pub fraction: T,
     /// The same beside it, N m.
     pub beside_n_m: T,
 }
@@ -62,13 +62,13 @@ impl<T: Real> KalmanFilter<T> {
         let rate_n_m_s = ((reading.value - last.torque_n_m) / since_s).abs().at_least(fade * last.rate_n_m_s);
         state.reported = Some(LastTorque { rate_n_m_s, ..new });
         if let Some(engine) = state.engine {
-            self.correct_share(state, &engine, reading, since_s, rate_n_m_s);
+            self.correct_fraction(state, &engine, reading, since_s, rate_n_m_s);
         }
         ChannelHealth::Good
     }
 
     #[inline]
-    fn correct_share(
+    fn correct_fraction(
         &self,
         state: &mut KalmanState<T>,
         engine: &Engine<T>,
@@ -88,11 +88,11 @@ impl<T: Real> KalmanFilter<T> {
         let alike = (T::of(2.0) * self.uncertainty.turbine_share_s / since_s).at_least(one);
         // It is old, and compared with an acceleration that is found late.
         let changed = rate_n_m_s * (reading.age_s + T::of(SETTLED_S));
-        let own = alike * (square(told.share * reading.value.abs() + told.beside_n_m) + square(changed));
+        let own = alike * (square(told.fraction * reading.value.abs() + told.beside_n_m) + square(changed));
         let noise = square(ratio) * (own + square(told.engine_kg_m2 * acceleration_deviation));
-        let mut measured = running.covariance.with_state::<SHARE>(by_map.turbine_n_m);
-        measured.variance = (by_map.turbine_n_m * measured.with[SHARE]).at_least(T::zero()) + noise;
-        let innovation = found - by_map.turbine_n_m * (one + running.mean[SHARE]);
+        let mut measured = running.covariance.with_state::<FRACTION>(by_map.turbine_n_m);
+        measured.variance = (by_map.turbine_n_m * measured.with[FRACTION]).at_least(T::zero()) + noise;
+        let innovation = found - by_map.turbine_n_m * (one + running.mean[FRACTION]);
         if !(measured.variance.is_finite() && innovation.is_finite()) {
             return;
         }
@@ -104,6 +104,10 @@ impl<T: Real> ReportedTorque<T> {
     /// The same in another precision.
     pub fn cast<U: Real>(&self) -> ReportedTorque<U> {
         let to = |x: T| U::of(x.to_f64_exact());
-        ReportedTorque { engine_kg_m2: to(self.engine_kg_m2), share: to(self.share), beside_n_m: to(self.beside_n_m) }
+        ReportedTorque {
+            engine_kg_m2: to(self.engine_kg_m2),
+            fraction: to(self.fraction),
+            beside_n_m: to(self.beside_n_m),
+        }
     }
 }

@@ -7,8 +7,8 @@
 //! | `p` | the valve's maps, times `1 + g` | pressure of the oncoming clutch, Pa |
 //! | `T_ca` | random walk; once released it fades | torque of the offgoing clutch, N m |
 //! | `T_L` | random walk | all that the wheels' equation leaves out: road, grade, mass, tyre slip, N m |
-//! | `e` | fades in seconds | share by which the turbine torque differs from the converter's maps |
-//! | `f`, `g` | fade in tens of seconds | share by which the friction and the valve's gain differ from their maps |
+//! | `e` | fades in seconds | fraction by which the turbine torque differs from the converter's maps |
+//! | `f`, `g` | fade in tens of seconds | fraction by which the friction and the valve's gain differ from their maps |
 //! | `s`, `d_w`, `d_o` | constant | scale of the wheel speed; delay of the wheel speed and of the output speed, both against the turbine speed, s |
 //!
 //! Every reading is a measurement of its own that may be absent; a step without one only predicts. A reading is compared
@@ -23,9 +23,9 @@
 //! Where a log has the command of the offgoing clutch, its valve model limits `T_ca`; where it has the torque that the engine's
 //! controller reports, that is a second source of the turbine torque.
 //!
-//! A reading that contradicts all the others is refused once; one that goes on to do so is believed. The share `e` is
+//! A reading that contradicts all the others is refused once; one that goes on to do so is believed. The fraction `e` is
 //! only corrected while both clutches slip (a consider state, S. F. Schmidt 1966): before, an error that shaft
-//! and turbine torque share cancels in the clutch torque, and no speed shows it.
+//! and relative turbine torque error cancels in the clutch torque, and no speed shows it.
 //!
 //! The covariance is corrected in Joseph's form `P - K S' - S K' + K V K'`, which holds for any gain and keeps it
 //! positive but for rounding. A filter whose variance is no number, or negative, begins anew and says so.
@@ -71,7 +71,7 @@ const SPRING: usize = 3;
 const PRESSURE: usize = 4;
 const OFFGOING: usize = 5;
 const LOAD: usize = 6;
-const SHARE: usize = 7;
+const FRACTION: usize = 7;
 const FRICTION: usize = 8;
 const GAIN: usize = 9;
 const SCALE: usize = 10;
@@ -147,7 +147,7 @@ struct Running<T> {
     past: Past<T>,
     /// The earlier speeds from this one on have their covariance kept up to date.
     kept: usize,
-    /// Time since the shares that fade slowly have done so, s.
+    /// Time since the fractions that fade slowly have done so, s.
     unfaded_s: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     motion_pa_s: T,
@@ -529,14 +529,14 @@ fn holds_offgoing<T: Real>(
 }
 
 impl<T: Real> Running<T> {
-    /// Corrects mean, covariance and remembered speeds for a measurement; of the considered states' best gains these shares. The
+    /// Corrects mean, covariance and remembered speeds for a measurement; of the considered states' best gains these fractions. The
     /// readings of the speeds from `next` on are still to come in this step.
-    fn correct(&mut self, measured: &Measured<T>, innovation: T, shares: &[T; CONSIDERED], next: usize) {
+    fn correct(&mut self, measured: &Measured<T>, innovation: T, fractions: &[T; CONSIDERED], next: usize) {
         // The next step remembers other speeds if it is due.
         if self.past.is_due() {
             self.kept = self.kept.max(next);
         }
-        let moves = self.covariance.correct(measured, shares, self.kept, innovation);
+        let moves = self.covariance.correct(measured, fractions, self.kept, innovation);
         for (x, by) in self.mean.iter_mut().zip(&moves.states) {
             *x = *x + *by;
         }

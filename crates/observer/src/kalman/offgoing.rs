@@ -91,7 +91,7 @@ impl<T: Real> KalmanFilter<T> {
             return;
         }
         // Lag and delay err in proportion to what the pressure still has to go.
-        let by_valve = hypot(u.valve_gain * pressure_pa, u.valve_share * (pressure_pa - offgoing.settled_pa));
+        let by_valve = hypot(u.valve_gain * pressure_pa, u.valve_fraction * (pressure_pa - offgoing.settled_pa));
         let per_pa = clutch.static_friction * clutch.lever() * clutch.piston_area_m2;
         let deviation = hypot(u.friction * capacity, per_pa * by_valve) + self.offgoing.open_n_m;
         let most = capacity + deviation;

@@ -21,21 +21,21 @@ pub struct SpeedReading<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Uncertainty<T> {
-    /// Of the turbine torque, as a share.
+    /// Of the turbine torque, as a fraction.
     pub turbine_share: T,
-    /// Time after which that share is another, s.
+    /// Time after which that fraction is another, s.
     pub turbine_share_s: T,
-    /// Of the shafts' stiffness, as a share.
-    pub stiffness_share: T,
+    /// Of the shafts' stiffness, as a fraction.
+    pub stiffness_fraction: T,
     /// Torque that the shafts gain over the backlash, N m: while their torque is smaller they may carry none.
     pub backlash_n_m: T,
-    /// Of the rate of the pressure, as a share of it: errors of lag and delay.
-    pub valve_share: T,
-    /// Of the valve's gain, as a share.
+    /// Of the rate of the pressure, as a fraction of it: errors of lag and delay.
+    pub valve_fraction: T,
+    /// Of the valve's gain, as a fraction.
     pub valve_gain: T,
     /// Time for which an error of a rate persists, s. The filter takes it as white noise of the same power.
     pub rate_s: T,
-    /// Of the friction, as a share.
+    /// Of the friction, as a fraction.
     pub friction: T,
     /// Time after which friction and gain are others, s: errors of the model that shifts have in common would otherwise make
     /// the filter surer of both with every shift.
@@ -82,9 +82,9 @@ impl<T: Real> Uncertainty<T> {
         Uncertainty {
             turbine_share: to(self.turbine_share),
             turbine_share_s: to(self.turbine_share_s),
-            stiffness_share: to(self.stiffness_share),
+            stiffness_fraction: to(self.stiffness_fraction),
             backlash_n_m: to(self.backlash_n_m),
-            valve_share: to(self.valve_share),
+            valve_fraction: to(self.valve_fraction),
             valve_gain: to(self.valve_gain),
             rate_s: to(self.rate_s),
             friction: to(self.friction),

@@ -42,7 +42,7 @@ pub(super) struct Then<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct OnLine<T> {
     /// How much of now, and of the earlier time.
-    pub(super) shares: [T; 2],
+    pub(super) fractions: [T; 2],
     /// How many times the length of the line it is behind its end: zero where the line reaches it.
     pub(super) beyond: T,
 }
@@ -110,13 +110,13 @@ impl<T: Real> Past<T> {
     #[inline]
     pub(super) fn on_line(&self, age_s: T, kept: bool) -> OnLine<T> {
         let (zero, one) = (T::zero(), T::one());
-        let share = if self.age_s > zero { age_s / self.age_s } else { zero };
+        let fraction = if self.age_s > zero { age_s / self.age_s } else { zero };
         let reached = match kept {
             false => zero,
-            true if self.age_s < T::of(LEAST_SPAN_S) => share.at_most(one),
-            true => share,
+            true if self.age_s < T::of(LEAST_SPAN_S) => fraction.at_most(one),
+            true => fraction,
         };
-        OnLine { shares: [one - reached, reached], beyond: share - reached }
+        OnLine { fractions: [one - reached, reached], beyond: fraction - reached }
     }
 
     /// Accelerations of the speed `k`, rad/s^2: now, and over the time before.
@@ -160,11 +160,11 @@ mod tests {
         let mut past = Past::<f64>::steady([100.0, 50.0, 10.0], [0.0; 3]);
         past.remember([100.0, 50.0, 10.0]);
         past.pass(0.002);
-        assert_eq!(past.on_line(0.001, true), OnLine { shares: [0.5, 0.5], beyond: 0.0 });
+        assert_eq!(past.on_line(0.001, true), OnLine { fractions: [0.5, 0.5], beyond: 0.0 });
         // Two milliseconds tell no acceleration.
-        assert_eq!(past.on_line(0.006, true), OnLine { shares: [0.0, 1.0], beyond: 2.0 });
-        assert_eq!(past.on_line(0.006, false), OnLine { shares: [1.0, 0.0], beyond: 3.0 });
+        assert_eq!(past.on_line(0.006, true), OnLine { fractions: [0.0, 1.0], beyond: 2.0 });
+        assert_eq!(past.on_line(0.006, false), OnLine { fractions: [1.0, 0.0], beyond: 3.0 });
         past.pass(0.008);
-        assert_eq!(past.on_line(0.02, true), OnLine { shares: [-1.0, 2.0], beyond: 0.0 });
+        assert_eq!(past.on_line(0.02, true), OnLine { fractions: [-1.0, 2.0], beyond: 0.0 });
     }
 }

@@ -2,14 +2,14 @@
 
 use drivetrain::{AccelerationRow, Real, ValveStep};
 
-use super::{FRICTION, GAIN, LOAD, N, OFFGOING, OUTPUT, PRESSURE, SHARE, SPRING, TURBINE, WHEEL};
+use super::{FRACTION, FRICTION, GAIN, LOAD, N, OFFGOING, OUTPUT, PRESSURE, SPRING, TURBINE, WHEEL};
 
 /// Number of the states that have a law of their own; the others stand or fade.
 pub(super) const LAWS: usize = 5;
 /// The states that these laws depend on are the first ones.
 pub(super) const COLUMNS: usize = GAIN + 1;
 const _: () = assert!(TURBINE < LAWS && OUTPUT < LAWS && WHEEL < LAWS && SPRING < LAWS && PRESSURE < LAWS);
-const _: () = assert!(SHARE < COLUMNS && OFFGOING < COLUMNS && LOAD < COLUMNS && FRICTION < COLUMNS);
+const _: () = assert!(FRACTION < COLUMNS && OFFGOING < COLUMNS && LOAD < COLUMNS && FRICTION < COLUMNS);
 
 /// One step of the powertrain with frozen coefficients.
 ///
@@ -48,7 +48,7 @@ pub(super) struct Step<T> {
     pub(super) damping: T,
     /// `dt/J` of wheels and vehicle, s/(kg m^2).
     pub(super) per_inertia: T,
-    /// What is left of the turbine's share, of the offgoing torque, and of friction and gain.
+    /// What is left of the relative turbine torque error, of the offgoing torque, and of friction and gain.
     pub(super) stay: T,
     pub(super) keep: T,
     pub(super) last: T,
@@ -69,7 +69,7 @@ impl<T: Real> Step<T> {
         slope_n_m_s.at_most(T::of(2.0) * (slope_n_m_s + step))
     }
 
-    /// Pressure at the end per share of the valve's gain, Pa.
+    /// Pressure at the end per fraction of the valve's gain, Pa.
     #[inline]
     fn per_gain(&self) -> T {
         (T::one() - self.valve.phi) * self.settled_pa
@@ -77,9 +77,9 @@ impl<T: Real> Step<T> {
 
     /// Solves for how much turbine and output speed change, from what they would change by at the torques of the start.
     #[inline]
-    fn implicit(&self, share: T, slope_n_m_s: T) -> Implicit<T> {
+    fn implicit(&self, fraction: T, slope_n_m_s: T) -> Implicit<T> {
         let (one, half, dt) = (T::one(), T::of(0.5), self.dt_s);
-        let per_turbine = half * dt * (one + share) * slope_n_m_s;
+        let per_turbine = half * dt * (one + fraction) * slope_n_m_s;
         let per_output = half * dt * self.shaft_per_twist() * self.per_ratio * self.per_ratio;
         let [t, o] = &self.rows;
         let matrix = [
@@ -100,12 +100,12 @@ impl<T: Real> Step<T> {
         let (k, rate) = (self.shaft_per_twist(), x[OUTPUT] * self.per_ratio - middle);
         let held = x[SPRING] + k * rate;
         let explicit = |row: &AccelerationRow<T>| {
-            dt * (row.per_turbine_torque * self.turbine[0] * (one + x[SHARE])
+            dt * (row.per_turbine_torque * self.turbine[0] * (one + x[FRACTION])
                 + row.per_oncoming_torque * oncoming
                 + row.per_offgoing_torque * x[OFFGOING]
                 + row.per_output_torque * self.per_ratio * held)
         };
-        let implicit = self.implicit(x[SHARE], self.slope_in_step(self.turbine[1]));
+        let implicit = self.implicit(x[FRACTION], self.slope_in_step(self.turbine[1]));
         let [turbine, output] = implicit.solve([explicit(&self.rows[0]), explicit(&self.rows[1])]);
         let mean_rate = rate + half * self.per_ratio * output;
         let shaft = x[SPRING] + k * mean_rate;
@@ -115,7 +115,7 @@ impl<T: Real> Step<T> {
         next[WHEEL] = x[WHEEL] + self.per_inertia * (shaft - x[LOAD]);
         next[SPRING] = x[SPRING] + self.stiffness * dt * mean_rate;
         next[PRESSURE] = self.valve.phi * x[PRESSURE] + self.valve.drift_pa + self.per_gain() * x[GAIN];
-        next[SHARE] = self.stay * x[SHARE];
+        next[FRACTION] = self.stay * x[FRACTION];
         next[OFFGOING] = self.keep * x[OFFGOING];
         next[FRICTION] = self.last * x[FRICTION];
         next[GAIN] = self.last * x[GAIN];
@@ -129,7 +129,7 @@ impl<T: Real> Step<T> {
         let slope_n_m_s = if self.held { zero } else { self.turbine[1] };
         let in_step = self.slope_in_step(self.turbine[1]);
         let mean_turbine_n_m = self.turbine[0] + half * in_step * (next[TURBINE] - x[TURBINE]);
-        let implicit = self.implicit(x[SHARE], self.slope_in_step(slope_n_m_s));
+        let implicit = self.implicit(x[FRACTION], self.slope_in_step(slope_n_m_s));
         let [t, o] = &self.rows;
         let per = |t: T, o: T| implicit.solve([dt * t, dt * o]);
         let Self { per_ratio, per_inertia, .. } = *self;
@@ -146,8 +146,8 @@ impl<T: Real> Step<T> {
             per_oncoming_torque: per(t.per_oncoming_torque, o.per_oncoming_torque),
             per_offgoing_torque: per(t.per_offgoing_torque, o.per_offgoing_torque),
             per_shaft_torque: per(t.per_output_torque * per_ratio, o.per_output_torque * per_ratio),
-            turbine_per_share: mean_turbine_n_m,
-            turbine_per_speed: (one + x[SHARE]) * slope_n_m_s,
+            turbine_per_fraction: mean_turbine_n_m,
+            turbine_per_speed: (one + x[FRACTION]) * slope_n_m_s,
             oncoming_per_pressure: self.per_pressure * (one + x[FRICTION]) * self.above_kiss[1],
             oncoming_per_friction: self.per_pressure * self.above_kiss[0],
             phi: self.valve.phi,
@@ -176,14 +176,14 @@ pub(super) struct Tangent<T> {
     per_offgoing_torque: [T; 2],
     per_shaft_torque: [T; 2],
     /// Torques per state.
-    turbine_per_share: T,
+    turbine_per_fraction: T,
     turbine_per_speed: T,
     oncoming_per_pressure: T,
     oncoming_per_friction: T,
     /// Of the pressure.
     phi: T,
     per_gain: T,
-    /// What is left of the turbine's share, of the offgoing torque, and of friction and gain.
+    /// What is left of the relative turbine torque error, of the offgoing torque, and of friction and gain.
     pub(super) stay: T,
     pub(super) keep: T,
     pub(super) last: T,
@@ -198,7 +198,7 @@ impl<T: Real> Tangent<T> {
         // The twist rate with the output speed of the start, and the shaft torque with it.
         let rate = self.damped * (self.per_ratio * output - wheel) - self.half_per_inertia * driving;
         let held = spring + self.shaft_per_twist * rate;
-        let turbine_torque = self.turbine_per_share * x[SHARE] + self.turbine_per_speed * x[TURBINE];
+        let turbine_torque = self.turbine_per_fraction * x[FRACTION] + self.turbine_per_speed * x[TURBINE];
         let oncoming = self.oncoming_per_pressure * x[PRESSURE] + self.oncoming_per_friction * x[FRICTION];
         let by = |end: usize| {
             self.per_turbine_torque[end] * turbine_torque
@@ -303,7 +303,7 @@ pub(super) mod tests {
             (WHEEL, 40.5),
             (SPRING, 900.0),
             (PRESSURE, 0.2e6),
-            (SHARE, 0.03),
+            (FRACTION, 0.03),
             (OFFGOING, 60.0),
             (LOAD, 700.0),
             (FRICTION, -0.1),

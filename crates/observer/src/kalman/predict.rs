@@ -8,27 +8,27 @@ use super::gate::Gate;
 use super::past::Past;
 use super::powertrain::Step;
 use super::{
-    DELAY, FIRST_S, FRICTION, GAIN, KalmanFilter, KalmanState, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE, Running,
-    SCALE, SHARE, SKEW, SPRING, TURBINE, WHEEL,
+    DELAY, FIRST_S, FRACTION, FRICTION, GAIN, KalmanFilter, KalmanState, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE,
+    Running, SCALE, SKEW, SPRING, TURBINE, WHEEL,
 };
 use crate::Phase;
 
 /// Innovation beyond which a reading is refused, in its deviations.
 const GATE: u8 = 4;
 /// Deviations that the filter begins with \[chosen\]: of the wheel speed about the output's, rad/s; of shaft, offgoing and load
-/// torque, as a share of the shaft or holding torque and beside it, N m; of the pressure of a clutch under command, as a share of it.
+/// torque, as a fraction of the shaft or holding torque and beside it, N m; of the pressure of a clutch under command, as a fraction of it.
 const WHEEL_START_RAD_S: f64 = 0.3;
 const SHAFT_START: (f64, f64) = (0.3, 100.0);
 pub(super) const OFFGOING_START: (f64, f64) = (0.5, 50.0);
 const LOAD_START: (f64, f64) = (0.15, 400.0);
 const PRESSURE_START: f64 = 0.3;
-/// Time after which the shares fade that do so in seconds, s: not at every step, and no multiple of a usual sample time, so that
+/// Time after which the fractions fade that do so in seconds, s: not at every step, and no multiple of a usual sample time, so that
 /// rounding does not decide when.
 const FADING_S: f64 = 0.0487;
 /// After so long without a command the valve may have had any other, s \[chosen\]: rows of a slow log are 0.1 s apart.
 pub(super) const UNHEARD_S: f64 = 0.12;
 /// Deviation of the speeds' model over 10 ms, in deviations of a reading.
-const MODEL_SHARE: f64 = 0.1;
+const MODEL_FRACTION: f64 = 0.1;
 
 impl<T: Real> KalmanFilter<T> {
     /// The first state, once turbine, output and engine speed are known.
@@ -107,7 +107,7 @@ impl<T: Real> KalmanFilter<T> {
         deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
         deviations[SPRING] = at_start(SHAFT_START, shaft);
         deviations[PRESSURE] = self.first_pressure_deviation(acting, mean[PRESSURE]);
-        deviations[SHARE] = u.turbine_share;
+        deviations[FRACTION] = u.turbine_share;
         deviations[OFFGOING] = at_start(OFFGOING_START, mean[OFFGOING]);
         deviations[LOAD] = at_start(LOAD_START, shaft);
         deviations[FRICTION] = u.friction;
@@ -120,7 +120,7 @@ impl<T: Real> KalmanFilter<T> {
         let mut covariance = Covariance::of(deviations);
         // An error of the turbine torque is one of the shaft torque in balance with it.
         let shared = u.turbine_share * u.turbine_share * shaft;
-        covariance.set(SPRING, SHARE, shared);
+        covariance.set(SPRING, FRACTION, shared);
         covariance.add(SPRING, shared * shaft);
         covariance
     }
@@ -245,18 +245,18 @@ impl<T: Real> KalmanFilter<T> {
         let twist_rate = x[OUTPUT] * step.per_ratio - x[WHEEL];
         let p = &mut running.covariance;
         for k in [TURBINE, OUTPUT] {
-            p.add(k, per_10_ms * square(T::of(MODEL_SHARE) * self.readings[k].deviation_rad_s));
+            p.add(k, per_10_ms * square(T::of(MODEL_FRACTION) * self.readings[k].deviation_rad_s));
         }
         // Within the backlash the shafts twist without torque.
-        let stiffness_share = if x[SPRING].abs() < u.backlash_n_m { one } else { u.stiffness_share };
-        p.add(SPRING, two * dt * u.rate_s * square(stiffness_share * step.stiffness * twist_rate));
-        p.add(PRESSURE, two * dt * u.rate_s * square(u.valve_share * running.motion_pa_s));
+        let stiffness_fraction = if x[SPRING].abs() < u.backlash_n_m { one } else { u.stiffness_fraction };
+        p.add(SPRING, two * dt * u.rate_s * square(stiffness_fraction * step.stiffness * twist_rate));
+        p.add(PRESSURE, two * dt * u.rate_s * square(u.valve_fraction * running.motion_pa_s));
         if running.is_unheard {
             // Where the pressure goes is not known: what the speeds show is no error of the gain.
             p.add(PRESSURE, square((one - step.valve.phi) * T::of(0.5) * self.limits.pressure_max_pa));
         }
         if step.last < one {
-            p.add(SHARE, square(u.turbine_share) * (one - square(step.stay)));
+            p.add(FRACTION, square(u.turbine_share) * (one - square(step.stay)));
             for (state, deviation) in [(FRICTION, u.friction), (GAIN, u.valve_gain)] {
                 p.add(state, square(deviation) * (one - square(step.last)));
             }
@@ -285,10 +285,10 @@ impl<T: Real> KalmanFilter<T> {
     }
 }
 
-/// A deviation that is a share of a torque and something beside it.
+/// A deviation that is a fraction of a torque and something beside it.
 #[inline]
-pub(super) fn at_start<T: Real>((share, beside): (f64, f64), torque_n_m: T) -> T {
-    T::of(share) * torque_n_m.abs() + T::of(beside)
+pub(super) fn at_start<T: Real>((fraction, beside): (f64, f64), torque_n_m: T) -> T {
+    T::of(fraction) * torque_n_m.abs() + T::of(beside)
 }
 
 /// Length of the hypotenuse. That of the mathematical library computes in double precision.
@@ -328,11 +328,11 @@ mod tests {
     #[test]
     fn the_mean_above_zero_is_that_of_the_distribution() {
         // At zero: deviation/sqrt(2 pi), and half of the samples.
-        let (mean, share) = above(0.0_f64, 4.0);
-        assert!((mean - 2.0 * 0.398_942_28).abs() < 1e-6 && (share - 0.5).abs() < 1e-6);
+        let (mean, fraction) = above(0.0_f64, 4.0);
+        assert!((mean - 2.0 * 0.398_942_28).abs() < 1e-6 && (fraction - 0.5).abs() < 1e-6);
         // One deviation above: 1.0833, 84.13 %.
-        let (mean, share) = above(1.0_f64, 1.0);
-        assert!((mean - 1.083_315_47).abs() < 1e-6 && (share - 0.841_344_75).abs() < 1e-6);
+        let (mean, fraction) = above(1.0_f64, 1.0);
+        assert!((mean - 1.083_315_47).abs() < 1e-6 && (fraction - 0.841_344_75).abs() < 1e-6);
         assert_eq!(above(5.0_f64, 0.0), (5.0, 1.0));
         assert_eq!(above(-5.0_f32, 0.0), (0.0, 0.0));
         let (mean, _) = above(-3.0_f64, 1.0);

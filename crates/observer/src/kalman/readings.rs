@@ -5,7 +5,7 @@ use drivetrain::Real;
 use super::covariance::{CONSIDERED, Measured, Row};
 use super::gate::Verdict;
 use super::past::SPEEDS;
-use super::{DELAY, FRICTION, GAIN, KalmanFilter, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
+use super::{DELAY, FRACTION, FRICTION, GAIN, KalmanFilter, OUTPUT, Running, SCALE, SKEW, TURBINE, WHEEL};
 use crate::{ChannelHealth, Phase, Reading};
 
 /// Standard deviation of a uniform distribution, in its width.
@@ -18,7 +18,7 @@ const SLOWLY_S: f64 = 0.2;
 struct Line<T> {
     value: T,
     /// How much of its error is that of the speed now, and how much that of the earlier speed.
-    shares: [T; 2],
+    fractions: [T; 2],
     /// Its derivative by the age, rad/s^2.
     per_age: T,
     /// What a line leaves open.
@@ -55,7 +55,7 @@ impl<T: Real> KalmanFilter<T> {
         let noise = repeated * (sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance);
         let innovation = reading.value - scale * line.value;
         let learnt = by_learnt::<T, K>(running.mean[SKEW], line.value, scale * line.per_age);
-        let row = Row { now: scale * line.shares[0], earlier: scale * line.shares[1], learnt };
+        let row = Row { now: scale * line.fractions[0], earlier: scale * line.fractions[1], learnt };
         let mut measured = running.covariance.measured::<K>(&row, noise);
         match running.gates[K].judge(innovation, measured.variance) {
             Verdict::Refused => {
@@ -97,7 +97,7 @@ impl<T: Real> KalmanFilter<T> {
             let beyond = then.beyond_s;
             variance = variance + square(load / inertia) * beyond * beyond * beyond / T::of(3.0);
         }
-        Line { value: then.value, shares: on_line.shares, per_age: -then.acceleration, variance }
+        Line { value: then.value, fractions: on_line.fractions, per_age: -then.acceleration, variance }
     }
 
     /// Ties turbine to output speed by the ratio of the gear before the shift.
@@ -116,22 +116,22 @@ impl<T: Real> KalmanFilter<T> {
     /// from `next` on are still to come in this step.
     #[inline]
     fn apply(&self, running: &mut Running<T>, measured: &Measured<T>, innovation: T, since_s: T, next: usize) {
-        let mut shares = [T::one(); CONSIDERED];
+        let mut fractions = [T::one(); CONSIDERED];
         // Before both clutches slip an error of the turbine torque cancels in the clutch torque, and a cylinder that fills late
         // looks like a clutch with less friction or a valve with less gain.
         if running.acting != Phase::InertiaPhase {
-            for state in [SHARE, FRICTION, GAIN] {
-                shares[state - SHARE] = T::zero();
+            for state in [FRACTION, FRICTION, GAIN] {
+                fractions[state - FRACTION] = T::zero();
             }
         }
         // What is known as well as it can be is corrected slowly: the errors of many readings are alike, and the model would
         // claim more than is true.
         for (state, least) in self.known_at_best() {
             if running.covariance.at(state, state) <= least * least {
-                shares[state - SHARE] = (since_s / T::of(SLOWLY_S)).at_most(T::one());
+                fractions[state - FRACTION] = (since_s / T::of(SLOWLY_S)).at_most(T::one());
             }
         }
-        running.correct(measured, innovation, &shares, next);
+        running.correct(measured, innovation, &fractions, next);
     }
 
     /// How well scale and delays can be known at best: their least standard deviations.

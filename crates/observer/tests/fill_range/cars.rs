@@ -37,8 +37,8 @@ pub(crate) struct Car {
 /// Highest line pressure, Pa.
 pub(crate) const LINE_PA: f64 = 1.25e6;
 
-fn around(nominal: f64, share: f64) -> [f64; 2] {
-    [nominal * (1.0 - share), nominal * (1.0 + share)]
+fn around(nominal: f64, fraction: f64) -> [f64; 2] {
+    [nominal * (1.0 - fraction), nominal * (1.0 + fraction)]
 }
 
 impl Car {
@@ -65,8 +65,8 @@ impl Car {
         // All at one end together, those that fill early at one and those that fill late at the other; or each anywhere.
         let together = [Some(0.0), Some(1.0), None, None][random.count(0, 3)];
         let mut pick = |[early, late]: [f64; 2]| {
-            let share = together.unwrap_or_else(|| [0.0, 1.0, random.share()][random.count(0, 2)]);
-            early + share * (late - early)
+            let fraction = together.unwrap_or_else(|| [0.0, 1.0, random.fraction()][random.count(0, 2)]);
+            early + fraction * (late - early)
         };
         let [low, high] = [0, 1].map(|end| gain_limits[end]);
         Self {

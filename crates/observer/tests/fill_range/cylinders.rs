@@ -118,8 +118,8 @@ impl Wandering {
         Self { outlet_pa, pressure_pa, piston, lag: 0.5, passage: 0.5, leak: 0.5, capacity: 0.5 }
     }
 
-    fn between([low, high]: [f64; 2], share: f64) -> f64 {
-        low + share * (high - low)
+    fn between([low, high]: [f64; 2], fraction: f64) -> f64 {
+        low + fraction * (high - low)
     }
 
     fn plateau(car: &Car, stroke: f64) -> f64 {
@@ -141,7 +141,7 @@ impl Cylinder for Wandering {
         match random.count(0, 2) {
             0 => Self::new(outlet_pa, random.within([0.0, car.preload_pa]), Piston::Home),
             1 => {
-                let stroke = random.share();
+                let stroke = random.fraction();
                 Self::new(outlet_pa, Self::plateau(car, stroke), Piston::Strokes(stroke))
             }
             _ => Self::new(outlet_pa, random.within([car.kiss_pa, 0.8e6]), Piston::Kissed),

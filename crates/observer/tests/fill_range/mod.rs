@@ -16,7 +16,7 @@ use shifts::{COMMAND_MAX_A, Log, Row};
 struct Random(u64);
 
 impl Random {
-    fn share(&mut self) -> f64 {
+    fn fraction(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -26,15 +26,15 @@ impl Random {
     }
 
     fn within(&mut self, [low, high]: [f64; 2]) -> f64 {
-        low + self.share() * (high - low)
+        low + self.fraction() * (high - low)
     }
 
-    fn chance(&mut self, share: f64) -> bool {
-        self.share() < share
+    fn chance(&mut self, fraction: f64) -> bool {
+        self.fraction() < fraction
     }
 
     fn count(&mut self, low: usize, high: usize) -> usize {
-        low + (self.share() * (high + 1 - low) as f64) as usize
+        low + (self.fraction() * (high + 1 - low) as f64) as usize
     }
 }
 

@@ -35,7 +35,7 @@ pub struct Contacts {
 
 /// A slip below this is zero, rad/s.
 const ZERO_SLIP_RAD_S: f64 = 1e-6;
-/// A slip that changes by less than this share of what it would without the sticking elements is kept.
+/// A slip that changes by less than this fraction of what it would without the sticking elements is kept.
 const KEPT: f64 = 1e-7;
 
 impl Contacts {

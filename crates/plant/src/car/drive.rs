@@ -13,7 +13,7 @@ use super::sample::CarSample;
 
 /// Engine speed below which the engine has stalled, rad/s.
 const STALLED_RAD_S: f64 = 30.0;
-/// The gear below is taken at no more than this share of the speed at which the gear was reached: the hysteresis.
+/// The gear below is taken at no more than this fraction of the speed at which the gear was reached: the hysteresis.
 const HYSTERESIS: f64 = 0.85;
 /// Times closer than this are the same instant, s.
 const SAME_INSTANT_S: f64 = 1e-9;
@@ -139,8 +139,8 @@ impl<'d> Road<'d> {
             self.segment = (self.segment + 1) % segments.len();
         }
         let segment = &segments[self.segment];
-        let share = ((time_s - self.begun_s) / segment.duration_s).clamp(0.0, 1.0);
-        let at = |[from, to]: [f64; 2]| from + share * (to - from);
+        let fraction = ((time_s - self.begun_s) / segment.duration_s).clamp(0.0, 1.0);
+        let at = |[from, to]: [f64; 2]| from + fraction * (to - from);
         Driver { throttle: at(segment.throttle), brake: at(segment.brake), grade_rad: at(segment.grade_rad) }
     }
 }

@@ -32,7 +32,7 @@ pub struct SpeedError {
     pub rms_m_s: f64,
     /// Largest error, m/s.
     pub largest_m_s: f64,
-    /// Share of the time in which the speed is further than 2 km/h from all speeds within 1 s before and after.
+    /// Fraction of the time in which the speed is further than 2 km/h from all speeds within 1 s before and after.
     pub beyond: f64,
 }
 

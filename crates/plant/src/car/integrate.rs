@@ -14,7 +14,7 @@ use crate::{Contact, Direction};
 const RELATIVE_TOLERANCE: f64 = 2e-6;
 /// Margins may fall this far below zero before the contacts change, so that rounding does not start another change.
 const SLACK: f64 = 1e-9;
-/// The same for torques, as a share of the torque that an element can hold.
+/// The same for torques, as a fraction of the torque that an element can hold.
 const TORQUE_SLACK: f64 = 1e-8;
 /// A pressure counts as this much per Pa among the margins.
 const PER_PA: f64 = 1e-5;
@@ -333,7 +333,7 @@ impl CarIntegrator {
 #[inline]
 fn holding_margin(model: &CarModel, inputs: &CarInputs, x: &CarState, element: usize, held_n_m: f64) -> f64 {
     let (lower, upper) = model.holding_limits(element, x, inputs).unwrap_or((0.0, 0.0));
-    // The contact solver counts in shares of the limits.
+    // The contact solver counts in fractions of the limits.
     let slack = |limit: f64| TORQUE_SLACK * (1.0 + limit.abs());
     (upper - held_n_m + slack(upper)).min(held_n_m - lower + slack(lower))
 }

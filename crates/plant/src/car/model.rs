@@ -122,7 +122,7 @@ impl CarState {
 pub struct CarInputs {
     /// Throttle, 0 to 1.
     pub throttle: f64,
-    /// Share of the driving engine torque that the transmission controller leaves, 0 to 1.
+    /// Fraction of the driving engine torque that the transmission controller leaves, 0 to 1.
     pub engine_share: f64,
     /// Torque of the brakes on the driven wheels, N m.
     pub brake_n_m: f64,
@@ -562,8 +562,8 @@ fn brake_slope(torque_n_m: f64, wheel_rad_s: f64) -> f64 {
     if torque_n_m == 0.0 {
         return 0.0;
     }
-    let share = Real::tanh(wheel_rad_s / BRAKE_TURN_RAD_S);
-    torque_n_m / BRAKE_TURN_RAD_S * (1.0 - share * share)
+    let fraction = Real::tanh(wheel_rad_s / BRAKE_TURN_RAD_S);
+    torque_n_m / BRAKE_TURN_RAD_S * (1.0 - fraction * fraction)
 }
 
 /// Response of the motion to unit torques on engine, gearbox input and gearbox output.

@@ -56,7 +56,7 @@ pub struct CarSample {
     pub shift: Option<ShiftUnderWay>,
     /// What the driver does.
     pub driver: Driver,
-    /// Share of the engine torque that the transmission controller leaves.
+    /// Fraction of the engine torque that the transmission controller leaves.
     pub engine_share: f64,
     /// Speeds and torques.
     pub torques: CarTorques,

@@ -41,12 +41,12 @@ fn freeze(readings: &mut Readings, length_s: f64, noise: Noise, rows: Rows<'_>) 
     }
 }
 
-fn lose_by_chance(readings: &mut Readings, share: f64, mut noise: Noise) {
-    if share <= 0.0 {
+fn lose_by_chance(readings: &mut Readings, fraction: f64, mut noise: Noise) {
+    if fraction <= 0.0 {
         return;
     }
     for at in 0..readings.values.len() {
-        if !readings.values[at].is_nan() && noise.uniform() < share {
+        if !readings.values[at].is_nan() && noise.uniform() < fraction {
             readings.lose(at);
         }
     }

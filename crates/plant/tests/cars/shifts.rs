@@ -22,7 +22,7 @@ fn numbers(q: &CarShiftQuality) -> Limits {
     [complete_s, q.flare_rad_s, q.past_synchronous_rad_s, q.tie_up_n_m, q.held_slip_rad_s, q.jerk_m_s3]
 }
 
-/// Simulates every shift of these cars whose clutches have this share of their nominal friction, prints the worst of each
+/// Simulates every shift of these cars whose clutches have this fraction of their nominal friction, prints the worst of each
 /// number, and refuses those beyond the limits.
 fn each_shift(title: &str, cars: Vec<Car>, friction: f64, limits: Limits) {
     let mut worst: [(f64, String); NUMBERS.len()] = std::array::from_fn(|_| (0.0, String::new()));

@@ -162,8 +162,8 @@ fn clutch_words(shift: &ScoredShift, car: &Car) -> String {
 /// The order of the table: the largest error first, where the truth is known; else the worst health.
 fn by_need(a: &ScoredShift, b: &ScoredShift) -> Ordering {
     let health = |shift: &ScoredShift| shift.worst_health().map_or((Health::Good, 0.0), |worst| worst);
-    let ((a_health, a_share), (b_health, b_share)) = (health(a), health(b));
-    let by_health = b_health.cmp(&a_health).then(b_share.total_cmp(&a_share));
+    let ((a_health, a_fraction), (b_health, b_fraction)) = (health(a), health(b));
+    let by_health = b_health.cmp(&a_health).then(b_fraction.total_cmp(&a_fraction));
     b.worst_error_n_m().total_cmp(&a.worst_error_n_m()).then(by_health).then(a.number.cmp(&b.number))
 }
 

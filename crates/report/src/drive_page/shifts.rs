@@ -92,8 +92,8 @@ const COLUMNS: &[Column] = &[
     ),
     column("pressures in range", "share of the measured pressures within their ranges by the error budget", |s, _| {
         let [all, inside] = s.summary.pressures;
-        let share = inside as f64 / all as f64;
-        if all > 0 { coverage(share) } else { String::new() }
+        let fraction = inside as f64 / all as f64;
+        if all > 0 { coverage(fraction) } else { String::new() }
     }),
     column("controlling", "the clutch that drives the inertia phase", |s, car| {
         unscored(s, |s| Some(clutch_names(s, car)[controlling_of(&s.rows, s.kind?)].to_owned()))
@@ -121,7 +121,7 @@ const COLUMNS: &[Column] = &[
         "not seen",
         "share of both phases in which the speeds show nothing of the controlling clutch's torque",
         |s, car| match s.hidden() {
-            Some(share) => format!("{:.0} %", 100.0 * share),
+            Some(fraction) => format!("{:.0} %", 100.0 * fraction),
             None if car.gearbox.has_ratios_alone() => String::new(),
             None => "–".to_owned(),
         },
@@ -205,10 +205,10 @@ fn ranged([mean, low, high]: &[f64; 3], unit: f64, decimals: usize) -> String {
     format!("{text} ({} to {})", number(low, decimals), number(high, decimals))
 }
 
-fn health((worst, share): (Health, f64)) -> String {
+fn health((worst, fraction): (Health, f64)) -> String {
     match worst {
         Health::Good => "good".to_owned(),
-        worst => format!("{} {:.0} %", worst.name().replace('_', " "), (100.0 * share).max(1.0)),
+        worst => format!("{} {:.0} %", worst.name().replace('_', " "), (100.0 * fraction).max(1.0)),
     }
 }
 
@@ -258,8 +258,8 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         }
     }
     let [pressures, inside] = shift.summary.pressures;
-    let share = if pressures > 0 { inside as f64 / pressures as f64 } else { f64::NAN };
-    cells.push(number("measured_pressure_inside_range", share));
+    let fraction = if pressures > 0 { inside as f64 / pressures as f64 } else { f64::NAN };
+    cells.push(number("measured_pressure_inside_range", fraction));
     for (c, role) in ["offgoing", "oncoming"].iter().enumerate() {
         let none = [f64::NAN; 3];
         let work = shift.summary.friction_work_j[c].unwrap_or(none);

@@ -32,7 +32,7 @@ const RUNS: u64 = 200;
 /// Passes; each stage counts with its fastest.
 const PASSES: usize = 5;
 
-/// The stages of a run, each made by itself, with their shares of the whole.
+/// The stages of a run, each made by itself, with their fractions of the whole.
 pub(crate) fn of_a_run(page: &mut String, campaign: &Campaign) -> Figure {
     let mut best = [f64::INFINITY; STAGES.len()];
     for _ in 0..PASSES {

@@ -23,7 +23,7 @@ pub enum Metric {
     TorqueRms,
     /// RMS error of the drive-shaft torque, N m.
     ShaftRms,
-    /// Share of the samples at which the true pressure and clutch torque lie in their guaranteed ranges.
+    /// Fraction of the samples at which the true pressure and clutch torque lie in their guaranteed ranges.
     Coverage,
     /// Mean width of the guaranteed range of the pressure, Pa.
     RangeWidth,

@@ -57,9 +57,9 @@ impl Distribution {
         if self.count > 0 { self.largest } else { f64::NAN }
     }
 
-    /// The quantile for this share; NaN without values.
-    pub fn quantile(&self, share: f64) -> f64 {
-        let wanted = share * as_f64(self.count);
+    /// The quantile for this fraction; NaN without values.
+    pub fn quantile(&self, fraction: f64) -> f64 {
+        let wanted = fraction * as_f64(self.count);
         let mut below = 0;
         for (&bin, &count) in &self.bins {
             below += count;
@@ -70,8 +70,8 @@ impl Distribution {
         if self.count > 0 { f64::INFINITY } else { f64::NAN }
     }
 
-    /// Share of the values below a limit.
-    pub fn share_below(&self, limit: f64) -> f64 {
+    /// Fraction of the values below a limit.
+    pub fn fraction_below(&self, limit: f64) -> f64 {
         let below: u64 = self.bins.iter().filter(|&(&bin, _)| upper_edge(bin) <= limit).map(|(_, count)| count).sum();
         as_f64(below) / as_f64(self.count.max(1))
     }
@@ -114,9 +114,9 @@ pub struct FactorEffect {
     pub factor: String,
     /// Mean of the finite scores over the factor's bins from its smallest to its largest value; NaN for an empty bin.
     pub means: Vec<f64>,
-    /// First-order Sobol index: share of the score's variance that this factor explains alone.
+    /// First-order Sobol index: fraction of the score's variance that this factor explains alone.
     pub first_order: f64,
-    /// Total Sobol index: share of the variance that would go if the factor were known, interactions included;
+    /// Total Sobol index: fraction of the variance that would go if the factor were known, interactions included;
     /// only a Saltelli plan gives it.
     pub total: Option<f64>,
 }
@@ -150,7 +150,7 @@ pub struct Relative {
     pub high_over_high: f64,
     /// Largest error over the largest one of the open loop.
     pub worst_over_worst: f64,
-    /// Share of the runs in which the error is smaller.
+    /// Fraction of the runs in which the error is smaller.
     pub better: f64,
 }
 
@@ -233,7 +233,7 @@ impl Summary {
             largest: ratio.largest(),
             high_over_high: over(mine.quantile(0.95), reference.quantile(0.95)),
             worst_over_worst: over(mine.largest(), reference.largest()),
-            better: ratio.share_below(1.0),
+            better: ratio.fraction_below(1.0),
         })
     }
 
@@ -366,7 +366,7 @@ impl Effects {
         }
     }
 
-    /// Share of the variance between the means of the bins, less what chance alone would put there.
+    /// Fraction of the variance between the means of the bins, less what chance alone would put there.
     fn explained(&self, factor: usize) -> f64 {
         let bins = self.bins[factor].iter().filter(|bin| bin.count > 0.0);
         let count = bins.clone().count() as f64;
@@ -391,11 +391,11 @@ mod tests {
     fn quantiles_are_good_to_a_per_cent() {
         let mut distribution = Distribution::default();
         (1..=1000).for_each(|i| distribution.push(f64::from(i)));
-        for share in [0.05, 0.5, 0.95] {
-            assert!((distribution.quantile(share) / (1000.0 * share) - 1.0).abs() < 0.01);
+        for fraction in [0.05, 0.5, 0.95] {
+            assert!((distribution.quantile(fraction) / (1000.0 * fraction) - 1.0).abs() < 0.01);
         }
         assert_eq!(distribution.largest(), 1000.0);
-        assert!((distribution.share_below(250.0) - 0.25).abs() < 0.01);
+        assert!((distribution.fraction_below(250.0) - 0.25).abs() < 0.01);
     }
 
     #[test]
@@ -406,13 +406,13 @@ mod tests {
         distribution.push(f64::NAN);
         assert_eq!((distribution.count(), distribution.diverged()), (100, 10));
         assert!(distribution.quantile(0.9) < 91.0 && distribution.quantile(0.95) == f64::INFINITY);
-        assert!((distribution.share_below(1e9) - 0.9).abs() < 1e-12 && distribution.largest() == f64::INFINITY);
+        assert!((distribution.fraction_below(1e9) - 0.9).abs() < 1e-12 && distribution.largest() == f64::INFINITY);
         assert!(Distribution::default().largest().is_nan() && Distribution::default().quantile(0.5).is_nan());
         assert_eq!([over(f64::INFINITY, f64::INFINITY), over(1.0, f64::INFINITY)], [f64::INFINITY, 0.0]);
     }
 
     #[test]
-    fn the_explained_share_is_that_of_a_known_function() {
+    fn the_explained_fraction_is_that_of_a_known_function() {
         // f = 3 a + b on the unit square: variances 9/12 and 1/12.
         let mut effects = Effects {
             all: Moments::default(),
@@ -426,10 +426,10 @@ mod tests {
             let place = |k: u32| (f64::from(i) * [0.618_034, 0.414_214, 0.732_051][k as usize]).fract();
             effects.push(3.0 * place(0) + place(1), &[place(0), place(1), place(2)]);
         }
-        let shares = [0, 1, 2].map(|i| effects.explained(i));
-        // Ten bins cannot see what varies within them: one hundredth of the factor's share.
-        for (share, exact) in shares.iter().zip([0.9 * 0.99, 0.1 * 0.99, 0.0]) {
-            assert!((share - exact).abs() < 0.01, "{shares:?}");
+        let fractions = [0, 1, 2].map(|i| effects.explained(i));
+        // Ten bins cannot see what varies within them: one hundredth of the factor's fraction.
+        for (fraction, exact) in fractions.iter().zip([0.9 * 0.99, 0.1 * 0.99, 0.0]) {
+            assert!((fraction - exact).abs() < 0.01, "{fractions:?}");
         }
     }
 }

@@ -8,7 +8,7 @@ use plant::car::NO_GEAR;
 /// Values that a message names.
 const NAMED: usize = 5;
 
-/// A shift is done by the readings if the turbine has at most this share of the way to the new gear before it, with the output at least
+/// A shift is done by the readings if the turbine has at most this fraction of the way to the new gear before it, with the output at least
 /// so fast, rad/s \[chosen\]: a late `gear` leaves the turbine at the new gear, a change of mind comes before it is there.
 const LEFT_OF_WAY: f64 = 0.05;
 const OUTPUT_RAD_S: f64 = 20.0;
@@ -266,9 +266,9 @@ mod tests {
         let right = [["8", "8"], ["8", "6"], ["6", "5"], ["6", "5"], ["6", "5"], ["5", "5"]];
         assert_eq!(shown(&late, ratio("6")), (right.to_vec(), 1, 1));
         // The turbine is at the gear that is left, or on its way.
-        for share in [0.0, 0.5, 0.9, 1.2] {
-            let on_its_way = ratio("8") + share * (ratio("6") - ratio("8"));
-            assert_eq!(shown(&late, on_its_way), (late.to_vec(), 0, 0), "{share}");
+        for fraction in [0.0, 0.5, 0.9, 1.2] {
+            let on_its_way = ratio("8") + fraction * (ratio("6") - ratio("8"));
+            assert_eq!(shown(&late, on_its_way), (late.to_vec(), 0, 0), "{fraction}");
         }
         // `gear` never says 6, and three shifts follow each other. Back to the gear that is left is always a change of mind.
         let never = [["8", "6"], ["8", "5"], ["5", "5"]];

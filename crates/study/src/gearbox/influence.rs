@@ -25,9 +25,9 @@ pub enum ValueFrom {
 
 /// By how much a value may be off, either way.
 enum Off {
-    /// By a share of it.
-    Share(f64),
-    /// By the share that the bounds of the car allow.
+    /// By a fraction of it.
+    Fraction(f64),
+    /// By the fraction that the bounds of the car allow.
     Car(fn(&ErrorBudget) -> f64),
     /// Between the factors that the bounds of each element allow.
     Element(fn(&ElementErrors) -> [f64; 2]),
@@ -70,7 +70,7 @@ impl Value {
     /// Least and greatest factor on the value of an element, by its place in the gearbox. Those of a car do not depend on it.
     fn limits(&self, car: &Car, element: usize) -> [f64; 2] {
         match self.off {
-            Off::Share(share) => around(share),
+            Off::Fraction(fraction) => around(fraction),
             Off::Car(relative) => around(relative(&ErrorBudget::of_car(car))),
             Off::Element(factors) => ErrorBudget::of_car(car).element(element).map_or([1.0; 2], factors),
         }
@@ -98,8 +98,8 @@ impl Value {
     }
 }
 
-const fn around(share: f64) -> [f64; 2] {
-    [1.0 - share, 1.0 + share]
+const fn around(fraction: f64) -> [f64; 2] {
+    [1.0 - fraction, 1.0 + fraction]
 }
 
 /// What an estimate may depend on, with its uncertainty: what the filter's bounds allow, which are those of the file where it has its
@@ -115,17 +115,17 @@ const VALUES: [Value; 14] = [
     ),
     Value::of_gearbox(
         "element.pack.piston_area_m2",
-        Off::Share(0.2),
+        Off::Fraction(0.2),
         Change::Element(|element, factor| element.clutch.piston_area_m2 *= factor),
     ),
     Value::of_gearbox(
         "element.pack.mean_radius_m",
-        Off::Share(0.1),
+        Off::Fraction(0.1),
         Change::Element(|element, factor| element.clutch.mean_radius_m *= factor),
     ),
     Value::of_gearbox(
         "element.pack.return_spring_n",
-        Off::Share(0.3),
+        Off::Fraction(0.3),
         Change::Element(|element, factor| element.clutch.return_spring_n *= factor),
     ),
     Value::of_gearbox("turbine_inertia_kg_m2", Off::Car(|errors| errors.inertia), Change::Car(scale_inertia)),
@@ -140,10 +140,10 @@ const VALUES: [Value; 14] = [
         Change::Element(|element, factor| element.valve = element.valve.changed(factor, 1.0, None)),
     ),
     Value::of_car("converter.capacity_n_m_s2", Off::Car(|errors| errors.converter), Change::Car(scale_capacity)),
-    Value::of_car("converter.torque_ratio", Off::Share(0.1), Change::Car(scale_torque_ratio)),
+    Value::of_car("converter.torque_ratio", Off::Fraction(0.1), Change::Car(scale_torque_ratio)),
     Value::of_car(
         "engine.inertia_kg_m2",
-        Off::Share(0.2),
+        Off::Fraction(0.2),
         Change::Car(|car, factor| car.engine.inertia_kg_m2 *= factor),
     ),
     Value::of_car(
@@ -153,15 +153,15 @@ const VALUES: [Value; 14] = [
     ),
     Value::of_car(
         "driveline.shaft_damping_n_m_s_rad",
-        Off::Share(0.5),
+        Off::Fraction(0.5),
         Change::Car(|car, factor| car.driveline.shaft_damping_n_m_s_rad *= factor),
     ),
     Value::of_car(
         "driveline.wheel_inertia_kg_m2",
-        Off::Share(0.2),
+        Off::Fraction(0.2),
         Change::Car(|car, factor| car.driveline.wheel_inertia_kg_m2 *= factor),
     ),
-    Value::of_car("vehicle.mass_kg", Off::Share(0.15), Change::Car(|car, factor| car.road.mass_kg *= factor)),
+    Value::of_car("vehicle.mass_kg", Off::Fraction(0.15), Change::Car(|car, factor| car.road.mass_kg *= factor)),
 ];
 
 fn scale_inertia(car: &mut Car, factor: f64) {

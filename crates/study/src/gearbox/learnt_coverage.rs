@@ -200,7 +200,7 @@ impl SampledCar {
             let of = |learnt| filter.learnt_element(learnt, place).zip(filter.learnt_timing(learnt, place));
             let Some(((of, [lag, delay]), (was, [lag_was, delay_was]))) = of(learnt).zip(of(nothing)) else { continue };
             let (friction, gain) = (self.draw.friction[at], self.draw.valve_gain[at]);
-            push(Quantity::TorqueFactor, at, friction * gain - 1.0, of.torque_share, was.torque_share);
+            push(Quantity::TorqueFactor, at, friction * gain - 1.0, of.torque_fraction, was.torque_fraction);
             push(Quantity::ValveGain, at, gain - 1.0, of.valve_gain, was.valve_gain);
             let kiss_pa = clutch.clutch.kiss_pressure() * (gain.recip() - 1.0);
             push(Quantity::KissPoint, at, kiss_pa, of.kiss_pa, was.kiss_pa);

@@ -10,7 +10,7 @@ use drivetrain::ClutchValve;
 /// this car.
 const MOST_LINE_PRESSURES: f64 = 3.0;
 
-/// Share of the line pressure below zero down to which a commanded pressure is none; below it is a wrong sign or offset.
+/// Fraction of the line pressure below zero down to which a commanded pressure is none; below it is a wrong sign or offset.
 const LEAST_LINE_PRESSURES: f64 = -0.05;
 /// A command that no valve takes.
 const REFUSED: f64 = -1e3;

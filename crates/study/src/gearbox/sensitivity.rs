@@ -13,7 +13,7 @@ use super::nominal::{NominalShift, nominal_shifts};
 use super::{EvaluateError, ShiftScoreRow, TruePhase};
 use crate::StudyError;
 
-/// Share of the valve model's deviation above which the speeds are of no use.
+/// Fraction of the valve model's deviation above which the speeds are of no use.
 const HIDDEN: f64 = 0.9;
 /// Rows that a phase needs.
 const LEAST_ROWS: usize = 3;

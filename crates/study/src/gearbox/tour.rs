@@ -23,9 +23,9 @@ const PEDAL_S: f64 = 0.3;
 const NEAR_M_S: f64 = 0.3;
 /// Longest time to reach the speed of a shift, and longest shift, s.
 const LONGEST_APPROACH_S: f64 = 90.0;
-/// Share of that time after which the throttle opens fully.
+/// Fraction of that time after which the throttle opens fully.
 const PATIENCE: f64 = 0.7;
-/// A car that is too weak for the speed of a shift makes it at its highest speed, if that is at least this share \[chosen\].
+/// A car that is too weak for the speed of a shift makes it at its highest speed, if that is at least this fraction \[chosen\].
 const SLOWEST: f64 = 0.6;
 const LONGEST_SHIFT_S: f64 = 6.0;
 /// Speed at the start of a car without a converter, over that of its first shift: a launch is not simulated.

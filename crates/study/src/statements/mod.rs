@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::{Comparison, StudyError, compare};
 
 pub use offsets::BoundCheck;
-pub use settings::{Settings, Shares};
+pub use settings::{Fractions, Settings};
 
 /// The unit of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -112,8 +112,8 @@ pub struct Statement {
     pub figures: Vec<Figure>,
     /// Of a certified offset: whether the error respects it.
     pub bound: Option<BoundCheck>,
-    /// In which share of the settings the same comes out.
-    pub share_of_settings: Option<Shares>,
+    /// In which fraction of the settings the same comes out.
+    pub share_of_settings: Option<Fractions>,
     /// Why they differ, or what else the numbers say.
     #[serde(skip)]
     pub because: String,
@@ -156,9 +156,9 @@ pub fn reproduce(
     let compared = [compare(vehicle, e1)?, compare(vehicle, e2)?, compare(vehicle, e3)?, compare(vehicle, e4)?];
     let mut statements = rows::rows(vehicle, &compared)?;
     because::explain(&mut statements, vehicle, experiments, &compared)?;
-    let (settings, shares) = settings::shares(study, experiments, count, threads, progress)?;
-    for (statement, share) in statements.iter_mut().zip(shares) {
-        statement.share_of_settings = Some(share);
+    let (settings, fractions) = settings::fractions(study, experiments, count, threads, progress)?;
+    for (statement, fraction) in statements.iter_mut().zip(fractions) {
+        statement.share_of_settings = Some(fraction);
     }
     Ok(Chapter { experiments: compared, statements, settings })
 }

@@ -34,7 +34,7 @@ pub struct BoundCheck {
     pub largest_after_decay_pa: f64,
     /// Whether it is within the offset; `None` if the phase ends before.
     pub holds: Option<bool>,
-    /// Largest share of the bound with the initial error in it, Eq. (2.40), that the error has after the first sample,
+    /// Largest fraction of the bound with the initial error in it, Eq. (2.40), that the error has after the first sample,
     /// in which it is the initial error.
     pub largest_share_of_bound: f64,
     /// Whether the error is always within that bound.
@@ -104,14 +104,14 @@ impl Errors {
         let after = largest(&mut samples().filter(|&(since_s, _)| since_s >= decayed_after_s).map(|(_, error)| error));
         let from_start = largest(&mut self.pressure_pa.iter().copied());
         let bound = |since_s| error_bound(offset_pa, kappa2_per_s, self.initial_pa, since_s);
-        let share = largest(&mut samples().skip(1).map(|(since_s, error)| error / bound(since_s)));
+        let fraction = largest(&mut samples().skip(1).map(|(since_s, error)| error / bound(since_s)));
         BoundCheck {
             bound_pa: offset_pa,
             decayed_after_s,
             largest_after_decay_pa: after,
             holds: (!after.is_nan()).then_some(after <= offset_pa),
-            largest_share_of_bound: share,
-            holds_with_initial_error: share <= 1.0,
+            largest_share_of_bound: fraction,
+            holds_with_initial_error: fraction <= 1.0,
             largest_from_start_pa: from_start,
             holds_at_start: from_start <= offset_pa,
         }

@@ -30,7 +30,7 @@ pub(super) const I: Phase = Phase::InertiaPhase;
 
 /// What "much" and "chatter" mean in numbers: a factor of two.
 const MUCH: f64 = 2.0;
-/// Share of the working range of the pressure that the chapter calls acceptable.
+/// Fraction of the working range of the pressure that the chapter calls acceptable.
 const ACCEPTABLE: f64 = 0.10;
 
 /// Sample time of the chapter's discrete observers, s.

@@ -18,7 +18,7 @@ use crate::{Comparison, StudyError};
 pub struct Settings {
     /// How many were drawn.
     pub drawn: u64,
-    /// Of those, with a whole shift in each experiment: the shares are shares of these.
+    /// Of those, with a whole shift in each experiment: the fractions are of these.
     pub whole: u64,
     /// Without a whole shift in one of the experiments.
     pub no_shift: u64,
@@ -28,9 +28,9 @@ pub struct Settings {
     pub refused: u64,
 }
 
-/// In which share of the settings something comes out; `None` where there is nothing to test.
+/// In which fraction of the settings something comes out; `None` where there is nothing to test.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Shares {
+pub struct Fractions {
     /// Our figure agrees with the chapter's.
     pub agrees: Option<f64>,
     /// The offset holds after the initial error has decayed.
@@ -41,7 +41,7 @@ pub struct Shares {
     pub holds_at_start: Option<f64>,
 }
 
-/// What came out of one row in one setting, in the order of [`Shares`].
+/// What came out of one row in one setting, in the order of [`Fractions`].
 type Outcome = [Option<bool>; 4];
 
 /// One setting.
@@ -53,13 +53,13 @@ enum Setting {
 }
 
 /// Tests the statements in the first `count` settings of the study.
-pub(super) fn shares(
+pub(super) fn fractions(
     study: &Study,
     experiments: &[ExperimentFile; 4],
     count: u64,
     threads: usize,
     mut progress: impl FnMut(),
-) -> Result<(Settings, Vec<Shares>), StudyError> {
+) -> Result<(Settings, Vec<Fractions>), StudyError> {
     let experiments = experiments.each_ref().map(with_the_observers_that_count);
     let mut settings = Settings::default();
     let mut counts: Vec<[Count; 4]> = Vec::new();
@@ -85,11 +85,11 @@ pub(super) fn shares(
             Ok(())
         },
     )?;
-    let share = |count: &[Count; 4]| {
-        let [agrees, holds, holds_with_initial_error, holds_at_start] = count.map(Count::share);
-        Shares { agrees, holds, holds_with_initial_error, holds_at_start }
+    let fraction = |count: &[Count; 4]| {
+        let [agrees, holds, holds_with_initial_error, holds_at_start] = count.map(Count::fraction);
+        Fractions { agrees, holds, holds_with_initial_error, holds_at_start }
     };
-    Ok((settings, counts.iter().map(share).collect()))
+    Ok((settings, counts.iter().map(fraction).collect()))
 }
 
 #[derive(Clone, Copy, Default)]
@@ -106,7 +106,7 @@ impl Count {
         }
     }
 
-    fn share(self) -> Option<f64> {
+    fn fraction(self) -> Option<f64> {
         (self.tested > 0).then(|| f64::from(self.yes) / f64::from(self.tested))
     }
 }

@@ -22,7 +22,7 @@ use super::cars::{Random, cars, sensors};
 enum With {
     /// The converter's maps.
     Maps,
-    /// These and the reported torque, which is another by this share beside its drawn error and so many samples late.
+    /// These and the reported torque, which is another by this fraction beside its drawn error and so many samples late.
     Reported(f64, usize),
     /// The true converter, known within 5 %.
     Exact,

@@ -71,7 +71,7 @@ fn what_is_learnt_from_late_speeds_is_what_is_learnt_from_the_same_on_time() {
     }
     let learnt = |state: &GearboxState<f64>| {
         let each = (0..known.clutches.len()).filter_map(|at| on_time.learnt_element(state.learnt(), at));
-        each.flat_map(|of| [of.torque_share, of.kiss_pa.map(|pa| 1e-5 * pa)].concat()).collect::<Vec<f64>>()
+        each.flat_map(|of| [of.torque_fraction, of.kiss_pa.map(|pa| 1e-5 * pa)].concat()).collect::<Vec<f64>>()
     };
     let (found, right) = (learnt(&of_late), learnt(&of_on_time));
     assert!(

@@ -52,7 +52,7 @@ const ALL: [(Without, &str); 9] = [
     (Without::AllButDrawn, "all else"),
 ];
 
-/// An error that is almost none, as a share.
+/// An error that is almost none, as a fraction.
 const LITTLE: f64 = 0.005;
 /// Deviation of a speed that is read exactly, rad/s: that of turbine, output and wheel.
 const EXACT_RAD_S: [f64; 3] = [0.01, 0.01, 0.002];
@@ -153,7 +153,7 @@ impl Without {
             }
         }
         if self == Self::AllButDrawn {
-            (filter.uncertainty.torque_share_s, filter.uncertainty.turbine_share) = (1e6, LITTLE);
+            (filter.uncertainty.torque_fraction_s, filter.uncertainty.turbine_share) = (1e6, LITTLE);
             // Without a converter the reported torque of the engine is exact.
             if filter.turbine.converter.is_none() {
                 filter.turbine.engine_share = LITTLE;
@@ -177,10 +177,10 @@ impl Without {
 fn sure_of_all_but_drawn(tables: &mut ShiftTables<f64>, budget: &ErrorBudget) {
     let [friction, valve_gain] = [budget.widest(ElementErrors::friction), budget.widest(ElementErrors::valve_gain)];
     for u in tables.uncertainties_mut() {
-        u.torque_share = ((friction * friction + valve_gain * valve_gain) / 3.0).sqrt();
+        u.torque_fraction = ((friction * friction + valve_gain * valve_gain) / 3.0).sqrt();
         u.slow_part = 0.9999;
         (u.kiss_point_pa, u.pressure_pa) = (100.0, 300.0);
-        (u.valve_lag_share, u.valve_delay_s) = (0.001, 2e-4);
+        (u.valve_lag_fraction, u.valve_delay_s) = (0.001, 2e-4);
     }
 }
 

@@ -7,7 +7,7 @@ use study::gearbox::{ShiftDraw, ValveTiming};
 use super::cars::{Random, cars};
 use super::learning::{Drive, Errors, SHIFTS, draws};
 
-/// How sure a filter is that is told lag and delay: share of the lag, and s.
+/// How sure a filter is that is told lag and delay: fraction of the lag, and s.
 const SURE: (f64, f64) = (0.02, 0.001);
 
 /// Factor on the lag of a valve, and its delay, s; none as in the known car.

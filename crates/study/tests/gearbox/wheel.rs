@@ -207,12 +207,12 @@ impl Known {
     }
 }
 
-/// What a filter has learnt of the scale in its state, as a share, and the deviation.
+/// What a filter has learnt of the scale in its state, as a fraction, and the deviation.
 fn learnt(filter: &GearboxFilter<'_, f64>, state: &GearboxState<f64>) -> [f64; 2] {
     filter.learnt_wheel_scale(state.learnt())
 }
 
-/// A rate of twist of 0.1 rad/s may be no error of the scale: at 33 rad/s that is this share, and a drive of 18 s does not tell them apart.
+/// A rate of twist of 0.1 rad/s may be no error of the scale: at 33 rad/s that is this fraction, and a drive of 18 s does not tell them apart.
 const LITTLE: f64 = 3e-3;
 
 #[test]
@@ -293,7 +293,7 @@ fn what_is_no_scale_is_not_learnt() {
 fn a_wheel_speed_of_another_car_is_refused() {
     let known = Known::new();
     let filter = known.filter();
-    let share_refused = |change: &dyn Fn(usize) -> f64| {
+    let fraction_refused = |change: &dyn Fn(usize) -> f64| {
         let (mut state, mut refused, mut given) = (filter.start(), 0, 0);
         for (at, input) in known.inputs(scaled(1.0)).into_iter().enumerate() {
             let wheel_rad_s = input.wheel_rad_s.map(|reading| Reading { value: change(at) * reading.value, ..reading });
@@ -305,10 +305,10 @@ fn a_wheel_speed_of_another_car_is_refused() {
         }
         f64::from(refused) / f64::from(given)
     };
-    let [right, edge, beyond, other] = [1.0, 1.02, 1.05, 1.3].map(|scale| share_refused(&|_| scale));
+    let [right, edge, beyond, other] = [1.0, 1.02, 1.05, 1.3].map(|scale| fraction_refused(&|_| scale));
     println!("share refused: right {right:.4}, 2 % {edge:.4}, 5 % {beyond:.3}, 30 % {other:.3}");
     assert!(right < 0.002 && edge < 0.002 && beyond > 0.85 && other > 0.9, "{right} {edge} {beyond} {other}");
-    let passing = share_refused(&|at| if (600..1000).contains(&at) { 1.2 } else { 1.0 });
+    let passing = fraction_refused(&|at| if (600..1000).contains(&at) { 1.2 } else { 1.0 });
     let rows = known.recording.samples.len() as f64;
     println!("400 of {rows} wrong: {passing:.4} refused");
     // The mean over a second has forgotten a fifth after some four seconds.

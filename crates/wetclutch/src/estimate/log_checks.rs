@@ -95,7 +95,7 @@ pub(crate) fn old_commands(median_s: f64, bound_s: f64) -> Option<String> {
     })
 }
 
-/// Share by which times of rows are rounded.
+/// Fraction by which times of rows are rounded.
 const ROUNDING: f64 = 1e-3;
 
 /// Says what was met in mapped channels, after their last step; those of some roles may be empty.

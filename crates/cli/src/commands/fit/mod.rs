@@ -131,7 +131,7 @@ fn print_json(
             "value": row.value,
             "lower": row.interval[0],
             "upper": row.interval[1],
-            "deviation_after_over_before": row.share,
+            "deviation_after_over_before": row.fraction,
             "verdict": row.verdict.name(),
         })
     };
@@ -222,7 +222,7 @@ fn table(rows: &[ReportRow]) -> Result<(), Failure> {
     let titles = ["", "value", "95 %", "after / before", ""].map(str::to_owned).to_vec();
     let cells = rows.iter().map(|row| {
         let verdict = format!(" {}", row.verdict.name());
-        vec![row.name.clone(), row.value_text(), row.interval_text(), format!("{:.2}", row.share), verdict]
+        vec![row.name.clone(), row.value_text(), row.interval_text(), format!("{:.2}", row.fraction), verdict]
     });
     Ok(output::table(1, &[titles].into_iter().chain(cells).collect::<Vec<_>>())?)
 }

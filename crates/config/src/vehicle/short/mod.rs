@@ -12,7 +12,7 @@ mod uncertainty;
 
 use ::car::one_shift::{
     ENGINE_TORQUE_N_M, FINAL_RATIO, MASS_ERROR, OFFGOING_N_M, OFFGOING_OPEN_N_M, OUTPUT_ERROR_N_M, PISTON_AREAS_M2,
-    PLATE_RADII_M, RATIO_BEFORE, SHAFT_TORQUE_N_M, TORQUE_SHARES,
+    PLATE_RADII_M, RATIO_BEFORE, SHAFT_TORQUE_N_M, TORQUE_FRACTIONS,
 };
 use ::car::template::{MASS_KG, WHEEL_RADIUS_M};
 use drivetrain::Real;
@@ -135,7 +135,7 @@ const TURBINE_INERTIA_KG_M2: f64 = 0.06;
 const OUTPUT_INERTIA_KG_M2: f64 = 0.15;
 const LOWER_GEAR: f64 = RATIO_BEFORE * FINAL_RATIO;
 /// Its rolling resistance over the weight.
-const ROLLING_SHARE: f64 = 0.02;
+const ROLLING_FRACTION: f64 = 0.02;
 /// Pressure at which its plates touch, Pa.
 const KISS_PA: f64 = 60e3;
 
@@ -154,7 +154,7 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
     let rows = map.rows().iter().map(|speed| format!("  {},\n", row(speed))).collect::<String>();
     let elements =
         train::elements([facts.ratio_before, facts.ratio_after], torque).map_err(|wrong| facts.wrong_ratios(wrong))?;
-    let carried = [0, 1].map(|i| torque * elements[i].torque_share / TORQUE_SHARES[i]);
+    let carried = [0, 1].map(|i| torque * elements[i].torque_fraction / TORQUE_FRACTIONS[i]);
     let weight_n = facts.mass_kg * drivetrain::road::GRAVITY_M_S2;
     let mut fields = vec![
         ("before", toml_number(facts.ratio_before)),
@@ -175,7 +175,7 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
         ("max_force", toml_number(mass * TYRE_FORCE_N)),
         ("mass", toml_number(facts.mass_kg)),
         ("radius", toml_number(facts.wheel_radius_m)),
-        ("rolling", toml_number(ROLLING_SHARE * weight_n * facts.wheel_radius_m)),
+        ("rolling", toml_number(ROLLING_FRACTION * weight_n * facts.wheel_radius_m)),
         ("turbine_torque", toml_number(torque * TURBINE_ERROR_N_M)),
         ("mass_error", toml_number(MASS_ERROR * facts.mass_kg)),
         ("shaft_torque", toml_number(lower_gear * SHAFT_TORQUE_N_M)),

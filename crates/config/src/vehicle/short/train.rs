@@ -9,7 +9,7 @@ pub(super) struct Element {
     /// What it connects.
     pub(super) sides: String,
     /// Its torque in its gear over that of the turbine.
-    pub(super) torque_share: f64,
+    pub(super) torque_fraction: f64,
 }
 
 /// Teeth of a sun, and the most of a ring.
@@ -17,8 +17,8 @@ const SUNS: std::ops::RangeInclusive<u32> = 20..=480;
 const RING_MAX: f64 = 500.0;
 /// A ratio as near to 1 is 1.
 const DIRECT: f64 = 2e-3;
-/// Least share of the turbine torque that a clutch is made for: in a shift it carries more than in its gear.
-const SHARE_MIN: f64 = 0.3;
+/// Least fraction of the turbine torque that a clutch is made for: in a shift it carries more than in its gear.
+const FRACTION_MIN: f64 = 0.3;
 /// Inertia of a braked shaft, as it counts at the turbine, kg m^2, of the car that is scaled.
 const BRAKED_KG_M2: f64 = 0.0044;
 const INERTIA_MIN_KG_M2: f64 = 1e-4;
@@ -32,7 +32,7 @@ pub(super) fn elements(ratios: [f64; 2], torque: f64) -> Result<[Element; 2], St
 fn element(ratio: f64, shaft: &str, torque: f64) -> Result<Element, String> {
     if (ratio - 1.0).abs() < DIRECT {
         let sides = "input = \"turbine\"\noutput = \"output\"".to_owned();
-        return Ok(Element { text: String::new(), sides, torque_share: 1.0 });
+        return Ok(Element { text: String::new(), sides, torque_fraction: 1.0 });
     }
     // Teeth of the sun over those of the ring, which must be more; the members in the order sun, ring, carrier.
     let (teeth, [sun, ring, carrier]) = match ratio {
@@ -49,7 +49,7 @@ fn element(ratio: f64, shaft: &str, torque: f64) -> Result<Element, String> {
          sun_teeth = {sun_teeth}\nring_teeth = {ring_teeth}\n\n"
     );
     let sides = format!("input = \"housing\"\noutput = \"{shaft}\"");
-    Ok(Element { text, sides, torque_share: (ratio - 1.0).abs().max(SHARE_MIN) })
+    Ok(Element { text, sides, torque_fraction: (ratio - 1.0).abs().max(FRACTION_MIN) })
 }
 
 /// Whole numbers of teeth of sun and ring with about this quotient, the ring with more.

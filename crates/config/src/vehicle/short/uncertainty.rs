@@ -16,9 +16,9 @@ pub struct Uncertainty {
     pub limits: [f64; 2],
 }
 
-/// Shares by which defaults of a car may be off, where the error budget has none [chosen]: what differs between cars of one size
+/// Fractions by which defaults of a car may be off, where the error budget has none [chosen]: what differs between cars of one size
 /// and power, and between data sheet and car. `*` is any name.
-const SHARES: [(&str, f64); 26] = [
+const FRACTIONS: [(&str, f64); 26] = [
     ("engine.inertia_kg_m2", 0.2),
     ("converter.torque_ratio", 0.1),
     ("gear_train.shaft.*.inertia_kg_m2", 0.3),
@@ -51,11 +51,11 @@ const SHARES: [(&str, f64); 26] = [
 const SETTING: f64 = 2.0;
 
 impl DefaultTaken {
-    /// How far off it may be: what the error budget allows, else a share; half and twice for the settings of the observers and for
+    /// How far off it may be: what the error budget allows, else a fraction; half and twice for the settings of the observers and for
     /// the budget itself. None for a list that only says where values stand, and where no estimate depends on the value.
     pub fn uncertainty(&self, budget: &ErrorBounds) -> Option<Uncertainty> {
         let scale = |limits: [f64; 2]| Some(Uncertainty { change: Change::Scale, limits });
-        let share = |share: f64| scale([1.0 - share, 1.0 + share]);
+        let fraction = |fraction: f64| scale([1.0 - fraction, 1.0 + fraction]);
         let key = without_names(&self.key);
         match key.as_str() {
             "clutch.*.friction.coefficient" | "clutch.*.static_friction" => scale(budget.friction_factor),
@@ -68,10 +68,10 @@ impl DefaultTaken {
             }
             // A plate more or less has two faces, a single-sided one has one.
             "clutch.*.friction_faces" => Some(Uncertainty { change: Change::Add, limits: [-1.0, 1.0] }),
-            "converter.capacity_n_m_s2" => share(budget.turbine_torque_share),
+            "converter.capacity_n_m_s2" => fraction(budget.turbine_torque_share),
             "driveline.shaft_stiffness_n_m_rad" => scale(budget.shaft_stiffness_factor),
-            _ => match SHARES.iter().find(|(pattern, _)| *pattern == key) {
-                Some((_, off)) => share(*off),
+            _ => match FRACTIONS.iter().find(|(pattern, _)| *pattern == key) {
+                Some((_, off)) => fraction(*off),
                 None if is_setting(&key) && self.numbers.len() == 1 && self.numbers != [0.0] => {
                     scale([1.0 / SETTING, SETTING])
                 }
@@ -143,9 +143,9 @@ mod tests {
     }
 
     #[test]
-    fn every_share_belongs_to_a_default_and_every_default_of_the_car_has_an_uncertainty() {
+    fn every_fraction_belongs_to_a_default_and_every_default_of_the_car_has_an_uncertainty() {
         let cars = [short(ValveKind::Proportional), short(ValveKind::PulseWidth)];
-        for (pattern, _) in SHARES {
+        for (pattern, _) in FRACTIONS {
             let has = |car: &VehicleFile| car.defaults_taken.iter().any(|taken| without_names(&taken.key) == pattern);
             assert!(cars.iter().any(has), "{pattern}");
         }

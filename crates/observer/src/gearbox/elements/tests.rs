@@ -8,11 +8,11 @@ use drivetrain::{Clutch, ClutchValve, Cylinder, Table1, ValveMaps};
 const LIMITS: ValveLimits<f64> = ValveLimits { command_max: 1.2, command_error: 0.01, pressure_max_pa: 1.1e6 };
 
 const UNCERTAINTY: ElementUncertainty<f64> = ElementUncertainty {
-    torque_share: 0.12,
+    torque_fraction: 0.12,
     slow_part: 0.75,
     valve_gain: 0.06,
     kiss_point_pa: 7e3,
-    valve_lag_share: 0.3,
+    valve_lag_fraction: 0.3,
     valve_delay_s: 9e-3,
     pressure_pa: 7e3,
 };

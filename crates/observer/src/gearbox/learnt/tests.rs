@@ -321,7 +321,7 @@ fn what_depends_on_the_oil_is_forgotten_with_its_temperature() {
     );
     learnt.pass(WITH_OIL_S, &CORRELATIONS);
     let left = (-1.0_f64).exp();
-    for (place, share) in [
+    for (place, fraction) in [
         (1, left),
         (KISS_AT + 1, left),
         (TURBINE_AT, left),
@@ -331,13 +331,13 @@ fn what_depends_on_the_oil_is_forgotten_with_its_temperature() {
         (STIFFNESS_AT, 1.0),
         (WHEEL_AT, 1.0),
     ] {
-        assert!((learnt.mean[place] / 0.8 - share).abs() < 3e-3, "{place}: {}", learnt.mean[place]);
+        assert!((learnt.mean[place] / 0.8 - fraction).abs() < 3e-3, "{place}: {}", learnt.mean[place]);
     }
 }
 
-/// Two errors of which only the sum is seen: each gets its share of it, and the same sum again is no news.
+/// Two errors of which only the sum is seen: each gets its part of it, and the same sum again is no news.
 #[test]
-fn a_reported_torque_moves_the_capacity_by_its_share_of_the_variance_and_once() {
+fn a_reported_torque_moves_the_capacity_by_its_fraction_of_the_variance_and_once() {
     let (deviations, noise) = ([0.05, 0.035], 1e-8);
     let part = 0.05_f64.powi(2) / (0.05_f64.powi(2) + 0.035_f64.powi(2));
     let mut learnt = Learnt::nothing(&CORRELATIONS);
@@ -350,8 +350,8 @@ fn a_reported_torque_moves_the_capacity_by_its_share_of_the_variance_and_once() 
     assert!(learnt.covariance[TURBINE_AT][TURBINE_AT] > 0.9 * left && learnt.checked().is_some());
     // Of neither of these cars, and no numbers.
     let known = learnt;
-    for share in [0.2, -0.3, f64::NAN, f64::INFINITY] {
-        learnt.take_capacity(share, deviations, noise);
+    for fraction in [0.2, -0.3, f64::NAN, f64::INFINITY] {
+        learnt.take_capacity(fraction, deviations, noise);
     }
     for (deviations, noise) in [([f64::NAN, 0.1], 0.1), ([0.05, 0.035], f64::NAN), ([0.0, 0.0], 0.0)] {
         learnt.take_capacity(0.01, deviations, noise);

@@ -29,7 +29,7 @@ pub struct CarCalibration {
     pub flare_per_s: f64,
     /// Speed of the oncoming ramp when the old gear flares, over that without.
     pub flare_ramp: f64,
-    /// Share of the turbine torque that the offgoing clutch holds while the old gear flares.
+    /// Fraction of the turbine torque that the offgoing clutch holds while the old gear flares.
     pub flare_holding: f64,
     /// Turbine torque beyond which its sign is believed, N m.
     pub sign_n_m: f64,
@@ -74,13 +74,13 @@ pub struct CarCalibration {
     pub lock_ramp_s: f64,
     /// Time after which the oncoming clutch is closed whatever its slip, s.
     pub longest_s: f64,
-    /// Share of the engine torque in the inertia phase of power-on upshifts.
-    pub up_engine_share: f64,
-    /// Share of the engine torque at the end of the inertia phase of power-on downshifts.
-    pub down_engine_share: f64,
-    /// Share of the way at which the torque of an upshift is given back, and that of a downshift is taken.
+    /// Fraction of the engine torque in the inertia phase of power-on upshifts.
+    pub up_engine_fraction: f64,
+    /// Fraction of the engine torque at the end of the inertia phase of power-on downshifts.
+    pub down_engine_fraction: f64,
+    /// Fraction of the way at which the torque of an upshift is given back, and that of a downshift is taken.
     pub engine_way: f64,
-    /// Time in which the share of the engine torque changes by one, s.
+    /// Time in which the fraction of the engine torque changes by one, s.
     pub engine_ramp_s: f64,
     /// Time in which the engine torque rises from none to the greatest in a shift, s, when the driver asks for it: a pedal that is
     /// moved in a shift is followed as fast as the clutches can answer.
@@ -156,8 +156,8 @@ impl CarCalibration {
         lock_hold_s: 0.03,
         lock_ramp_s: 0.15,
         longest_s: 3.0,
-        up_engine_share: 0.55,
-        down_engine_share: 0.7,
+        up_engine_fraction: 0.55,
+        down_engine_fraction: 0.7,
         engine_way: 0.8,
         engine_ramp_s: 0.2,
         tip_in_s: 0.5,

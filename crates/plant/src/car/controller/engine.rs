@@ -18,8 +18,8 @@ use super::{CarCalibration, CarMeasured};
 /// The engine as the shift controller asks for it.
 #[derive(Debug, Clone)]
 pub(super) struct EngineControl {
-    /// Share of the torque by the stage of the shift.
-    stage_share: f64,
+    /// Fraction of the torque by the stage of the shift.
+    stage_fraction: f64,
     /// Torque that is let through, N m, and that it will be.
     passed_n_m: f64,
     expected_n_m: f64,
@@ -28,28 +28,28 @@ pub(super) struct EngineControl {
 
 impl EngineControl {
     pub(super) fn new() -> Self {
-        Self { stage_share: 1.0, passed_n_m: 0.0, expected_n_m: 0.0, is_limited: false }
+        Self { stage_fraction: 1.0, passed_n_m: 0.0, expected_n_m: 0.0, is_limited: false }
     }
 
-    /// Share of the engine torque for the next period; `stage_share` is what the stage of the shift wants of it, `None` without
+    /// Fraction of the engine torque for the next period; `stage_fraction` is what the stage of the shift wants of it, `None` without
     /// a shift.
     pub(super) fn step(
         &mut self,
         (car, c): (&Car, &CarCalibration),
         throttle: f64,
-        stage_share: Option<f64>,
+        stage_fraction: Option<f64>,
         measured: &CarMeasured,
     ) -> f64 {
         let period_s = c.control_period_s;
         let step = period_s / c.engine_ramp_s;
-        self.stage_share += (stage_share.unwrap_or(1.0) - self.stage_share).clamp(-step, step);
+        self.stage_fraction += (stage_fraction.unwrap_or(1.0) - self.stage_fraction).clamp(-step, step);
         let driver_n_m = car.engine.torque(measured.engine_rad_s, throttle);
-        let asked_n_m = if driver_n_m > 0.0 { driver_n_m * self.stage_share } else { driver_n_m };
+        let asked_n_m = if driver_n_m > 0.0 { driver_n_m * self.stage_fraction } else { driver_n_m };
         let rise_n_m_s = car.engine.torque(measured.engine_rad_s, 1.0).max(0.0) / c.tip_in_s;
         let most_n_m = |after_s: f64, from_n_m: f64| from_n_m.max(0.0) + rise_n_m_s * after_s;
         let at_once_n_m = most_n_m(period_s, self.passed_n_m);
         // After the shift until the driver has what he asks for.
-        self.is_limited = stage_share.is_some() || (self.is_limited && asked_n_m > at_once_n_m);
+        self.is_limited = stage_fraction.is_some() || (self.is_limited && asked_n_m > at_once_n_m);
         self.passed_n_m = if self.is_limited { asked_n_m.min(at_once_n_m) } else { asked_n_m };
         self.expected_n_m = asked_n_m.min(most_n_m(c.lead_s, self.passed_n_m));
         if driver_n_m > 0.0 { self.passed_n_m / driver_n_m } else { 1.0 }

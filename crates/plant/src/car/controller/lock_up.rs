@@ -15,8 +15,8 @@ use super::{CarCalibration, CarMeasured};
 /// State of its controller.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct LockUpControl {
-    /// Share of its capacity that it may hold.
-    share: f64,
+    /// Fraction of its capacity that it may hold.
+    fraction: f64,
     is_closed: bool,
     /// Integral of the slip error, rad.
     integral_rad: f64,
@@ -38,8 +38,8 @@ impl LockUpControl {
         self.is_closed = is_high && measured.turbine_rad_s > slowest;
         let period_s = c.control_period_s;
         let step = if self.is_closed { period_s / lock_up.ramp_s } else { -period_s / c.unlock_s };
-        self.share = (self.share + step).clamp(0.0, 1.0);
-        let most_n_m = self.share * lock_up.capacity_n_m;
+        self.fraction = (self.fraction + step).clamp(0.0, 1.0);
+        let most_n_m = self.fraction * lock_up.capacity_n_m;
         if lock_up.slip_rad_s > 0.0 {
             self.slipping_n_m((car, c), &lock_up, most_n_m, engine_n_m, measured)
         } else {

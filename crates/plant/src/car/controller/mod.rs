@@ -1,4 +1,4 @@
-//! The shift controller of any gearbox: commands of all elements and the share of engine torque, from measured speeds.
+//! The shift controller of any gearbox: commands of all elements and the fraction of engine torque, from measured speeds.
 //!
 //! A shift is run by the reduced shift of the gearbox: torques `U` at the turbine, `alpha` and ratio of both clutches, and the
 //! 2 x 2 mass. With the offgoing slip `y = w_t - i_off w_0` and the oncoming slip `z = w_t - i_on w_0` at the turbine, one
@@ -73,7 +73,7 @@ pub struct CarCommands {
     pub elements: [f64; MAX_ELEMENTS],
     /// Which elements are dogs that are to be in.
     pub dogs: [bool; MAX_ELEMENTS],
-    /// Share of the engine torque that the driver asks for.
+    /// Fraction of the engine torque that the driver asks for.
     pub engine_share: f64,
     /// Torque that the lock-up clutch is to hold, N m.
     pub lock_up_n_m: f64,
@@ -366,8 +366,8 @@ impl CarShiftController {
         }
         let period_s = self.calibration.control_period_s;
         self.output.follow(measured.wheel_rad_s * self.car.driveline.final_ratio, period_s);
-        let stage_share = self.active.as_ref().map(ActiveShift::engine_share);
-        let engine_share = self.engine.step((&self.car, &self.calibration), throttle, stage_share, measured);
+        let stage_fraction = self.active.as_ref().map(ActiveShift::engine_share);
+        let engine_share = self.engine.step((&self.car, &self.calibration), throttle, stage_fraction, measured);
         let turbine_n_m = self.engine.turbine_n_m(&self.car, measured);
         let (mut elements, dogs) = self.held();
         let line_pa = self.car.line_pressure_pa;
@@ -388,7 +388,7 @@ impl CarShiftController {
             for (clutch, pressure_pa) in [&shift.offgoing, &shift.oncoming].into_iter().zip(pressures) {
                 elements[clutch.element] = clutch.valve_command(pressure_pa.clamp(0.0, line_pa));
             }
-            shift.choose_engine_share(&self.calibration, turbine_n_m, measured);
+            shift.choose_engine_fraction(&self.calibration, turbine_n_m, measured);
             if shift.stage == ShiftStage::Done {
                 self.gear = shift.to;
                 self.active = None;

@@ -6,7 +6,7 @@ use super::pressure::Controlled;
 use super::track::Track;
 use super::{CarCalibration, CarMeasured};
 
-/// Share of the fill after which the oncoming clutch is at its waiting pressure.
+/// Fraction of the fill after which the oncoming clutch is at its waiting pressure.
 const FILLED_AT: f64 = 0.75;
 
 /// Ratios closer than this are one.
@@ -47,7 +47,7 @@ pub(super) struct ActiveShift {
     begun_s: f64,
     since_s: f64,
     is_filled_by_plan: bool,
-    /// Share of the load that the oncoming clutch has taken in the torque phase.
+    /// Fraction of the load that the oncoming clutch has taken in the torque phase.
     transferred: f64,
     has_flared: bool,
     /// Size of the torque that the offgoing clutch is to hold, N m at the turbine.
@@ -341,14 +341,14 @@ impl ActiveShift {
     }
 
     fn fill(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let share = ((now.time_s - self.since_s + c.control_period_s) / self.fill_s(c)).min(1.0);
+        let fraction = ((now.time_s - self.since_s + c.control_period_s) / self.fill_s(c)).min(1.0);
         let held = self.offgoing.pressure_for(c.holding_margin * self.held_n_m, 0.0);
-        let offgoing_pa = self.line_pa.min(held + (1.0 - share) * (self.line_pa - held).max(0.0));
+        let offgoing_pa = self.line_pa.min(held + (1.0 - fraction) * (self.line_pa - held).max(0.0));
         if self.oncoming.fill.is_some() {
             return [offgoing_pa, self.waiting_pa(c, now)];
         }
         // Gently: a command that falls arrives later than the one that rises before it.
-        let filled = Real::sin(std::f64::consts::FRAC_PI_2 * (share / FILLED_AT).min(1.0));
+        let filled = Real::sin(std::f64::consts::FRAC_PI_2 * (fraction / FILLED_AT).min(1.0));
         [offgoing_pa, filled * self.waiting_pa(c, now)]
     }
 
@@ -423,31 +423,31 @@ impl ActiveShift {
 
     /// The oncoming clutch closes; what it cannot yet carry of the controlled torque stays with the offgoing one.
     fn hand_over(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let share = ((now.time_s - self.since_s + c.control_period_s) / c.hand_over_s).min(1.0);
-        let taken = share * self.closing_n_m(c, now);
+        let fraction = ((now.time_s - self.since_s + c.control_period_s) / c.hand_over_s).min(1.0);
+        let taken = fraction * self.closing_n_m(c, now);
         let left = (-self.slip_controlled_n_m(c, now) * self.direction - taken).max(0.0);
         // The offgoing clutch is open at the end, whatever the slip.
-        let left = left.min((1.0 - share) * c.holding_margin * self.handed_n_m.abs());
+        let left = left.min((1.0 - fraction) * c.holding_margin * self.handed_n_m.abs());
         let oncoming = taken + self.beyond_n_m(c, now);
         [self.offgoing.pressure_for(left, now.y), self.oncoming.pressure_for(oncoming, now.z)]
     }
 
     fn locked_pa(&self, c: &CarCalibration, now: &Now) -> f64 {
         let closing = self.oncoming.pressure_for(self.closing_n_m(c, now) + self.beyond_n_m(c, now), now.z);
-        let share = ((now.time_s - self.since_s) / c.lock_ramp_s).min(1.0);
-        closing + share * (self.line_pa - closing).max(0.0)
+        let fraction = ((now.time_s - self.since_s) / c.lock_ramp_s).min(1.0);
+        closing + fraction * (self.line_pa - closing).max(0.0)
     }
 
-    /// Share of the engine torque that suits the stage.
+    /// Fraction of the engine torque that suits the stage.
     pub(super) fn engine_share(&self) -> f64 {
         self.engine_share
     }
 
-    pub(super) fn choose_engine_share(&mut self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) {
-        self.engine_share = self.suitable_engine_share(c, turbine_n_m, measured);
+    pub(super) fn choose_engine_fraction(&mut self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) {
+        self.engine_share = self.suitable_engine_fraction(c, turbine_n_m, measured);
     }
 
-    fn suitable_engine_share(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
+    fn suitable_engine_fraction(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
         if !self.is_slipping || self.is_from_neutral {
             return 1.0;
         }
@@ -455,12 +455,12 @@ impl ActiveShift {
         let way = 1.0 - z / self.from_rad_s;
         match self.stage {
             ShiftStage::InertiaPhase if turbine_n_m > 0.0 && self.direction > 0.0 && way < c.engine_way => {
-                c.up_engine_share
+                c.up_engine_fraction
             }
             ShiftStage::InertiaPhase | ShiftStage::HandOver
                 if turbine_n_m > 0.0 && self.direction < 0.0 && way > c.engine_way =>
             {
-                c.down_engine_share
+                c.down_engine_fraction
             }
             _ => 1.0,
         }
@@ -469,9 +469,9 @@ impl ActiveShift {
 
 /// Half a cosine between two values: value and rate after `elapsed_s` of `duration_s`.
 fn half_cosine(from: f64, to: f64, elapsed_s: f64, duration_s: f64) -> (f64, f64) {
-    let share = (elapsed_s / duration_s).clamp(0.0, 1.0);
-    let angle = std::f64::consts::PI * share;
-    let running = if share < 1.0 { 1.0 } else { 0.0 };
+    let fraction = (elapsed_s / duration_s).clamp(0.0, 1.0);
+    let angle = std::f64::consts::PI * fraction;
+    let running = if fraction < 1.0 { 1.0 } else { 0.0 };
     let half = 0.5 * (from - to);
     (to + half * (1.0 + Real::cos(angle)), -half * std::f64::consts::PI / duration_s * Real::sin(angle) * running)
 }

@@ -235,6 +235,6 @@ fn time_at(points: &[(f64, f64)], error: f64) -> Option<f64> {
 
 /// Largest difference of a state, over its size.
 fn error(end: &[f64; STATES], reference: &[f64; STATES]) -> f64 {
-    let share = |i: usize| (end[i] - reference[i]).abs() / (State::SCALE.to_array()[i].max(reference[i].abs()));
-    (0..STATES).map(share).fold(0.0, f64::max)
+    let fraction = |i: usize| (end[i] - reference[i]).abs() / (State::SCALE.to_array()[i].max(reference[i].abs()));
+    (0..STATES).map(fraction).fold(0.0, f64::max)
 }

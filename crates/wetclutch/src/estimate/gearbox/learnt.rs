@@ -54,7 +54,7 @@ fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> V
     let mut said = vec![
         format!(
             "learnt torque at the same pressure (friction times gain), % above the vehicle file: {}",
-            list(&|of| of.torque_share, 100.0)
+            list(&|of| of.torque_fraction, 100.0)
         ),
         format!("learnt kiss points, kPa above the vehicle file: {}", list(&|of| of.kiss_pa, 1e-3)),
     ];

@@ -222,9 +222,10 @@ impl Findings {
         said.extend(said_of_origin(origin_s));
         said.push(format!("rows: {rows}, from {:.3} to {:.3} s", self.first_s - origin_s, self.last_s - origin_s));
         said.push(format!("shifts: {}", self.shifts(origin_s)));
-        let share = |count: u64| 100.0 * count as f64 / self.rows as f64;
-        let shares = self.health.iter().map(|(health, count)| format!("{} {:.1} %", health.name(), share(*count)));
-        said.push(format!("health: {}", shares.collect::<Vec<_>>().join(", ")));
+        let fraction = |count: u64| 100.0 * count as f64 / self.rows as f64;
+        let fractions =
+            self.health.iter().map(|(health, count)| format!("{} {:.1} %", health.name(), fraction(*count)));
+        said.push(format!("health: {}", fractions.collect::<Vec<_>>().join(", ")));
         said
     }
 

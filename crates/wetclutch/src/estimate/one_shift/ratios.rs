@@ -10,10 +10,10 @@ use crate::Error;
 
 /// Below this output speed a ratio says nothing, rad/s.
 const OUTPUT_MIN_RAD_S: f64 = 8.0;
-/// A ratio is that of a gear within this share.
+/// A ratio is that of a gear within this fraction.
 const IN_GEAR: f64 = 0.05;
 /// A car is in gear for most of the time; so little says that its gears are others.
-const IN_GEAR_SHARE: f64 = 0.1;
+const IN_GEAR_FRACTION: f64 = 0.1;
 /// By the wheels it is in gear for so much of the time where the output speed alone is wrong.
 const MOSTLY: f64 = 0.5;
 /// Wheels differ by so much: tyres, scale and slip are a part of it.
@@ -91,11 +91,11 @@ impl Ratios {
         if self.moving < STEPS || self.moving_s < TIME_S {
             return Ok(());
         }
-        let share = |in_gear: u64| in_gear as f64 / self.moving as f64;
-        if share(self.in_gear) < IN_GEAR_SHARE {
+        let fraction = |in_gear: u64| in_gear as f64 / self.moving as f64;
+        if fraction(self.in_gear) < IN_GEAR_FRACTION {
             // Turbine and wheels fit each other: it is the output that is wrong.
             let (final_ratio, found) = (self.final_ratio, self.output_over_wheel.middle());
-            if share(self.in_gear_by_wheel) > MOSTLY && check_wheel(found, final_ratio).is_err() {
+            if fraction(self.in_gear_by_wheel) > MOSTLY && check_wheel(found, final_ratio).is_err() {
                 return Err(Error::Input(format!(
                     "output_speed over wheel_speed is {found:.2} in the middle, and the final ratio of the vehicle file is {final_ratio:.2}; \
                      turbine_speed and wheel_speed fit the gears\nhint: output_speed is {:.3} times too large: check its unit and scale",
@@ -112,7 +112,7 @@ impl Ratios {
                 "turbine_speed over output_speed is {:.3} in the middle, and the gears of the vehicle file have {offgoing:.3} and \
                  {oncoming:.3}: the car is in them for {:.0} % of the time\nhint: {hint}",
                 self.turbine_over_output.middle(),
-                100.0 * share(self.in_gear),
+                100.0 * fraction(self.in_gear),
             )));
         }
         check_wheel(self.output_over_wheel.middle(), self.final_ratio)
