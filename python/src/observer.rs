@@ -349,7 +349,7 @@ impl ClutchStep {
     /// Standard deviation of the torque, N m.
     #[getter]
     fn torque_deviation_n_m(&self) -> f64 {
-        self.clutch.deviation_n_m
+        self.clutch.std_dev_n_m
     }
 
     /// Pressure by the models of valve and piston alone, Pa.

@@ -30,12 +30,12 @@ fn line(text: &str) -> String {
     text.lines().find(|line| line.starts_with("learnt: ")).unwrap_or_else(|| panic!("{text}")).to_owned()
 }
 
-/// The value that is said of an element, and its deviation.
+/// The value that is said of an element, and its standard deviation.
 fn of_element(text: &str, what: &str, element: &str) -> [f64; 2] {
     let said = text.lines().find(|line| line.starts_with(what)).unwrap_or_else(|| panic!("{text}"));
     let after = said.split_once(": ").unwrap().1.split(", ").find_map(|part| part.strip_prefix(&format!("{element} ")));
-    let (value, deviation) = after.unwrap().split_once(" +-").unwrap();
-    [value, deviation].map(|number| number.parse().unwrap())
+    let (value, std_dev) = after.unwrap().split_once(" +-").unwrap();
+    [value, std_dev].map(|number| number.parse().unwrap())
 }
 
 #[test]
@@ -162,18 +162,18 @@ fn a_friction_above_the_file_is_said_in_words() {
         said(&estimate(&folder, &["sim/city_measured.csv"], &["--learnt", &learnt, "-o", &folder.path("out.csv")]));
     // All five have 12 %; B shifts once in a while only.
     for element in ["A", "C", "D", "E"] {
-        let [torque, deviation] = of_element(&text, "learnt torque at the same pressure", element);
-        assert!((torque - 12.0).abs() < 12.0 && (torque - 12.0).abs() < 2.0 * deviation, "{element}: {text}");
-        let [kiss_kpa, deviation] = of_element(&text, "learnt kiss points", element);
-        assert!(kiss_kpa.abs() < 3.0 * deviation, "{element}: {text}");
+        let [torque, std_dev] = of_element(&text, "learnt torque at the same pressure", element);
+        assert!((torque - 12.0).abs() < 12.0 && (torque - 12.0).abs() < 2.0 * std_dev, "{element}: {text}");
+        let [kiss_kpa, std_dev] = of_element(&text, "learnt kiss points", element);
+        assert!(kiss_kpa.abs() < 3.0 * std_dev, "{element}: {text}");
     }
     assert!(text.contains("\nlearnt scale of the wheel speed: it reads "), "{text}");
     // The converter is that of the file, and the simulated engine reports its torque as it is.
     for name in ["learnt torque at the gearbox input: ", "learnt reported engine torque: "] {
         let number = |text: &str| text.split(' ').next().unwrap().trim_start_matches("+-").parse::<f64>().unwrap();
         let said = text.split_once(name).unwrap().1;
-        let deviation = number(said.split_once(' ').unwrap().1);
-        assert!(number(said).abs() < 3.0 * deviation && deviation < 5.0, "{name}: {text}");
+        let std_dev = number(said.split_once(' ').unwrap().1);
+        assert!(number(said).abs() < 3.0 * std_dev && std_dev < 5.0, "{name}: {text}");
     }
 }
 

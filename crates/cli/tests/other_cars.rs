@@ -167,7 +167,7 @@ fn lock_up_and_launch_clutch_have_a_torque() {
         let found = estimate(&folder, &log, car, "out.csv");
         let (error, rows) = rms(&std::fs::read_to_string(truth).unwrap(), &found, clutch);
         assert!(error < 8.0 && rows > 400, "{clutch}: {error} N m in {rows} rows");
-        let deviations = numbers(&found, &format!("{clutch}_torque_deviation_n_m"));
-        assert!(deviations.iter().filter(|deviation| deviation.is_finite()).all(|deviation| *deviation > 0.0));
+        let std_devs = numbers(&found, &format!("{clutch}_torque_deviation_n_m"));
+        assert!(std_devs.iter().filter(|std_dev| std_dev.is_finite()).all(|std_dev| *std_dev > 0.0));
     }
 }

@@ -8,7 +8,7 @@ use observer::{
 };
 
 use observer::of_sensors::{
-    ENGINE_KG_M2, SCALE_LEAST, deviation_of, deviation_rad_s, engine_noise, lag_rad, speed_reading,
+    ENGINE_KG_M2, SCALE_LEAST, engine_noise, lag_rad, speed_reading, std_dev_of, std_dev_rad_s,
 };
 
 use crate::budget::{ValveErrors, shift_pressure, shift_time_constant};
@@ -31,8 +31,8 @@ const CLUTCH_S: f64 = 20.0;
 const DELAY_LEAST_S: f64 = 1.3e-3;
 
 /// Half the width of a range, as the edge of a uniform distribution.
-fn deviation_within(range: [f64; 2]) -> f64 {
-    deviation_of(0.5 * (range[1] - range[0]))
+fn std_dev_within(range: [f64; 2]) -> f64 {
+    std_dev_of(0.5 * (range[1] - range[0]))
 }
 
 /// An error for each unit of what it is weighed at; weighed at nothing there is none.
@@ -81,7 +81,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
     };
     let reported = ReportedTorque {
         engine_kg_m2: vehicle.engine.inertia_kg_m2,
-        fraction: deviation_of(budget.engine_torque_share),
+        fraction: std_dev_of(budget.engine_torque_share),
         beside_n_m: ENGINE_BESIDE_N_M * (vehicle.engine.inertia_kg_m2 / ENGINE_KG_M2),
     };
     KalmanFilter::new(
@@ -111,26 +111,26 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
     let swing_rad_s = (line.shaft_stiffness_n_m_rad * (gearbox.recip() + wheels.recip())).sqrt();
     let quarter_swing_s = 0.5 * std::f64::consts::PI / swing_rad_s;
     let [delay_least_s, delay_most_s] = budget.valve_delay_s;
-    let lag = deviation_of(budget.valve_lag_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max));
-    let delay = deviation_of(0.5 * (delay_most_s - delay_least_s)) / shift_time_constant(vehicle);
+    let lag = std_dev_of(budget.valve_lag_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max));
+    let delay = std_dev_of(0.5 * (delay_most_s - delay_least_s)) / shift_time_constant(vehicle);
     Uncertainty {
-        turbine_share: deviation_of(budget.turbine_torque_share),
+        turbine_share: std_dev_of(budget.turbine_torque_share),
         turbine_share_s: told.turbine_share_s,
-        stiffness_fraction: deviation_within(budget.shaft_stiffness_factor),
+        stiffness_fraction: std_dev_within(budget.shaft_stiffness_factor),
         backlash_n_m: budget.backlash_rad * line.shaft_stiffness_n_m_rad,
         valve_fraction: Real::hypot(lag, delay),
-        valve_gain: deviation_within(budget.valve_gain_factor),
+        valve_gain: std_dev_within(budget.valve_gain_factor),
         rate_s: told.valve_rate_s,
-        friction: deviation_within(budget.friction_factor),
+        friction: std_dev_within(budget.friction_factor),
         clutch_s: CLUTCH_S,
         offgoing_n_m: told.offgoing_n_m,
         offgoing_release_s: told.offgoing_release_s,
         load_shifting_n_m: budget.shaft_torque_n_m / quarter_swing_s.sqrt(),
         load_in_gear_n_m: LOAD_IN_GEAR * budget.shaft_torque_n_m / LOAD_IN_GEAR_S.sqrt(),
-        wheel_scale: deviation_of(budget.wheel_scale),
+        wheel_scale: std_dev_of(budget.wheel_scale),
         wheel_delay_s: [-budget.channel_skew_s, budget.wheel_delay_s],
         skew_s: budget.channel_skew_s,
-        scale_least: SCALE_LEAST.min(deviation_of(budget.wheel_scale)),
+        scale_least: SCALE_LEAST.min(std_dev_of(budget.wheel_scale)),
         delay_least_s: DELAY_LEAST_S,
         output_least_rad_s: told.output_least_rad_s,
     }
@@ -159,15 +159,15 @@ fn aged_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> ExtendedFilter<f
     let (budget, told) = (&vehicle.error_bounds, &vehicle.settings.filter);
     let valve = ValveErrors::of(vehicle);
     let noise = FilterNoise {
-        turbine_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.turbine), budget.turbine_quantum_rad_s),
-        output_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.output), budget.output_quantum_rad_s),
-        wheel_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.wheel), budget.wheel_quantum_rad_s),
+        turbine_rad_s: std_dev_rad_s(sensors.map(|sensors| &sensors.turbine), budget.turbine_quantum_rad_s),
+        output_rad_s: std_dev_rad_s(sensors.map(|sensors| &sensors.output), budget.output_quantum_rad_s),
+        wheel_rad_s: std_dev_rad_s(sensors.map(|sensors| &sensors.wheel), budget.wheel_quantum_rad_s),
         turbine_share: told.turbine_share,
         turbine_share_s: told.turbine_share_s,
         twist_rate_rad_s: told.twist_rate_rad_s,
         output_least_rad_s: told.output_least_rad_s,
-        valve_moving: fraction(deviation_of(Real::hypot(valve.lag_pa_s, valve.delay_pa_s)), budget.shift_ramp_pa_s),
-        valve_resting_per_s: fraction(deviation_of(valve.gain_pa_s), shift_pressure(vehicle)),
+        valve_moving: fraction(std_dev_of(Real::hypot(valve.lag_pa_s, valve.delay_pa_s)), budget.shift_ramp_pa_s),
+        valve_resting_per_s: fraction(std_dev_of(valve.gain_pa_s), shift_pressure(vehicle)),
         valve_rate_s: told.valve_rate_s,
         offgoing_n_m: told.offgoing_n_m,
         offgoing_release_s: told.offgoing_release_s,

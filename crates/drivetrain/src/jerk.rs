@@ -6,7 +6,7 @@
 //!
 //! A longitudinal acceleration that swings with a frequency `f` and an amplitude `a` shows with a jerk of nearly `2 pi f a` up to
 //! 1 Hz, of half of it at 3 Hz, and of nothing from 6 Hz on. Shorter windows follow the noise of speeds on a vehicle bus: the
-//! rounding to 0.05 km/h at 50 Hz alone has a deviation of 4 m/s^3 over 0.1 s, and of 0.3 m/s^3 over 0.3 s.
+//! rounding to 0.05 km/h at 50 Hz alone has a standard deviation of 4 m/s^3 over 0.1 s, and of 0.3 m/s^3 over 0.3 s.
 
 /// Time over which a parabola is laid, s.
 pub const WINDOW_S: f64 = 0.3;

@@ -124,7 +124,8 @@ impl ScoredShift {
         self.summary.mean_torque_n_m[clutch.min(1)]
     }
 
-    /// Of a gearbox by its ratios alone: mean torque of the clutches at the turbine in the inertia phase, and the mean of its deviation, N m.
+    /// Of a gearbox by its ratios alone: mean torque of the clutches at the turbine in the inertia phase, and the mean of its standard
+    /// deviation, N m.
     pub fn mean_at_turbine_n_m(&self) -> Option<[f64; 2]> {
         self.summary.mean_at_turbine_n_m
     }

@@ -295,7 +295,7 @@ impl<'c> LoggedDrive<'c> {
         let [_, turbine, output] = self.speeds_rad_s;
         self.beyond.push(&mut shift.quality, [turbine, output]);
         let found = estimate.clutches.filter(|found| Some(found.map(|clutch| clutch.element)) == elements);
-        let at_turbine_n_m = estimate.at_turbine.map(|clutches| [clutches.torque_n_m, clutches.deviation_n_m]);
+        let at_turbine_n_m = estimate.at_turbine.map(|clutches| [clutches.torque_n_m, clutches.std_dev_n_m]);
         let row = self.tables.tables().shift(from, to).copied();
         let clutches = match (found.zip(row), self.car.gearbox.has_ratios_alone()) {
             (Some((found, row)), _) => {

@@ -256,7 +256,7 @@ mod tests {
         for row in fast.clone() {
             let truth = speeds_of(&row.sample);
             for (at, ([read, age_s], truth)) in row.speeds.iter().zip(truth).enumerate() {
-                // Five deviations of noise, and some 15 ms of delay at 500 rad/s^2.
+                // Five standard deviations of noise, and some 15 ms of delay at 500 rad/s^2.
                 assert!(*age_s == 0.0 && (read - truth).abs() < 8.0, "{at} {}: {read} {truth}", row.sample.time_s);
             }
         }

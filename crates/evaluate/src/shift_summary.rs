@@ -33,7 +33,8 @@ pub struct ShiftSummary {
     pub friction_work_j: [Option<[f64; 3]>; 2],
     /// Largest torque with which both clutches work against each other, at the turbine, N m, by the estimate.
     pub tie_up_n_m: f64,
-    /// Of a gearbox by its ratios alone: mean torque of the clutches together at the turbine in the inertia phase, and of its deviation, N m.
+    /// Of a gearbox by its ratios alone: mean torque of the clutches together at the turbine in the inertia phase, and of its standard
+    /// deviation, N m.
     pub mean_at_turbine_n_m: Option<[f64; 2]>,
     /// How much there is to see in it.
     pub(crate) measures: Measures,

@@ -26,7 +26,7 @@ pub(crate) fn measures(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Measu
     let is_remarked = |row: &&ShiftScoreRow| !matches!(row.health, Health::Good | Health::CommandsMistimed);
     let remarked = rows.iter().filter(is_remarked).count() as f64 / rows.len().max(1) as f64;
     let at_turbine = rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia));
-    let mut at_turbine = at_turbine.filter_map(|row| row.at_turbine_n_m.map(|[_, deviation]| deviation)).peekable();
+    let mut at_turbine = at_turbine.filter_map(|row| row.at_turbine_n_m.map(|[_, std_dev]| std_dev)).peekable();
     if at_turbine.peek().is_some() {
         return [remarked, mean(&mut at_turbine), 0.0];
     }

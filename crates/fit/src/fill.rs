@@ -19,7 +19,7 @@ use crate::{Series, Verdict};
 /// Pressure drop over the passages in a fast fill at which flows are compared, Pa \[chosen: as production gearboxes command it\].
 pub(crate) const FILL_DROP_PA: f64 = 0.15e6;
 /// Least standard deviation of a fitted fill volume: of slow and of fast flows, as passages and oil may be, one law has not both. Within 10 % of an
-/// orifice's area and 15 K the ratio of the flows at 20 and at 150 kPa has a deviation of 2 and of 4 %.
+/// orifice's area and 15 K the ratio of the flows at 20 and at 150 kPa has a standard deviation of 2 and of 4 %.
 const FILL_FLOOR: f64 = 0.04;
 /// What the preload of the spring may be off beside the kiss point, as a fraction \[chosen, as in the error budget\].
 const PRELOAD: f64 = 0.1;

@@ -231,7 +231,7 @@ fn found(
     Ok((precision, misfits))
 }
 
-/// The fill volume of the oncoming clutch by the measured pressures of a fitted car, with the deviations of its parameters.
+/// The fill volume of the oncoming clutch by the measured pressures of a fitted car, with the standard deviations of its parameters.
 fn fill_of(
     vehicle: &Vehicle,
     car: &Car,

@@ -28,7 +28,7 @@ pub(crate) struct Unknowns {
     pub(crate) shared: Vec<f64>,
     /// Of each shift.
     pub(crate) own: Vec<Vec<f64>>,
-    /// Deviation of the mass in the driving of each log.
+    /// Standard deviation of the mass in the driving of each log.
     pub(crate) drives: Vec<f64>,
 }
 

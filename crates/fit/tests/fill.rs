@@ -159,7 +159,7 @@ fn the_zero_offset_of_a_pressure_sensor_changes_no_fill_volume() {
         assert!((fill.log_volume - of_right.log_volume).abs() < 0.25 * fill.sd[0], "{fill:?} {of_right:?}");
         assert_eq!(fill.is_misfit, of_right.is_misfit);
         let moved = |p, more: f64| (fit.value(p).unwrap() - right.value(p).unwrap() - more) / fit.sd(p).unwrap();
-        // The offset is in Pa, its deviation in 10 kPa.
+        // The offset is in Pa, its standard deviation in 10 kPa.
         assert!(moved(gain, 0.0).abs() < 0.05 && moved(offset, offset_pa).abs() < 0.05 * 1e4, "{offset_pa}");
     }
 }

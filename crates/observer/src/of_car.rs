@@ -11,14 +11,14 @@ use car::{Car, ElementErrors, ErrorBudget, Sensors};
 use drivetrain::{Cylinder, Real};
 use geartrain::{Change, ElementKind, Gear, Gearbox};
 
-use crate::of_sensors::{SCALE_LEAST, deviation_of, engine_noise, speed_reading};
+use crate::of_sensors::{SCALE_LEAST, engine_noise, speed_reading, std_dev_of};
 
 /// Quantum of the speeds of engine, turbine and output where no sensor is described, rad/s: that of the built-in car's budget.
 const SPEED_QUANTUM_RAD_S: f64 = 0.7;
 /// The same of the wheel speed.
 const WHEEL_QUANTUM_RAD_S: f64 = 0.14;
 /// Errors of the valve's map beside its gain, as a fraction \[chosen\]: with the bounds of 15 % of friction and 10 % of gain it gives a
-/// deviation of 12 %.
+/// standard deviation of 12 %.
 const MAP_FRACTION: f64 = 0.06;
 
 /// Standard deviations of the part of the pressure's error at rest that does not last, as of hysteresis, and of the kiss
@@ -202,7 +202,7 @@ fn has_dog(gearbox: &Gearbox, [from, to]: [usize; 2]) -> bool {
 
 /// A piston whose stroke is within these limits, each the edge of a uniform distribution.
 fn piston(cylinder: &Cylinder<f64>, fill: &FillBudget<f64>) -> Piston<f64> {
-    let fraction = |[least, most]: [f64; 2], value: f64| deviation_of(0.5 * (most - least)) / value;
+    let fraction = |[least, most]: [f64; 2], value: f64| std_dev_of(0.5 * (most - least)) / value;
     let flow = |k: usize| fill.supply[k].flow(FILL_PA, fill.viscosity_m2_s[k]).min(cylinder.flow_max_m3_s);
     let volume = fraction(fill.volume_m3, cylinder.stroke_m3);
     Piston::new(*cylinder, Real::hypot(volume, fraction([flow(1), flow(0)], cylinder.flow(FILL_PA))))
@@ -234,8 +234,8 @@ pub fn gearbox_filter<'a>(
         turbine: TurbineTorque {
             converter: car.converter,
             engine_inertia_kg_m2: car.engine.inertia_kg_m2,
-            converter_share: deviation_of(budget.converter),
-            engine_share: deviation_of(budget.engine),
+            converter_share: std_dev_of(budget.converter),
+            engine_share: std_dev_of(budget.engine),
         },
         uncertainty: uncertainty(budget),
         readings: [
@@ -269,15 +269,15 @@ fn shaft_n_m(car: &Car) -> f64 {
 
 /// What the filter does not know of an element, whose friction and valve err by this scale times the bounds.
 pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncertainty<f64> {
-    let parts = [deviation_of(errors.friction()), deviation_of(errors.valve_gain()), MAP_FRACTION];
+    let parts = [std_dev_of(errors.friction()), std_dev_of(errors.valve_gain()), MAP_FRACTION];
     let square: f64 = parts.iter().map(|part| part * part).sum();
     ElementUncertainty {
         torque_fraction: scale * square.sqrt(),
         slow_part: 1.0 - parts[2] * parts[2] / square,
         valve_gain: scale * parts[1],
         kiss_point_pa: scale * KISS_POINT_PA,
-        valve_lag_fraction: scale * deviation_of(errors.valve_lag()),
-        valve_delay_s: scale * deviation_of(errors.valve_delay()),
+        valve_lag_fraction: scale * std_dev_of(errors.valve_lag()),
+        valve_delay_s: scale * std_dev_of(errors.valve_delay()),
         pressure_pa: scale * PRESSURE_PA,
     }
 }
@@ -290,9 +290,9 @@ fn uncertainty(errors: &ErrorBudget) -> ShiftUncertainty<f64> {
         turbine_share: TURBINE_FRACTION,
         turbine_share_s: 3.0,
         // What is low by a fraction is exceeded by more than that fraction.
-        inertia_share: deviation_of(errors.inertia / (1.0 - errors.inertia)),
-        stiffness_fraction: deviation_of(errors.stiffness),
-        wheel_scale: deviation_of(errors.wheel_scale).max(SCALE_LEAST),
+        inertia_share: std_dev_of(errors.inertia / (1.0 - errors.inertia)),
+        stiffness_fraction: std_dev_of(errors.stiffness),
+        wheel_scale: std_dev_of(errors.wheel_scale).max(SCALE_LEAST),
         wheel_scale_walk: SCALE_LEAST / WHEEL_SCALE_S.sqrt(),
         rate_rad_s: 0.1,
         rate_walk: 0.01,

@@ -6,7 +6,7 @@ use crate::{EngineNoise, SpeedReading};
 
 /// Least standard deviation of a speed reading, rad/s \[chosen\].
 const READING_RAD_S: f64 = 0.02;
-/// A quantum of the error budget over the standard deviation of one reading: five deviations of the difference of two.
+/// A quantum of the error budget over the standard deviation of one reading: five standard deviations of the difference of two.
 const QUANTUM: f64 = 5.0 * core::f64::consts::SQRT_2;
 
 /// Inertia of the engine that the three torques below are of, kg m^2: a 2.0 L engine with 190 N m. Inertia and torque of an
@@ -23,7 +23,7 @@ const ENGINE_MOST_N_M: f64 = 400.0;
 pub const SCALE_LEAST: f64 = 3e-4;
 
 /// Standard deviation of an error whose bound is the edge of a uniform distribution.
-pub fn deviation_of(bound: f64) -> f64 {
+pub fn std_dev_of(bound: f64) -> f64 {
     bound / 3.0_f64.sqrt()
 }
 
@@ -33,14 +33,14 @@ pub fn lag_rad(sensor: &SpeedSensor) -> f64 {
 }
 
 /// Standard deviation of a speed reading, rad/s: that of its sensor, or of the quantum of the error budget.
-pub fn deviation_rad_s(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> f64 {
+pub fn std_dev_rad_s(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> f64 {
     sensor.map_or(quantum_rad_s / QUANTUM, |sensor| sensor.noise_rad_s).max(READING_RAD_S)
 }
 
 /// How a speed is read by a sensor, or with the quantum of the error budget, rad/s, where none is described.
 pub fn speed_reading(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> SpeedReading<f64> {
     SpeedReading {
-        deviation_rad_s: deviation_rad_s(sensor, quantum_rad_s),
+        std_dev_rad_s: std_dev_rad_s(sensor, quantum_rad_s),
         lag_rad: sensor.map_or(0.0, lag_rad),
         pitch_rad: sensor.map_or(0.0, |sensor| core::f64::consts::TAU / sensor.teeth),
         delay_s: sensor.map_or(0.0, |sensor| sensor.delay_s),
@@ -50,7 +50,7 @@ pub fn speed_reading(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> SpeedR
 /// How the speed of an engine changes, and is read.
 pub fn engine_noise(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> EngineNoise<f64> {
     EngineNoise {
-        reading_rad_s: deviation_rad_s(sensor, quantum_rad_s),
+        reading_rad_s: std_dev_rad_s(sensor, quantum_rad_s),
         acceleration_walk: ENGINE_CHANGE_N_M / ENGINE_KG_M2 / ENGINE_CHANGE_S.sqrt(),
         acceleration_max_rad_s2: ENGINE_MOST_N_M / ENGINE_KG_M2,
     }

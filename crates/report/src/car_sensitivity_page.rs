@@ -15,7 +15,7 @@ const PHASES: [&str; 2] = ["torque phase", "inertia phase"];
 const HIDDEN: &str = "hidden";
 
 /// Why a certified bound and this statistic may call different phases hidden; without its full stop.
-pub const BOUND_AND_DEVIATION: &str = "`design` and `sensitivity` may call different phases hidden: `design` bounds the error with all errors at their bounds at the \
+pub const BOUND_AND_STD_DEV: &str = "`design` and `sensitivity` may call different phases hidden: `design` bounds the error with all errors at their bounds at the \
                                        same time, for a fixed gain;\n`sensitivity` gives the standard deviation of the gearbox filter, with errors \
                                        anywhere within their bounds, independent of each other";
 
@@ -37,7 +37,7 @@ pub fn sensitivity_rows(shifts: &[ShiftSensitivity], car: &Car) -> (Vec<&'static
         let mut row = names(shift, car);
         for phase in &shift.phases {
             row.extend(match phase {
-                Some(phase) => [ratio(phase), deviations(phase), largest(phase)],
+                Some(phase) => [ratio(phase), std_devs(phase), largest(phase)],
                 None => ["–", "–", "–"].map(str::to_owned),
             });
         }
@@ -59,14 +59,14 @@ fn names(shift: &ShiftSensitivity, car: &Car) -> Vec<String> {
     ]
 }
 
-/// Deviation by the filter over that by the valve model alone, or that the speeds show nothing.
+/// Standard deviation by the filter over that by the valve model alone, or that the speeds show nothing.
 fn ratio(phase: &PhaseOfShift) -> String {
     if phase.is_hidden() { HIDDEN.to_owned() } else { number(phase.ratio(), 2) }
 }
 
-/// Both deviations of the torque: filter / valve model alone.
-fn deviations(phase: &PhaseOfShift) -> String {
-    let [filter, alone] = phase.deviation_n_m().map(|n_m| number(n_m, 1));
+/// Both standard deviations of the torque: filter / valve model alone.
+fn std_devs(phase: &PhaseOfShift) -> String {
+    let [filter, alone] = phase.std_dev_n_m().map(|n_m| number(n_m, 1));
     format!("{filter} / {alone}")
 }
 
@@ -107,7 +107,7 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &CarFile) -> Resul
             hidden,
             all,
             // A car without converter has no designs.
-            bound_and_deviation => car.converter.is_some().then(|| BOUND_AND_DEVIATION.replace('`', "")),
+            bound_and_deviation => car.converter.is_some().then(|| BOUND_AND_STD_DEV.replace('`', "")),
             inputs => origin(&[&car.source]),
         },
     )
@@ -115,18 +115,18 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &CarFile) -> Resul
 
 /// One shift in one phase, with every error.
 fn detail(shift: &ShiftSensitivity, phase: &PhaseOfShift, errors: &[ShiftErrorKind], car: &Car) -> Value {
-    let most = phase.deviation_n_m().into_iter().fold(1e-9, f64::max);
+    let most = phase.std_dev_n_m().into_iter().fold(1e-9, f64::max);
     let cell = |error: &ShiftErrorKind| {
         let effect = phase.effects.iter().find(|effect| effect.error == *error).map_or(0.0, |e| e.torque_n_m[0]);
         context! { text => number(effect, 1), shade => format!("{:.2}", (0.35 * effect / most).min(0.6)) }
     };
-    let [filter_pa, alone_pa] = phase.deviation_pa().map(|pa| number(1e-3 * pa, 0));
+    let [filter_pa, alone_pa] = phase.std_dev_pa().map(|pa| number(1e-3 * pa, 0));
     context! {
         names => names(shift, car),
         torque => number(phase.torque_n_m, 0),
         ratio => ratio(phase),
         is_hidden => phase.is_hidden(),
-        torques => deviations(phase),
+        torques => std_devs(phase),
         pressures => format!("{filter_pa} / {alone_pa}"),
         effects => errors.iter().map(cell).collect::<Vec<_>>(),
     }

@@ -198,14 +198,14 @@ pub fn shaft_level(vehicle: &Vehicle) -> [ShaftEffect; 2] {
 
 /// Length of a shift, s.
 const SHIFT_S: f64 = 0.6;
-/// Deviations of a reading in the budget's bound on a change: five of the difference of two readings.
-const QUANTUM_DEVIATIONS: f64 = 5.0 * std::f64::consts::SQRT_2;
+/// Standard deviations of a reading in the budget's bound on a change: five of the difference of two readings.
+const QUANTUM_STD_DEVS: f64 = 5.0 * std::f64::consts::SQRT_2;
 
 /// Drift of the shaft torque by integrating noisy readings over a shift at 100 Hz, one standard deviation, N m.
 fn drift_n_m(vehicle: &Vehicle) -> f64 {
     let (sample_s, bounds, line) = (0.01, &vehicle.error_bounds, &vehicle.driveline);
     let twist_rad_s = Real::hypot(bounds.output_quantum_rad_s / line.final_ratio, bounds.wheel_quantum_rad_s);
-    line.shaft_stiffness_n_m_rad * twist_rad_s / QUANTUM_DEVIATIONS * (SHIFT_S * sample_s).sqrt()
+    line.shaft_stiffness_n_m_rad * twist_rad_s / QUANTUM_STD_DEVS * (SHIFT_S * sample_s).sqrt()
 }
 
 fn friction(vehicle: &Vehicle) -> f64 {

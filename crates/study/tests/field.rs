@@ -285,8 +285,8 @@ fn what_is_learnt_in_a_launch_is_no_more_than_twice_too_sure() {
             sensors.output.delay_s - sensors.turbine.delay_s,
         ];
         for (k, truth) in truth.into_iter().enumerate() {
-            let (mean, deviation) = states[SCALE + k];
-            squares[k] += ((mean - truth) / deviation).powi(2) / RUNS as f64;
+            let (mean, std_dev) = states[SCALE + k];
+            squares[k] += ((mean - truth) / std_dev).powi(2) / RUNS as f64;
         }
     }
     let too_sure = squares.map(f64::sqrt);
@@ -442,8 +442,8 @@ fn after_an_hour_of_shifts_nothing_that_is_learnt_is_more_than_twice_too_sure() 
         }
         let states = state.states().unwrap();
         for (k, square) in squares.iter_mut().enumerate() {
-            let (mean, deviation) = states[FRICTION + k];
-            *square += ((mean - truth[k]) / deviation).powi(2) / LAUNCHES as f64;
+            let (mean, std_dev) = states[FRICTION + k];
+            *square += ((mean - truth[k]) / std_dev).powi(2) / LAUNCHES as f64;
         }
     }
     let too_sure = squares.map(f64::sqrt);

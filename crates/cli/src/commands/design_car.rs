@@ -240,7 +240,7 @@ fn print(
     output::line(&format!(
         "\n`wetclutch design {vehicle} --shift FROM-TO` prints gains and certificates of one shift.\n{OTHER_KINDS}\n\
          {}: `wetclutch sensitivity {vehicle}`.",
-        report::car_sensitivity_page::BOUND_AND_DEVIATION
+        report::car_sensitivity_page::BOUND_AND_STD_DEV
     ))?;
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use car::{Car, ErrorBudget};
 use config::{Kind, Source, VehicleFile};
-use report::car_sensitivity_page::{BOUND_AND_DEVIATION, car_sensitivity_page, hidden_phases, sensitivity_rows};
+use report::car_sensitivity_page::{BOUND_AND_STD_DEV, car_sensitivity_page, hidden_phases, sensitivity_rows};
 use report::sensitivity_page;
 use serde_json::json;
 use study::gearbox::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity, car_sensitivity};
@@ -126,8 +126,8 @@ fn json_of(shift: &ShiftSensitivity, car: &Car) -> serde_json::Value {
         phase.as_ref().map(|phase| {
             json!({
                 "mean_torque_n_m": phase.torque_n_m,
-                "deviation_n_m": phase.deviation_n_m(),
-                "deviation_pa": phase.deviation_pa(),
+                "deviation_n_m": phase.std_dev_n_m(),
+                "deviation_pa": phase.std_dev_pa(),
                 "hidden": phase.is_hidden(),
                 "effects": phase.effects,
             })

@@ -93,7 +93,7 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     let fine = coarse.and_then(|(step, _)| best(&mut (step - 3..=step + 3)));
     let Some((step, solution)) = fine else { return Err("the speeds and torques do not fit together".to_owned()) };
     let delay_s = DELAY_STEP_S * f64::from(step);
-    let Some(sd) = solution.deviations(&some, &knots) else {
+    let Some(sd) = solution.std_devs(&some, &knots) else {
         return Err("the speeds and torques do not fit together".to_owned());
     };
     let bends = bends(&knots, solution.unknowns.as_slice());
@@ -263,7 +263,7 @@ impl Solution {
 
     /// Standard deviations of the unknowns, then that of the delay, which is unknown too: the larger of those with the correlation of the residuals in time, and of
     /// those from the scatter of blocks of a second.
-    fn deviations(&self, moments: &[Moment], knots: &[f64]) -> Option<Vec<f64>> {
+    fn std_devs(&self, moments: &[Moment], knots: &[f64]) -> Option<Vec<f64>> {
         const BLOCK: usize = 50;
         /// Moments further apart are not joined by a line, s.
         const APART_S: f64 = 0.5;

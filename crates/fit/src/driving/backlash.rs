@@ -18,12 +18,12 @@ use crate::fitted_file::SIDES;
 
 /// Fewest reversals: their scatter is part of the interval.
 const REVERSALS: usize = 4;
-/// Deviation of the stiffness before the fit, as a fraction \[chosen\].
+/// Standard deviation of the stiffness before the fit, as a fraction \[chosen\].
 const STIFFNESS: f64 = 0.15;
 /// Error of the torque in overrun, as a fraction: the overrun half of a converter's map is rarely measured \[chosen\].
 const OVERRUN_FRACTION: f64 = 0.3;
-/// Deviation of a backlash of which nothing is known but that it is anywhere between 0 and 0.1 rad at the wheels \[chosen\]. The fit itself has none: a
-/// mean would pull.
+/// Standard deviation of a backlash of which nothing is known but that it is anywhere between 0 and 0.1 rad at the wheels \[chosen\]. The
+/// fit itself has none: a mean would pull.
 const BEFORE_RAD: f64 = 0.1 / 3.464;
 /// Greatest backlash that the error budget of a file may have, rad.
 pub(crate) const MOST_RAD: f64 = 0.2;

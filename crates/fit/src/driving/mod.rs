@@ -47,13 +47,14 @@ pub(crate) const INPUT_SD_FRACTION: f64 = 0.03;
 pub(crate) const DRAG_UNIT_N_M: f64 = 1.0;
 /// Step for the derivatives by a delay in its unit.
 pub(crate) const DELAY_STEP: f64 = 0.1;
-/// Errors, in the deviations that they are expected to have, beyond which a balance is not that of the car \[chosen\].
+/// Errors, in the standard deviations that they are expected to have, beyond which a balance is not that of the car \[chosen\].
 const MISFIT: f64 = 3.0;
 
 /// Bounds of rolling resistance and air drag \[chosen\].
 pub(crate) const ROLLING: f64 = 0.5;
 pub(crate) const AIR: f64 = 0.3;
-/// Least deviations of rolling resistance, as a mean grade over the weight, and of air drag, as a fraction \[chosen: a mean wind\].
+/// Least standard deviations of rolling resistance, as a mean grade over the weight, and of air drag, as a fraction \[chosen: a mean
+/// wind\].
 pub(crate) const MEAN_GRADE_RAD: f64 = 0.005;
 pub(crate) const WIND: f64 = 0.1;
 
@@ -89,7 +90,7 @@ pub(crate) enum Term {
 /// The place of a term among the unknowns of a fit; none where the fit does not have it.
 pub(crate) type Places<'a> = &'a dyn Fn(Term) -> Option<usize>;
 
-/// Why a balance with errors of this scale, in the deviations that they are expected to have, is not that of the car, if so.
+/// Why a balance with errors of this scale, in the standard deviations that they are expected to have, is not that of the car, if so.
 pub(crate) fn misfit(name: &str, scale: f64) -> Option<String> {
     // What is not a number does not fit either.
     let fits = scale <= MISFIT;
@@ -100,7 +101,7 @@ pub(crate) fn misfit(name: &str, scale: f64) -> Option<String> {
     })
 }
 
-/// Least deviation of the logarithm of the rolling resistance of a car: a mean grade acts like it.
+/// Least standard deviation of the logarithm of the rolling resistance of a car: a mean grade acts like it.
 pub(crate) fn rolling_floor(road: &drivetrain::RoadLoad<f64>) -> f64 {
     let weight_n_m = road.mass_kg * drivetrain::road::GRAVITY_M_S2 * road.wheel_radius_m;
     MEAN_GRADE_RAD * weight_n_m / road.rolling_moment_n_m.max(f64::MIN_POSITIVE)

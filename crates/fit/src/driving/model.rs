@@ -71,7 +71,7 @@ pub(crate) struct Evaluated {
     pub(crate) score: DVector<f64>,
     pub(crate) information: DMatrix<f64>,
     pub(crate) cost: f64,
-    /// Independent errors of each balance, in the deviations that they are expected to have.
+    /// Independent errors of each balance, in the standard deviations that they are expected to have.
     pub(crate) errors: [Vec<f64>; 2],
     /// The gradients of each gear and balance.
     pub(crate) groups: Vec<((Balance, usize), DVector<f64>)>,

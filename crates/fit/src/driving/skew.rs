@@ -32,7 +32,7 @@ const CELLS: usize = 72_000;
 /// Least time of driving, s, and fewest stretches: their scatter is part of the intervals.
 const TIME_S: f64 = 20.0;
 const GROUPS: usize = 4;
-/// Least deviations that are stated, as in the one-shift fit: of scale and delay, s.
+/// Least standard deviations that are stated, as in the one-shift fit: of scale and delay, s.
 const FLOORS: [f64; 2] = [1e-4, 0.3e-3];
 
 /// Means of the turbine speed and of what a channel says that it is, rad/s.

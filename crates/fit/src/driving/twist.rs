@@ -27,7 +27,7 @@ const RESTS_N_M: f64 = 5.0;
 const SETTLES_S: f64 = 0.5;
 /// A longer time from rest to rest tells nothing, s: the noise of the speeds adds up in the angle.
 const REVERSES_S: f64 = 3.0;
-/// Deviations before a fit of scale and delay, s \[chosen\], and of a backlash, rad: a mean would pull.
+/// Standard deviations before a fit of scale and delay, s \[chosen\], and of a backlash, rad: a mean would pull.
 pub(crate) const SCALE: f64 = 0.02;
 pub(crate) const DELAY_S: f64 = 0.03;
 const FREE_RAD: f64 = 1.0;
@@ -133,7 +133,7 @@ fn cell(car: &DrivenCar, gear: usize, speeds: &[Series; 4], begin_s: f64) -> Opt
 }
 
 /// What is known besides of the torque at the gearbox input: factors on the capacity of the converter and on its torque ratio above 1, and the standard
-/// deviation of the logarithm of the torque.
+/// standard deviation of the logarithm of the torque.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InputTorque {
     pub(crate) capacity: f64,
@@ -220,8 +220,8 @@ pub(crate) fn changes(
     (all, reversals)
 }
 
-/// What changes tell of scale, delay, compliance and backlash, with the compliance of before and its deviation as a fraction; none if the equations have no finite
-/// solution.
+/// What changes tell of scale, delay, compliance and backlash, with the compliance of before and its standard deviation as a fraction;
+/// none if the equations have no finite solution.
 pub(crate) fn told(changes: &[Line<UNKNOWNS>], compliance: f64, fraction: f64) -> Option<Told<UNKNOWNS>> {
     Told::of(changes, [0.0, 0.0, compliance, 0.0], [SCALE, DELAY_S, fraction * compliance, FREE_RAD])
 }

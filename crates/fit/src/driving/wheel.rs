@@ -18,7 +18,7 @@ const TIME_S: f64 = 20.0;
 const GROUPS: usize = 4;
 /// Speed of the gearbox output below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
 const OUTPUT_LEAST_RAD_S: f64 = 15.0;
-/// Least deviations that are stated, as in the one-shift fit: of scale, delay, s, and stiffness.
+/// Least standard deviations that are stated, as in the one-shift fit: of scale, delay, s, and stiffness.
 const FLOORS: [f64; 3] = [1e-4, 0.3e-3, 0.015];
 
 /// Which drive tells it.

@@ -8,7 +8,7 @@
 use drivetrain::Real;
 use nalgebra::{Matrix4, RowVector4, Vector4};
 
-/// Deviation of the speed at the begin of a stretch, rad/s: nothing is known of it.
+/// Standard deviation of the speed at the begin of a stretch, rad/s: nothing is known of it.
 const START_RAD_S: f64 = 1e3;
 
 /// How much of the disturbances passes: way and time, over those in which they change.
@@ -22,7 +22,7 @@ impl Passing {
     /// From one drive to another.
     pub(crate) const ALL: Self = Self { grade: 100.0, torque: 100.0 };
 
-    /// The transition of speed, grade, its change, and torque, each in its deviation.
+    /// The transition of speed, grade, its change, and torque, each in its standard deviation.
     fn transition(self) -> Matrix4<f64> {
         let (x, stays) = (self.grade, Real::exp(-self.grade));
         let mut transition = Matrix4::identity();
@@ -48,7 +48,7 @@ pub(crate) struct Step {
 
 /// Makes the rows of columns independent of each other.
 pub(crate) struct Whitening {
-    /// Covariance of the error of the speed, rad/s, and of the disturbances in their deviations.
+    /// Covariance of the error of the speed, rad/s, and of the disturbances in their standard deviations.
     covariance: Matrix4<f64>,
     /// Their estimates for each column.
     states: Vec<Vector4<f64>>,
@@ -99,7 +99,7 @@ impl Whitening {
         self.states.iter_mut().for_each(|state| *state = transition * *state);
     }
 
-    /// Turns a row, an entry for each column, into what was not to be predicted of it, in its deviations.
+    /// Turns a row, an entry for each column, into what was not to be predicted of it, in its standard deviations.
     pub(crate) fn take(&mut self, row: &mut [f64]) {
         let speed = RowVector4::new(1.0, 0.0, 0.0, 0.0);
         let with_speed = self.covariance.column(0).into_owned();

@@ -11,7 +11,7 @@ use super::channels::ChannelFits;
 use super::command_delay::{common_delay_s, with_commands_earlier};
 use super::contradicted::{contradicted, without_pressures};
 use super::precision::stated;
-use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity, deviation_of};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity, std_dev_of};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
@@ -184,7 +184,7 @@ fn fit_with(
         ratio: Real::exp(fit.unknown(Quantity::TorqueRatio)),
         sd: fit.input_sd(),
     };
-    let stiffness_sd = deviation_of(ErrorBudget::of_car(car).stiffness);
+    let stiffness_sd = std_dev_of(ErrorBudget::of_car(car).stiffness);
     fit.wheel = fit_wheel(&driven, driving, &input, stiffness_sd);
     fit.fills = (0..fit.quantities.elements.len()).map(|place| fit.fill_of(car, tables, shifts, place)).collect();
     Ok((fit, scales))
@@ -387,7 +387,7 @@ mod tests {
         let quantities = Quantities::of(&car, &tables, &[], [false; 2]);
         let place = quantities.place(Quantity::Inertia(3)).unwrap();
         let before = quantities.sd_before(place);
-        // The unknown, and its deviation after the fit, in deviations of before.
+        // The unknown, and its standard deviation after the fit, in standard deviations of before.
         let found = |x: f64, after: f64| {
             let (mut at, mut stated) = (vec![0.1; quantities.all.len()], quantities.before.clone());
             at[place] = x * before;

@@ -25,7 +25,7 @@ pub(crate) fn stated(
     let curvature = (information + &problem.precision).cholesky().ok_or_else(singular)?;
     let auto = curvature.inverse();
     let cluster = intervals::cluster(&auto, &scores(models, solved), &problem.precision);
-    let mut stated = with_deviations(&auto, |j| {
+    let mut stated = with_std_devs(&auto, |j| {
         let found =
             Real::hypot(auto[(j, j)].max(cluster[(j, j)]).sqrt(), problem.quantities.floor(problem.quantities.all[j]));
         // No fit knows less than was known before.
@@ -37,11 +37,11 @@ pub(crate) fn stated(
     }
     unfitted.iter().for_each(|error| error.add_to(&mut stated, problem, models, solved, &curvature));
     // Nor does one with what is held or not fitted.
-    Ok(with_deviations(&stated, |j| stated[(j, j)].sqrt().min(problem.quantities.sd_before(j))))
+    Ok(with_std_devs(&stated, |j| stated[(j, j)].sqrt().min(problem.quantities.sd_before(j))))
 }
 
 /// The covariance with the same correlations and other standard deviations.
-fn with_deviations(covariance: &DMatrix<f64>, sd: impl Fn(usize) -> f64) -> DMatrix<f64> {
+fn with_std_devs(covariance: &DMatrix<f64>, sd: impl Fn(usize) -> f64) -> DMatrix<f64> {
     let scale: Vec<f64> = (0..covariance.nrows()).map(|j| sd(j) / covariance[(j, j)].sqrt()).collect();
     DMatrix::from_fn(scale.len(), scale.len(), |i, j| scale[i] * scale[j] * covariance[(i, j)])
 }

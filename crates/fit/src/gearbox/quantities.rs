@@ -96,7 +96,7 @@ pub struct Quantities {
     /// Elements whose pressure is measured in a shift.
     pub measured: Vec<bool>,
     pub(crate) has_converter: bool,
-    /// Least deviation of the logarithm of the rolling resistance: a mean grade acts like it.
+    /// Least standard deviation of the logarithm of the rolling resistance: a mean grade acts like it.
     rolling_floor: f64,
 }
 
@@ -254,8 +254,8 @@ impl Known<'_> {
         match quantity {
             Quantity::Input if self.has_converter => self.filter.turbine.converter_share,
             Quantity::Input => self.filter.turbine.engine_share,
-            Quantity::TorqueRatio => deviation_of(TORQUE_RATIO),
-            Quantity::InputDelay | Quantity::EngineDelay => deviation_of(INPUT_DELAY_S / DELAY_UNIT_S),
+            Quantity::TorqueRatio => std_dev_of(TORQUE_RATIO),
+            Quantity::InputDelay | Quantity::EngineDelay => std_dev_of(INPUT_DELAY_S / DELAY_UNIT_S),
             Quantity::Delay(at) => of(at).valve_delay_s / DELAY_UNIT_S,
             Quantity::Drag(_) => DRAG_N_M / DRAG_UNIT_N_M,
             Quantity::Torque(at) => of(at).torque_fraction,
@@ -265,22 +265,22 @@ impl Known<'_> {
             Quantity::PressureOffset(_) => sd_before_pa() / OFFSET_UNIT_PA,
             Quantity::Lag(at) => of(at).valve_lag_fraction,
             Quantity::Inertia(_) => self.filter.uncertainty.inertia_share,
-            Quantity::Mass => deviation_of(self.mass_share),
-            Quantity::Rolling => deviation_of(ROLLING),
-            Quantity::Air => deviation_of(AIR),
+            Quantity::Mass => std_dev_of(self.mass_share),
+            Quantity::Rolling => std_dev_of(ROLLING),
+            Quantity::Air => std_dev_of(AIR),
             Quantity::ReportedScale => self.filter.turbine.engine_share,
-            Quantity::ReportedDelay => deviation_of(REPORTED_DELAY_S / DELAY_UNIT_S),
-            Quantity::EngineInertia => deviation_of(ENGINE_INERTIA),
+            Quantity::ReportedDelay => std_dev_of(REPORTED_DELAY_S / DELAY_UNIT_S),
+            Quantity::EngineInertia => std_dev_of(ENGINE_INERTIA),
         }
     }
 
-    /// What a deviation of the gain does to a kiss point by the gain of the file.
+    /// What a standard deviation of the gain does to a kiss point by the gain of the file.
     fn kiss_by_gain(&self, at: usize) -> f64 {
         let kiss_pa = self.filter.tables.elements[at].clutch.kiss_pressure();
         -self.elements[at].valve_gain * kiss_pa / KISS_UNIT_PA
     }
 
-    /// The element of a quantity that the gain of its valve is part of, and what a deviation of the gain does to it.
+    /// The element of a quantity that the gain of its valve is part of, and what a standard deviation of the gain does to it.
     fn by_gain(&self, quantity: Quantity) -> Option<(usize, f64)> {
         match quantity {
             Quantity::Torque(at) | Quantity::Gain(at) => Some((at, self.elements[at].valve_gain)),
@@ -307,7 +307,7 @@ impl Known<'_> {
 }
 
 /// Standard deviation of a uniform distribution with this bound.
-pub(crate) fn deviation_of(bound: f64) -> f64 {
+pub(crate) fn std_dev_of(bound: f64) -> f64 {
     bound / 3.0_f64.sqrt()
 }
 

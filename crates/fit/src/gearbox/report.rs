@@ -11,7 +11,7 @@ use crate::fitted_file::SIDES;
 use crate::report::{MEAN_GRADE, cautions, fill_row, offset_row, said_of_offset};
 use crate::{BacklashFit, Known, Measure, ReportRow, Verdict, WheelFit, correlated};
 
-/// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
+/// Errors of the torque at the turbine, in their standard deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
 /// Standard deviations on either side that 99.9 % lie within: 5 % over some 40 quantities.
 const SIDES_OF_ALL: f64 = 3.3;

@@ -16,10 +16,10 @@ use crate::pressure::{Grid, Hydraulics};
 
 /// Step of the integrals, s.
 const STEP_S: f64 = 0.002;
-/// Own unknowns of a shift: the turbine speed at its begin, rad/s, and an error of the torque at the turbine, N m, whose deviation is that of the torque at
-/// the input.
+/// Own unknowns of a shift: the turbine speed at its begin, rad/s, and an error of the torque at the turbine, N m, whose standard
+/// deviation is that of the torque at the input.
 pub(crate) const OWN: usize = 2;
-/// Deviation of the first, rad/s: nothing is known of it.
+/// Standard deviation of the first, rad/s: nothing is known of it.
 const START_SD_RAD_S: f64 = 50.0;
 
 /// A shift with what does not change during a fit.
@@ -46,7 +46,7 @@ pub(crate) struct ShiftModel {
     by_output: Vec<f64>,
     pub(crate) time_s: Vec<f64>,
     pub(crate) reading: Vec<f64>,
-    /// Deviations of its own unknowns.
+    /// Standard deviations of its own unknowns.
     pub(crate) own_sd: [f64; OWN],
 }
 

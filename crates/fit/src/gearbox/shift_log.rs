@@ -6,7 +6,7 @@ use observer::gearbox::ShiftRow;
 
 use crate::Series;
 
-/// Slip from which on a clutch counts as slipping is this times `sqrt(1 + i^2)`, rad/s: 3.5 deviations of a reading of 0.4 rad/s
+/// Slip from which on a clutch counts as slipping is this times `sqrt(1 + i^2)`, rad/s: 3.5 standard deviations of a reading of 0.4 rad/s
 /// \[chosen: the quantum of 0.7 rad/s of the filter, and some\].
 const SLIPS_RAD_S: f64 = 1.5;
 /// Readings in a row that may show no slip between others that do: outliers.

@@ -17,7 +17,7 @@ use crate::weights::{ChannelWeights, FACTOR};
 const ITERATIONS: Iterations = Iterations { reweighted: 5, most: 20, decrease: 0.1 };
 /// Turns in which the own unknowns of a shift are found with Huber's weights.
 const OWN_TURNS: u32 = 4;
-/// Deviations of what was known before beyond which nothing is held possible.
+/// Standard deviations of what was known before beyond which nothing is held possible.
 const LIMIT: f64 = 4.0;
 
 /// Weights of the turbine speed and of the measured pressures.
@@ -66,7 +66,7 @@ pub(crate) struct Profiled {
     pub(crate) score: DVector<f64>,
     /// Information about the parameters, own unknowns eliminated.
     pub(crate) information: DMatrix<f64>,
-    /// Error of the torque at the turbine, in its deviations.
+    /// Error of the torque at the turbine, in its standard deviations.
     pub(crate) torque_error: f64,
     cost: f64,
 }

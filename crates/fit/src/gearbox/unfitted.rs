@@ -1,13 +1,13 @@
 //! What a fit takes from the file of the way to a pressure, and what its error does to the quantities.
 //!
 //! Delays of the channels are fitted or found before, here is what stays. Hysteresis of a valve and volume of a piston's stroke are not fitted: the speeds hardly show them, and what they seem to say of a hysteresis comes
-//! from the noise of the command. An error of one deviation changes the gradients at the minimum, and the step of the fit by that change is what it
-//! does to the quantities: `H^-1 (s(file + deviation) - s(file))`. The deviation is taken whole, not as a derivative: the noise of a command hides
-//! a small hysteresis.
+//! from the noise of the command. An error of one standard deviation changes the gradients at the minimum, and the step of the fit by that
+//! change is what it does to the quantities: `H^-1 (s(file + std_dev) - s(file))`. The standard deviation is taken whole, not as a
+//! derivative: the noise of a command hides a small hysteresis.
 //!
 //! Of a hysteresis this is not all. Rising pressures are too low by it and falling ones too high, and where an element has both, the model of the fit
 //! makes less of it for the kiss point; but the model follows a command with noise, whose play is narrower than that of the true one. So the
-//! kiss point, a pressure, has at least the deviation of the hysteresis itself.
+//! kiss point, a pressure, has at least the standard deviation of the hysteresis itself.
 
 use car::Car;
 use car::ErrorBudget;
@@ -21,7 +21,7 @@ use super::solver::{Problem, Solved};
 use crate::fill::fill_sd;
 use crate::pressure::Hydraulics;
 
-/// What may be off by one deviation.
+/// What may be off by one standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Error {
     /// The logarithm of the volume of the stroke.
@@ -48,15 +48,15 @@ impl Unfitted {
                 all.push(Self { place, error: Error::Stroke(fill_sd(&clutch.cylinder, &fill)) });
             }
             let most_pa = budget.element(element).map_or(clutch.hysteresis_pa, |errors| errors.valve_hysteresis_pa);
-            let deviation_pa = deviation_of_width(clutch.hysteresis_pa, most_pa);
-            if deviation_pa > 0.0 {
-                all.push(Self { place, error: Error::Hysteresis(deviation_pa) });
+            let std_dev_pa = std_dev_of_width(clutch.hysteresis_pa, most_pa);
+            if std_dev_pa > 0.0 {
+                all.push(Self { place, error: Error::Hysteresis(std_dev_pa) });
             }
         }
         all
     }
 
-    /// Adds to the covariance of the unknowns at the end of a fit what an error of one deviation does.
+    /// Adds to the covariance of the unknowns at the end of a fit what an error of one standard deviation does.
     pub(crate) fn add_to(
         &self,
         covariance: &mut DMatrix<f64>,
@@ -91,8 +91,8 @@ impl Unfitted {
     }
 }
 
-/// Deviation from the width of the file of one that is anywhere between none and the greatest, Pa.
-fn deviation_of_width(file_pa: f64, most_pa: f64) -> f64 {
+/// Standard deviation from the width of the file of one that is anywhere between none and the greatest, Pa.
+fn std_dev_of_width(file_pa: f64, most_pa: f64) -> f64 {
     if most_pa <= 0.0 {
         return 0.0;
     }

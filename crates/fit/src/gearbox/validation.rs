@@ -39,7 +39,7 @@ impl HeldOut {
     /// Interval of the scale of the valve errors that holds it in 95 %: of a mean of as many squares as there are shifts, those before included.
     pub fn valve_error_interval(&self) -> [f64; 2] {
         let count = self.shifts as f64 + SHIFTS_BEFORE;
-        // The logarithm of the root of a mean of n squares has a deviation of 1/sqrt(2 n).
+        // The logarithm of the root of a mean of n squares has a standard deviation of 1/sqrt(2 n).
         let half = 1.96 / (2.0 * count).sqrt();
         [-half, half].map(|side| (self.valve_error_scale * Real::exp(side)).clamp(LEAST_SCALE, MOST_SCALE))
     }

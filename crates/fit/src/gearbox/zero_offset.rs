@@ -7,7 +7,7 @@ use car::Car;
 use drivetrain::Real;
 use observer::ShiftTables;
 
-use super::quantities::deviation_of;
+use super::quantities::std_dev_of;
 use super::shift_log::ShiftLog;
 use crate::intervals::OFFSET_FLOOR_PA;
 use crate::parameters::{OFFSET_PA, POSSIBLE};
@@ -61,7 +61,7 @@ pub(super) fn without_offsets(
 
 /// Standard deviation of a zero offset of which nothing is known, Pa.
 pub(super) fn sd_before_pa() -> f64 {
-    deviation_of(OFFSET_PA)
+    std_dev_of(OFFSET_PA)
 }
 
 /// The readings of a pressure while its valve is surely at rest.

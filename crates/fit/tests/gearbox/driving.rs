@@ -54,7 +54,8 @@ fn changed(drawn: &Drawn, rows: &[Row], change: impl Fn(usize, &mut Row)) -> (Ge
     (fit, said)
 }
 
-/// Deviation of the common factor of all torques, known within `before`, with at least half of what another quantity tells of it: one that is known within
+/// Standard deviation of the common factor of all torques, known within `before`, with at least half of what another quantity tells of it:
+/// one that is known within
 /// `anchor` with its ratio to that factor. It does not tell all, because each of the other torques has a part in the factor.
 fn with_half_of(anchor: f64, before: f64) -> f64 {
     (before.powi(-2) + 0.5 * anchor.powi(-2)).sqrt().recip()

@@ -9,7 +9,7 @@ use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 use super::drawn::{self, Case, Drawn, Truth, car, city, every_fifth, hilly};
 use super::{fitted, rows};
 
-/// The quantities of the elements that lie outside of their intervals, with errors in deviations.
+/// The quantities of the elements that lie outside of their intervals, with errors in standard deviations.
 fn outside(drawn: &Drawn, fit: &GearboxFit, is_asked: impl Fn(&Quantity) -> bool) -> Vec<(Quantity, f64)> {
     let tables = drawn.tables();
     let errors = fit.quantities.all.iter().filter(|quantity| is_asked(quantity)).map(|quantity| {

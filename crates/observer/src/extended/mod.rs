@@ -27,10 +27,10 @@ use crate::{CompliantModel, Estimate, Health, Interval, Phase, Sample, SampleEst
 /// Time over which the acceleration of the wheels is averaged, s.
 const WHEEL_AVERAGE_S: f64 = 0.05;
 
-/// Deviation of the speeds' model over a sample, in deviations of a reading \[chosen\]: small beside it.
+/// Standard deviation of the speeds' model over a sample, in standard deviations of a reading \[chosen\]: small beside it.
 const MODEL_FRACTION: f64 = 0.1;
 
-/// Deviations beside their own size that shaft and offgoing torque may begin with, N m \[chosen\].
+/// Standard deviations beside their own size that shaft and offgoing torque may begin with, N m \[chosen\].
 const SHAFT_START_N_M: f64 = 100.0;
 const OFFGOING_START_N_M: f64 = 50.0;
 
@@ -185,7 +185,7 @@ impl<T: Real> ExtendedFilter<T> {
         let holding = held.per_turbine_torque * torque + held.per_output_torque * shaft / line.final_ratio;
         let mut covariance = [[zero; N]; N];
         // Starting out of balance costs a few swings of the shafts: as much as the torque itself is allowed.
-        let deviations = [
+        let std_devs = [
             noise.turbine_rad_s,
             noise.output_rad_s,
             shaft.abs() + T::of(SHAFT_START_N_M),
@@ -193,8 +193,8 @@ impl<T: Real> ExtendedFilter<T> {
             zero,
             holding.abs() + T::of(OFFGOING_START_N_M),
         ];
-        for (i, deviation) in deviations.into_iter().enumerate() {
-            covariance[i][i] = deviation * deviation;
+        for (i, std_dev) in std_devs.into_iter().enumerate() {
+            covariance[i][i] = std_dev * std_dev;
         }
         let mean = [sample.turbine_rad_s, output, shaft, pressure_pa, zero, holding];
         // Whatever phase it begins in is entered from here.
@@ -348,7 +348,7 @@ impl<T: Real> ExtendedFilter<T> {
             (sample.turbine_rad_s, self.readings.turbine_rad, self.noise.turbine_rad_s),
             (output, self.readings.output_rad, self.noise.output_rad_s),
         ];
-        for (k, (reading, lag_rad, deviation)) in readings.into_iter().enumerate() {
+        for (k, (reading, lag_rad, std_dev)) in readings.into_iter().enumerate() {
             let p = &mut running.covariance;
             // An age of many samples is cut: so far back the line through both ends does not reach.
             let old = (self.age(lag_rad, reading) / interval.dt_s).at_most(T::of(OLDEST_SAMPLES));
@@ -356,7 +356,7 @@ impl<T: Real> ExtendedFilter<T> {
             // Covariance of the states at the end with the reading.
             let with_reading: [T; N] = core::array::from_fn(|i| new * p[k][i] + old * start.across[i][k]);
             let start_with_reading = |m: usize| new * start.across[k][m] + old * start.within[m][k];
-            let variance = new * with_reading[k] + old * start_with_reading(k) + deviation * deviation;
+            let variance = new * with_reading[k] + old * start_with_reading(k) + std_dev * std_dev;
             let per_surprise = variance.recip();
             let surprise = (reading - new * running.mean[k] - old * start.mean[k]) * per_surprise;
             let gain = with_reading.map(|x| x * per_surprise);

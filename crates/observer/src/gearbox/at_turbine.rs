@@ -19,7 +19,7 @@ pub struct ClutchesAtTurbine<T> {
     /// Torque, N m: positive when the turbine drives.
     pub torque_n_m: T,
     /// Its standard deviation, N m: torque at the gearbox input, inertia, acceleration.
-    pub deviation_n_m: T,
+    pub std_dev_n_m: T,
 }
 
 impl<T: Real> GearboxFilter<'_, T> {
@@ -46,8 +46,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             + input.noise
             + square(m11) * (turbine_variance + square(self.uncertainty.inertia_share * turbine_rate))
             + square(m12) * (output_variance + square(self.uncertainty.inertia_share * output_rate));
-        let found = ClutchesAtTurbine { torque_n_m, deviation_n_m: variance.sqrt() };
-        (found.torque_n_m.is_finite() && found.deviation_n_m.is_finite()).then_some(found)
+        let found = ClutchesAtTurbine { torque_n_m, std_dev_n_m: variance.sqrt() };
+        (found.torque_n_m.is_finite() && found.std_dev_n_m.is_finite()).then_some(found)
     }
 
     /// Which gear's speeds the readings show in a shift of such a gearbox.

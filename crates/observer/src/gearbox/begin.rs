@@ -171,7 +171,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         };
         running.renew_shift();
         if phase == ShiftPhase::BothSlip {
-            running.x.renew(TURBINE, turbine, square(self.readings[TURBINE].deviation_rad_s));
+            running.x.renew(TURBINE, turbine, square(self.readings[TURBINE].std_dev_rad_s));
         }
         if let Some(shift) = shift {
             self.enter_shift(&mut running, shift, &state.learnt);
@@ -187,20 +187,20 @@ impl<T: Real> GearboxFilter<'_, T> {
         let mut mean = [T::zero(); N];
         (mean[TURBINE], mean[OUTPUT], mean[WHEEL]) = (ratio * output, output, output / self.driveline.final_ratio);
         (mean[SPRING], mean[LOAD]) = (shaft, shaft);
-        let mut deviations = [T::zero(); N];
-        deviations[OUTPUT] = self.readings[OUTPUT].deviation_rad_s;
-        deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
-        deviations[SPRING] = at_start(SHAFT_START, shaft);
-        deviations[LOAD] = at_start(LOAD_START, shaft);
-        deviations[RATE] = u.rate_rad_s;
-        deviations[FRACTION] = u.turbine_share;
-        let mut x = Gaussian::of(mean, deviations);
+        let mut std_devs = [T::zero(); N];
+        std_devs[OUTPUT] = self.readings[OUTPUT].std_dev_rad_s;
+        std_devs[WHEEL] = T::of(WHEEL_START_RAD_S);
+        std_devs[SPRING] = at_start(SHAFT_START, shaft);
+        std_devs[LOAD] = at_start(LOAD_START, shaft);
+        std_devs[RATE] = u.rate_rad_s;
+        std_devs[FRACTION] = u.turbine_share;
+        let mut x = Gaussian::of(mean, std_devs);
         let [scale, scale_variance] = state.learnt.known_wheel_scale();
         x.renew(SCALE, u.wheel_scale * scale, square(u.wheel_scale) * scale_variance);
         let known = self.known(&state.learnt, &self.acting_in_gear());
         x.renew(SLOW_FRACTION, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
         // Turbine and output are tied.
-        let output_variance = square(deviations[OUTPUT]);
+        let output_variance = square(std_devs[OUTPUT]);
         x.add(TURBINE, TURBINE, ratio * ratio * output_variance);
         x.add(TURBINE, OUTPUT, ratio * output_variance);
         // An error of the turbine torque is one of the shaft torque in balance with it.

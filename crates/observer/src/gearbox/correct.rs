@@ -73,7 +73,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             row[SCALE] = row[SCALE] + then;
         }
         let bent = T::of(0.5) * age_s * (rate - running.rates[k]);
-        let noise = square(sensor.deviation_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
+        let noise = square(sensor.std_dev_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
         let innovation = reading.value - scale * then;
         let measured = Measured { row, innovation, noise };
         if k == WHEEL && !self.is_of_this_car(running, reading, age_s) {

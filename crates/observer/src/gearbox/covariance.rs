@@ -34,16 +34,16 @@ pub(super) struct Look<T> {
     pub(super) variance: T,
     /// Covariance of the states with it.
     with: [T; N],
-    /// By how much it is off per deviation of the timing.
+    /// By how much it is off per standard deviation of the timing.
     by_timing: [T; TIMINGS],
 }
 
 impl<T: Real> Gaussian<T> {
     /// Independent states with these standard deviations.
-    pub(super) fn of(mean: [T; N], deviations: [T; N]) -> Self {
+    pub(super) fn of(mean: [T; N], std_devs: [T; N]) -> Self {
         let mut covariance = [[T::zero(); N]; N];
-        for (k, deviation) in deviations.into_iter().enumerate() {
-            covariance[k][k] = deviation * deviation;
+        for (k, std_dev) in std_devs.into_iter().enumerate() {
+            covariance[k][k] = std_dev * std_dev;
         }
         Self { mean, covariance, active: N, timing: Timing::nothing([[T::zero(); 2]; 2]) }
     }

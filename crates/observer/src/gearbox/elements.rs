@@ -17,7 +17,7 @@ const RESTS_PA: f64 = 1.0;
 /// Least factor on the lag of a valve \[chosen\]: the bounds of the standard budget end at half the lag.
 const LAG_LEAST: f64 = 0.1;
 
-/// What is known of the errors of an element's pressure and kiss point, in their deviations.
+/// What is known of the errors of an element's pressure and kiss point, in their standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PressureError<T> {
     pub(super) pressure: T,
@@ -28,7 +28,7 @@ pub(super) struct PressureError<T> {
 }
 
 impl<T: Real> PressureError<T> {
-    /// Variance of the error of the pressure above the kiss point, Pa^2, with these deviations of kiss point and pressure.
+    /// Variance of the error of the pressure above the kiss point, Pa^2, with these standard deviations of kiss point and pressure.
     fn variance_pa(&self, [kiss_pa, moving_pa]: [T; 2]) -> T {
         square(moving_pa) * self.variance[0] + square(kiss_pa) * self.variance[1]
             - T::of(2.0) * moving_pa * kiss_pa * self.covariance
@@ -63,10 +63,10 @@ struct Pressing<T> {
     slope: T,
     /// Mean of the error of the pressure above the kiss point.
     error_pa: T,
-    /// Deviations of kiss point and pressure by the budget.
+    /// Standard deviations of kiss point and pressure by the budget.
     kiss_pa: T,
     moving_pa: T,
-    /// What it changes by the error of the fill, and per deviation of it.
+    /// What it changes by the error of the fill, and per standard deviation of it.
     by_fill_pa: T,
     per_fill_pa: T,
 }
@@ -87,7 +87,7 @@ impl<T: Real> Pressing<T> {
     }
 }
 
-/// What is learnt of lag and delay of a valve, in deviations.
+/// What is learnt of lag and delay of a valve, in standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ValveTiming<T> {
     pub(super) mean: [T; 2],
@@ -163,7 +163,7 @@ impl<T: Real> ElementState<T> {
         self.newest.map_or(self.pressure_pa(), |newest| self.pressure_pa().min(newest.settled_pa))
     }
 
-    /// The errors of lag and delay that the valve model has taken off, in deviations.
+    /// The errors of lag and delay that the valve model has taken off, in standard deviations.
     pub(super) fn taken_off(&self) -> [T; 2] {
         self.timing.mean
     }
@@ -228,7 +228,7 @@ impl<T: Real> ElementState<T> {
     /// Lets time pass for the pistons, where they have a stroke, once there is a command: after [`Self::step`].
     pub(super) fn move_pistons(&mut self, element: &FrictionElement<T>, dt_s: T) {
         let Some(piston) = element.piston.as_ref().filter(|_| self.newest.is_some()) else { return };
-        let (error_pa, moving_pa) = (element.above_kiss_pa(), self.deviation_pa(&element.uncertainty));
+        let (error_pa, moving_pa) = (element.above_kiss_pa(), self.std_dev_pa(&element.uncertainty));
         match &mut self.pistons {
             None => self.pistons = Some(Pistons::settled(piston, self.valve_pa, error_pa, moving_pa)),
             Some(pistons) => pistons.step(piston, self.valve_pa, [error_pa, moving_pa], dt_s),
@@ -275,10 +275,10 @@ impl<T: Real> ElementState<T> {
         self.pistons.as_ref().map_or(self.valve_pa, Pistons::nominal_pa)
     }
 
-    /// The error of that pressure, Pa, where `x` is that of the pressure in its deviations.
+    /// The error of that pressure, Pa, where `x` is that of the pressure in its standard deviations.
     pub(super) fn error_pa(&self, element: &FrictionElement<T>, x: T) -> T {
         match &self.pistons {
-            None => self.deviation_pa(&element.uncertainty) * x,
+            None => self.std_dev_pa(&element.uncertainty) * x,
             Some(pistons) => pistons.mean_pa() - pistons.nominal_pa() + pistons.spread.all_pa * x,
         }
     }
@@ -291,13 +291,13 @@ impl<T: Real> ElementState<T> {
 
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
     /// moves, and at rest.
-    fn deviation_pa(&self, u: &ElementUncertainty<T>) -> T {
+    fn std_dev_pa(&self, u: &ElementUncertainty<T>) -> T {
         let [lag, delay] = self.timing.variance;
         let [by_lag_pa, by_delay_pa] = self.by_timing_pa(u);
         (lag * square(by_lag_pa) + delay * square(by_delay_pa) + square(u.pressure_pa)).sqrt()
     }
 
-    /// Change of the pressure by a lag and a delay that are longer by one deviation, Pa.
+    /// Change of the pressure by a lag and a delay that are longer by one standard deviation, Pa.
     fn by_timing_pa(&self, u: &ElementUncertainty<T>) -> [T; 2] {
         [-u.valve_lag_fraction * self.per_lag_pa / self.lag, -u.valve_delay_s * self.rate_pa_s]
     }
@@ -307,7 +307,7 @@ impl<T: Real> ElementState<T> {
     #[inline]
     fn pressing(&self, element: &FrictionElement<T>, wrong: &PressureError<T>) -> Pressing<T> {
         let clutch = &element.clutch;
-        let (kiss_pa, moving_pa) = (element.kiss_deviation_pa(), self.deviation_pa(&element.uncertainty));
+        let (kiss_pa, moving_pa) = (element.kiss_std_dev_pa(), self.std_dev_pa(&element.uncertainty));
         if let Some(pistons) = &self.pistons {
             return pressing_of_pistons(pistons, clutch, [kiss_pa, moving_pa], wrong);
         }
@@ -347,7 +347,7 @@ impl<T: Real> ElementState<T> {
     }
 
     /// The torque at the turbine up to which the element holds, N m, by what is known of its errors: `factor` is that of its torque,
-    /// in deviations.
+    /// in standard deviations.
     #[inline]
     pub(super) fn holds(
         &self,

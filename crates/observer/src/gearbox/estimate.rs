@@ -24,7 +24,7 @@ pub struct ClutchEstimate<T> {
     /// Torque, N m, positive when it drives its output side.
     pub torque_n_m: T,
     /// Standard deviation of the torque, N m.
-    pub deviation_n_m: T,
+    pub std_dev_n_m: T,
     /// Pressure by the models of valve and piston alone, Pa.
     pub valve_pa: T,
     /// Torque by these models and friction alone, N m; of a clutch that holds, the torque up to which it does, in the direction of
@@ -38,7 +38,7 @@ pub struct ClutchEstimate<T> {
     pub pressure_range_pa: Option<[T; 2]>,
     /// Lowest and highest torque, N m, for errors within the budget. Its direction is that of the slip, if that is larger than its
     /// error; else, where an element that is engaged in both gears may slip by the bounds of the errors, and where a speed has not been read twice within 50 ms or its last reading was refused, either direction is
-    /// possible. The slip errs by 7 deviations and 0.6 rad/s, by twice its change since the older reading, by the spread of
+    /// possible. The slip errs by 7 standard deviations and 0.6 rad/s, by twice its change since the older reading, by the spread of
     /// the readings' ages times the rate of each speed, and by an acceleration that changes by up to 10,000 rad/s^3.
     pub torque_range_n_m: Option<[T; 2]>,
 }
@@ -239,7 +239,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             element: clutch.element,
             pressure_pa,
             torque_n_m: corrected / clutch.alpha,
-            deviation_n_m: (torque.unlearnt_variance(both).sqrt() / clutch.alpha).abs(),
+            std_dev_n_m: (torque.unlearnt_variance(both).sqrt() / clutch.alpha).abs(),
             valve_pa,
             open_loop_n_m: torque.open_loop_n_m / clutch.alpha,
             holds: false,
@@ -271,7 +271,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             // A slipping clutch does not push.
             torque = zero;
         }
-        let deviation = x.variance(&row).sqrt();
+        let std_dev = x.variance(&row).sqrt();
         let (valve_pa, pressure_pa, both) =
             self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
                 let modelled_pa = memory.pressure_pa();
@@ -287,11 +287,11 @@ impl<T: Real> GearboxFilter<'_, T> {
             element: clutch.element,
             pressure_pa,
             torque_n_m: torque / clutch.alpha,
-            deviation_n_m: (deviation / clutch.alpha).abs(),
+            std_dev_n_m: (std_dev / clutch.alpha).abs(),
             valve_pa,
             open_loop_n_m: open_loop_n_m / clutch.alpha,
             holds,
-            hidden: !holds && !clutch.is_one_way() && deviation >= T::of(HIDDEN) * alone,
+            hidden: !holds && !clutch.is_one_way() && std_dev >= T::of(HIDDEN) * alone,
             pressure_range_pa: None,
             torque_range_n_m: None,
         }

@@ -19,7 +19,7 @@ pub struct InputClutch<T> {
     /// Torque, N m: positive when the engine drives.
     pub torque_n_m: T,
     /// Its standard deviation, N m: reported engine torque, converter maps, acceleration.
-    pub deviation_n_m: T,
+    pub std_dev_n_m: T,
 }
 
 impl<T: Real> TurbineTorque<T> {
@@ -42,7 +42,7 @@ impl<T: Real> TurbineTorque<T> {
             + square(inertia) * acceleration_variance
             + noise;
         let torque_n_m = reported - inertia * acceleration - pump;
-        Some(InputClutch { torque_n_m, deviation_n_m: variance.sqrt() })
+        Some(InputClutch { torque_n_m, std_dev_n_m: variance.sqrt() })
     }
 }
 
@@ -76,12 +76,12 @@ impl<T: Real> GearboxFilter<'_, T> {
             + square(m12) * output_variance;
         let alpha = shift.clutches[0].alpha;
         let torque_n_m = (reported - m11 * acceleration - m12 * output_rate) / alpha;
-        Some(InputClutch { torque_n_m, deviation_n_m: variance.sqrt() / alpha.abs() })
+        Some(InputClutch { torque_n_m, std_dev_n_m: variance.sqrt() / alpha.abs() })
     }
 
     /// Rate of a speed by its two newest readings, rad/s^2, and its variance.
     pub(super) fn rate(&self, state: &GearboxState<T>, speed: usize) -> Option<(T, T)> {
         let (rate, span_s) = state.newest[speed]?.rate()?;
-        Some((rate, T::of(2.0) * square(self.readings[speed].deviation_rad_s / span_s)))
+        Some((rate, T::of(2.0) * square(self.readings[speed].std_dev_rad_s / span_s)))
     }
 }

@@ -11,7 +11,7 @@
 //! | `q` | car | torque that the engine's controller reports, beside an open converter |
 //! | `l`, `d` | element | lag and delay of its valve: the valve model is changed by them, and the filter has no states of them |
 //!
-//! Together they are one Gaussian, each in units of the deviation that it has unlearnt. A shift begins with the ten of
+//! Together they are one Gaussian, each in units of the standard deviation that it has unlearnt. A shift begins with the ten of
 //! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift. What it shows ([`Shown`])
 //! are up to ten measurements of these, with noise of variance one, and one Kalman filter of all quantities takes them:
 //!
@@ -65,22 +65,22 @@ pub const LEARNT: usize = DELAY_AT + MAX_ELEMENTS;
 pub(super) const ACTING: usize = STATES_ACTING + 4;
 pub(super) const STATES_ACTING: usize = 6;
 
-/// Squared distance of what a shift says from what was known, in its deviations, beyond which it counts for less, and
+/// Squared distance of what a shift says from what was known, in its standard deviations, beyond which it counts for less, and
 /// beyond which it is refused \[chosen\]: ten quantities reach them by chance in one of 70 and in 2 of a million shifts.
 const LIKELY: f64 = 22.0;
 const GATE: f64 = 46.0;
 /// Refused shifts in a row after which all is forgotten \[chosen\]: the car is another, as after a repair.
 const REFUSED_MOST: u8 = 8;
-/// Variance by which each quantity is another in the next shift, in that of the budget \[chosen\]: 9 % of its deviation in 30
+/// Variance by which each quantity is another in the next shift, in that of the budget \[chosen\]: 9 % of its standard deviation in 30
 /// shifts. What is well known stays open to what comes, also in single precision.
 const PER_SHIFT: f64 = 2.5e-4;
-/// Least variance of the scale of the wheel speed, in that of the budget \[chosen\]: the filter's own changes by a tenth of its deviation
-/// with what the car does, as the timing of the readings shows as a scale.
+/// Least variance of the scale of the wheel speed, in that of the budget \[chosen\]: the filter's own changes by a tenth of its standard
+/// deviation with what the car does, as the timing of the readings shows as a scale.
 const WHEEL_LEAST: f64 = 0.01;
-/// Bound of a quantity in its deviations: the edge of a uniform distribution, and of the sum of two.
+/// Bound of a quantity in its standard deviations: the edge of a uniform distribution, and of the sum of two.
 pub(super) const EDGE: f64 = 1.732;
 const EDGE_OF_TWO: f64 = 2.449;
-/// The same of lag and delay, in deviations of the part that lasts, three quarters of the variance: all of it may last.
+/// The same of lag and delay, in standard deviations of the part that lasts, three quarters of the variance: all of it may last.
 const EDGE_OF_TIMING: f64 = 2.0;
 /// Correlation of the torque factors of two elements unlearnt \[chosen\]: half of the variance of the friction is that of the oil,
 /// which all of them share, and friction is two thirds of that of the factor. Without it a friction that is wrong in all
@@ -112,7 +112,7 @@ const OIL_DEGC: [f64; 2] = [-60.0, 220.0];
 /// [`Learnt::checked`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learnt<T> {
-    /// Means, in units of the deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
+    /// Means, in units of the standard deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
     /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed, reported engine torque,
     /// lags and delays of the valves by element.
     pub mean: [T; LEARNT],
@@ -136,7 +136,7 @@ pub struct LearntElement<T> {
     /// Of its kiss point, Pa.
     pub kiss_pa: [T; 2],
     /// Of the valve's gain, as a fraction. Speeds and commands do not tell it apart from a friction and a kiss point of the
-    /// element: its deviation stays large.
+    /// element: its standard deviation stays large.
     pub valve_gain: [T; 2],
 }
 
@@ -150,7 +150,7 @@ pub(super) struct Acting<T> {
     places: [Option<usize>; ACTING],
     /// Part of the variance of torque factors, kiss points, lags and delays that lasts, of either clutch.
     slow_part: [T; 2],
-    /// How an error of the stiffness shows in each, per deviation of it.
+    /// How an error of the stiffness shows in each, per standard deviation of it.
     by_stiffness: [T; ACTING],
     /// Whether they act in a shift, and not in a gear.
     in_shift: bool,
@@ -271,13 +271,13 @@ impl<T: Real> Learnt<T> {
         }
     }
 
-    /// Mean and deviation of the inertia of a pair of gears.
+    /// Mean and standard deviation of the inertia of a pair of gears.
     pub(super) fn of_pair(&self, pair: usize) -> Option<[T; 2]> {
         let place = INERTIA_AT + pair.min(MAX_PAIRS - 1);
         (pair < MAX_PAIRS).then_some([self.mean_of(place), self.covariance_of(place, place).sqrt()])
     }
 
-    /// Mean and deviation of the torque at the gearbox input, and of the reported engine torque.
+    /// Mean and standard deviation of the torque at the gearbox input, and of the reported engine torque.
     pub(super) fn of_sources(&self) -> [[T; 2]; 2] {
         [TURBINE_AT, REPORTED_AT].map(|at| [self.mean_of(at), self.covariance_of(at, at).sqrt()])
     }
@@ -303,9 +303,9 @@ impl<T: Real> Learnt<T> {
         }
     }
 
-    /// Takes a measurement of the sum of two errors, as a fraction: of the converter's capacity and of the reported engine torque, whose deviations
-    /// unlearnt are these. Where it is further from what is known than both may be, at their bounds and with three deviations of the noise,
-    /// one of them is not that of this car, and nothing follows.
+    /// Takes a measurement of the sum of two errors, as a fraction: of the converter's capacity and of the reported engine torque, whose
+    /// standard deviations unlearnt are these. Where it is further from what is known than both may be, at their bounds and with three
+    /// standard deviations of the noise, one of them is not that of this car, and nothing follows.
     pub(super) fn take_capacity(&mut self, fraction: T, [capacity, reported]: [T; 2], noise: T) {
         let bound = T::of(EDGE) * (capacity + reported) + T::of(3.0) * noise.sqrt();
         let with = self.covariance.map(|row| capacity * row[TURBINE_AT] + reported * row[REPORTED_AT]);
@@ -527,7 +527,7 @@ fn is_oil<T: Real>(degc: T) -> bool {
     least <= degc && degc <= greatest
 }
 
-/// Bound of a quantity in its deviations.
+/// Bound of a quantity in its standard deviations.
 fn edge(k: usize) -> f64 {
     match k {
         0..INERTIA_AT => EDGE_OF_TWO,

@@ -119,19 +119,20 @@ const TWIST_S: f64 = 0.1;
 /// Time over which the wheel speed is compared with that of the output, s, and the largest twist of the drive shafts, rad \[chosen\].
 const WHEEL_S: f64 = 1.0;
 const TWIST_RAD: f64 = 0.3;
-/// Deviation of the age of the last tooth, in the time between two.
+/// Standard deviation of the age of the last tooth, in the time between two.
 const TOOTH: f64 = 0.6;
-/// Deviation of the model of the speeds over 10 ms, in deviations of a reading.
+/// Standard deviation of the model of the speeds over 10 ms, in standard deviations of a reading.
 const MODEL_FRACTION: f64 = 0.1;
-/// Deviations of an innovation beyond which a reading is refused.
+/// Standard deviations of an innovation beyond which a reading is refused.
 const GATE: u8 = 5;
-/// Deviations at the start \[chosen\]: of the rate of twist, as an error of the wheel speed, rad/s; of the shaft torque beside the fraction
+/// Standard deviations at the start \[chosen\]: of the rate of twist, as an error of the wheel speed, rad/s; of the shaft torque beside
+/// the fraction
 /// `b`, and of the load about the shaft torque, each as a fraction and beside it, N m: the car may accelerate or brake.
 const WHEEL_START_RAD_S: f64 = 0.3;
 const SHAFT_START: (f64, f64) = (0.3, 100.0);
 const LOAD_START: (f64, f64) = (1.0, 400.0);
 /// Time over which the squared innovations are averaged, s, and their mean above which no phase of the shift explains the
-/// speeds: five deviations that last.
+/// speeds: five standard deviations that last.
 const MISFIT_S: f64 = 0.05;
 const MISFIT: f64 = 25.0;
 /// Samples in a row with slip in a gear after which an element of the gear slips.
@@ -469,7 +470,7 @@ fn pieces<T: Real>(dt_s: T) -> (usize, T) {
     (pieces, dt_s / T::of(pieces as f64))
 }
 
-/// A deviation as a fraction of a value and beside it.
+/// A standard deviation as a fraction of a value and beside it.
 fn at_start<T: Real>((fraction, beside): (f64, f64), value: T) -> T {
     T::of(fraction) * value.abs() + T::of(beside)
 }

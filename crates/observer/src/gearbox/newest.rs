@@ -12,8 +12,8 @@ const JERK_RAD_S3: f64 = 10_000.0;
 /// By how much a speed may bend away from the line through the oldest readings where it is carried on before them, rad/s \[chosen\]:
 /// less than the threshold of a slip.
 const BENT_RAD_S: f64 = 0.3;
-/// Deviations of a reading from the line through the two before it beyond which it is no speed of this shaft.
-const DEVIATIONS: f64 = 5.0;
+/// Standard deviations of a reading from the line through the two before it beyond which it is no speed of this shaft.
+const STD_DEVS: f64 = 5.0;
 
 /// The newest reading of a speed and the two before: the other channel may miss two in a row and is still compared at a time
 /// that lies between readings.
@@ -36,7 +36,7 @@ pub(super) struct Newest<T> {
 pub(super) struct SpeedNow<T> {
     pub(super) value: T,
     /// Its standard deviation by those of the readings.
-    pub(super) deviation: T,
+    pub(super) std_dev: T,
     /// By how much it errs at most beside them: the speed bends, and the readings are of other times.
     pub(super) drift: T,
 }
@@ -44,9 +44,9 @@ pub(super) struct SpeedNow<T> {
 impl<T: Real> Newest<T> {
     /// Takes a reading that is `age_s` old up to `late_s`, with this standard deviation. Whether it was taken: one that lies off the line
     /// through the two before by more than a powertrain can do is refused once.
-    pub(super) fn take(newest: &mut Option<Self>, value: T, [age_s, late_s]: [T; 2], deviation: T) -> bool {
+    pub(super) fn take(newest: &mut Option<Self>, value: T, [age_s, late_s]: [T; 2], std_dev: T) -> bool {
         if let Some(newest) = newest
-            && newest.is_off(value, age_s, deviation)
+            && newest.is_off(value, age_s, std_dev)
             && !newest.refused
         {
             newest.refused = true;
@@ -60,7 +60,7 @@ impl<T: Real> Newest<T> {
         true
     }
 
-    fn is_off(&self, value: T, age_s: T, deviation: T) -> bool {
+    fn is_off(&self, value: T, age_s: T, std_dev: T) -> bool {
         let Some((_, before_s)) = self.before[0] else { return false };
         let (step_s, line_s) = (self.age_s - age_s, before_s - self.age_s);
         if line_s > T::of(LONGEST_S) || step_s <= T::zero() {
@@ -71,10 +71,10 @@ impl<T: Real> Newest<T> {
             return false;
         }
         let reach = step_s / line_s;
-        // Of the line's end, whose ends err by one deviation each, and of the reading.
+        // Of the line's end, whose ends err by one standard deviation each, and of the reading.
         let one = T::one();
-        let noise = deviation * ((one + reach) * (one + reach) + reach * reach + one).sqrt();
-        distance > T::of(DEVIATIONS) * noise
+        let noise = std_dev * ((one + reach) * (one + reach) + reach * reach + one).sqrt();
+        distance > T::of(STD_DEVS) * noise
     }
 
     /// Lets time pass.
@@ -132,7 +132,7 @@ impl<T: Real> Newest<T> {
     ///
     /// An acceleration that changes by at most `j` leads away from a line through two readings that are `a` and `b` old by at
     /// most `j a b / 2`. An age that errs by `e` changes the value of its reading by the rate times `e`.
-    pub(super) fn now(&self, deviation: T, longest_s: T) -> Option<SpeedNow<T>> {
+    pub(super) fn now(&self, std_dev: T, longest_s: T) -> Option<SpeedNow<T>> {
         let (early, early_s) = self.before[0].filter(|_| !self.refused)?;
         let (age_s, span_s) = (self.age_s + self.late_s, early_s - self.age_s);
         if !(age_s <= longest_s && span_s <= T::of(LONGEST_S)) {
@@ -147,7 +147,7 @@ impl<T: Real> Newest<T> {
         let turns = value.abs() - drift >= half * self.value.abs() || self.late_s <= T::zero();
         turns.then(|| SpeedNow {
             value,
-            deviation: deviation * ((one + reach) * (one + reach) + reach * reach).sqrt(),
+            std_dev: std_dev * ((one + reach) * (one + reach) + reach * reach).sqrt(),
             drift,
         })
     }

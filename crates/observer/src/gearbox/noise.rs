@@ -76,7 +76,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     pub(super) fn noisier(&self, factor: T) -> Self {
         let mut readings = self.readings;
         for k in [TURBINE, OUTPUT] {
-            readings[k].deviation_rad_s = factor * readings[k].deviation_rad_s;
+            readings[k].std_dev_rad_s = factor * readings[k].std_dev_rad_s;
         }
         Self { readings, ..*self }
     }
@@ -90,7 +90,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         };
         let together = came(TURBINE, &input.turbine_rad_s).zip(came(OUTPUT, &input.output_rad_s));
         let (Some(row), Some((turbine, output))) = (row, together) else { return state.noise.pause() };
-        let [of_turbine, of_output] = [TURBINE, OUTPUT].map(|k| square(self.readings[k].deviation_rad_s));
+        let [of_turbine, of_output] = [TURBINE, OUTPUT].map(|k| square(self.readings[k].std_dev_rad_s));
         let slip = turbine.value - row.ratio * output.value;
         let stated = (of_turbine + square(row.ratio) * of_output) / square(state.noise.factor());
         state.noise.take(slip, gear, stated);

@@ -18,9 +18,9 @@
 
 use drivetrain::Real;
 
-/// Deviations of the slip in its threshold, and slip beside them, rad/s.
+/// Standard deviations of the slip in its threshold, and slip beside them, rad/s.
 const THRESHOLD: (f64, f64) = (3.5, 0.3);
-/// Deviations of the slip above which it may be one: then no reading of turbine and output is taken while a clutch holds.
+/// Standard deviations of the slip above which it may be one: then no reading of turbine and output is taken while a clutch holds.
 const MAYBE: f64 = 2.0;
 /// Fraction of the threshold below which a clutch has caught, and samples in a row.
 const CAUGHT: (f64, u8) = (0.7, 2);
@@ -70,12 +70,12 @@ impl ShiftPhase {
 pub(super) struct Slip<T> {
     pub(super) value: T,
     /// Standard deviation of the reading.
-    pub(super) deviation: T,
+    pub(super) std_dev: T,
 }
 
 impl<T: Real> Slip<T> {
     pub(super) fn threshold(&self) -> T {
-        T::of(THRESHOLD.0) * self.deviation + T::of(THRESHOLD.1)
+        T::of(THRESHOLD.0) * self.std_dev + T::of(THRESHOLD.1)
     }
 
     pub(super) fn is_over(&self) -> bool {
@@ -84,7 +84,7 @@ impl<T: Real> Slip<T> {
 
     /// Whether it may be a slip that is not yet seen.
     pub(super) fn may_be(&self) -> bool {
-        self.value.abs() > T::of(MAYBE) * self.deviation
+        self.value.abs() > T::of(MAYBE) * self.std_dev
     }
 
     /// Its sign; less than one where the slip is below half its threshold.
@@ -254,8 +254,8 @@ impl<T: Real> PhaseMemory<T> {
             let value = slip.value.at_least(-limit).at_most(limit);
             self.mean_rad_s = self.mean_rad_s + fraction * (value - self.mean_rad_s);
         }
-        let deviation = slip.deviation * (fraction / (T::of(2.0) - fraction)).sqrt();
-        Slip { value: self.mean_rad_s, deviation }.is_over()
+        let std_dev = slip.std_dev * (fraction / (T::of(2.0) - fraction)).sqrt();
+        Slip { value: self.mean_rad_s, std_dev }.is_over()
     }
 
     fn both_slip(&mut self, off: &Contact<T>, on: &Contact<T>) -> ShiftPhase {
@@ -277,7 +277,7 @@ mod tests {
     use super::*;
 
     fn contact(slip: f64, needed_n_m: f64) -> Contact<f64> {
-        Contact { slip: Slip { value: slip, deviation: 0.1 }, needed_n_m, holds_n_m: 60.0 }
+        Contact { slip: Slip { value: slip, std_dev: 0.1 }, needed_n_m, holds_n_m: 60.0 }
     }
 
     /// The phase after these samples of slip and torque needed, of offgoing and oncoming clutch.
@@ -360,7 +360,7 @@ mod tests {
     #[test]
     fn a_clutch_that_may_slip_yet_has_its_direction_for_one_sample() {
         let mut memory = PhaseMemory::new(ShiftPhase::OncomingHolds);
-        let slip = Slip { value: 0.2, deviation: 0.1 };
+        let slip = Slip { value: 0.2, std_dev: 0.1 };
         memory.slips_yet = -0.3;
         assert_eq!([0, 1].map(|clutch| memory.direction(clutch, &slip)), [slip.direction(), -1.0]);
         memory.step(&[contact(90.0, 0.0), contact(0.2, 30.0)], [true; 2]);

@@ -5,7 +5,7 @@
 //! pistons of equal probability are carried by the law of [`drivetrain::Cylinder`]. They differ by two independent errors: of
 //! the time that a fill takes (volume and passages), and of the pressure at the valve against that of the return spring,
 //! on which a slow stroke at low pressure depends. From them follow the probability that the plates touch, mean
-//! and deviation of what presses them, and how much of an error of it lasts from step to step.
+//! and standard deviation of what presses them, and how much of an error of it lasts from step to step.
 
 use drivetrain::{Cylinder, Real};
 
@@ -13,7 +13,7 @@ use super::square;
 
 /// Pistons that are carried.
 const POINTS: usize = 9;
-/// Deviations of the fill's time and of the pressure of each piston: the middles of nine equal parts of a Gaussian, each once in
+/// Standard deviations of the fill's time and of the pressure of each piston: the middles of nine equal parts of a Gaussian, each once in
 /// both columns, which are not correlated. The first piston is the nominal one.
 const AWAY: [[f64; 2]; POINTS] = [
     [0.0, 0.0],
@@ -38,7 +38,7 @@ const RESTS_PA: f64 = 1.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piston<T> {
     cylinder: Cylinder<T>,
-    /// Of each of the pistons that are carried the volume of the stroke, m^3, and the pressure in its deviations.
+    /// Of each of the pistons that are carried the volume of the stroke, m^3, and the pressure in its standard deviations.
     each: [[T; 2]; POINTS],
 }
 
@@ -56,7 +56,7 @@ impl Piston<f64> {
 }
 
 impl<T: Real> Piston<T> {
-    /// The cylinders of the pistons that are carried, and the errors of their pressures, Pa, with this deviation.
+    /// The cylinders of the pistons that are carried, and the errors of their pressures, Pa, with this standard deviation.
     fn cylinders(&self, error_pa: T) -> [(Cylinder<T>, T); POINTS] {
         self.each.map(|[stroke_m3, more]| (Cylinder { stroke_m3, ..self.cylinder }, more * error_pa))
     }
@@ -107,7 +107,7 @@ pub(super) struct Pistons<T> {
     pub(super) spread: Spread<T>,
     /// Correlation of the error of what presses the plates with that at the beginning of the step.
     pub(super) lasts: T,
-    /// Pressure at the valve, and its deviation, at the end of the last step, Pa.
+    /// Pressure at the valve, and its standard deviation, at the end of the last step, Pa.
     valve_pa: T,
     moving_pa: T,
     /// Whether they rest as long as the pressure at the valve does.
@@ -115,7 +115,7 @@ pub(super) struct Pistons<T> {
 }
 
 impl<T: Real> Pistons<T> {
-    /// With the valve at this pressure for ever. `error_pa` is the deviation of the pressure against the return spring.
+    /// With the valve at this pressure for ever. `error_pa` is the standard deviation of the pressure against the return spring.
     pub(super) fn settled(piston: &Piston<T>, valve_pa: T, error_pa: T, moving_pa: T) -> Self {
         let points = piston.cylinders(error_pa).map(|(cylinder, away_pa)| {
             Point::new(&cylinder, cylinder.volume((valve_pa + away_pa).at_least(T::zero())), away_pa)
@@ -123,7 +123,7 @@ impl<T: Real> Pistons<T> {
         Self { points, spread: Spread::of(&points, moving_pa), lasts: T::one(), valve_pa, moving_pa, rest: false }
     }
 
-    /// Carries the pistons over a step, at whose end the valve has this pressure. `error_pa` is the deviation of the pressure
+    /// Carries the pistons over a step, at whose end the valve has this pressure. `error_pa` is the standard deviation of the pressure
     /// against the return spring, `moving_pa` that of the pressure.
     pub(super) fn step(&mut self, piston: &Piston<T>, valve_pa: T, [error_pa, moving_pa]: [T; 2], dt_s: T) {
         self.lasts = T::one();
@@ -157,7 +157,7 @@ impl<T: Real> Pistons<T> {
         rest
     }
 
-    /// What follows at the end of a step, with this deviation of the pressure.
+    /// What follows at the end of a step, with this standard deviation of the pressure.
     fn conclude(&mut self, moving_pa: T) {
         let then = self.spread;
         self.spread = Spread::of(&self.points, moving_pa);
@@ -268,7 +268,7 @@ mod tests {
         assert!(none.iter().all(|sum| sum.abs() < 1e-12), "{none:?}");
     }
 
-    /// Errors between their bounds, each as likely as the others, in their deviations.
+    /// Errors between their bounds, each as likely as the others, in their standard deviations.
     fn uniform_errors() -> Vec<[f64; 2]> {
         let of = |k: i32| 3.0_f64.sqrt() * f64::from(k) / 10.5;
         (-10..=10).flat_map(|late| (-10..=10).map(move |more| [of(late), of(more)])).collect()
@@ -289,7 +289,7 @@ mod tests {
         most
     }
 
-    /// Of pistons with other errors of the same deviations so many touch as nine can tell.
+    /// Of pistons with other errors of the same standard deviations so many touch as nine can tell.
     #[test]
     fn as_many_pistons_touch_as_is_said() {
         let (piston, all) = (piston(), uniform_errors());

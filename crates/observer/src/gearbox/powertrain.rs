@@ -51,7 +51,7 @@ pub(super) struct ClutchTorque<T> {
     pub(super) per_friction_n_m: T,
     pub(super) per_kiss_n_m: T,
     pub(super) per_pressure_n_m: T,
-    /// Pressure by a lag and a delay that are longer by one deviation, in deviations of the pressure's error.
+    /// Pressure by a lag and a delay that are longer by one standard deviation, in standard deviations of the pressure's error.
     pub(super) by_timing: [T; 2],
     /// By the valve model and the budget's friction and kiss point alone, of full size also where the direction is uncertain.
     pub(super) open_loop_n_m: T,
@@ -101,9 +101,9 @@ pub(super) struct Torques<T> {
     /// The same low-passed: what the fraction `b` multiplies. With the raw one the noise of the speeds would be in reading
     /// and factor, which pulls the fraction to one side.
     pub(super) fraction_n_m: T,
-    /// The same times the deviation of the part of its error that lasts.
+    /// The same times the standard deviation of the part of its error that lasts.
     pub(super) slow_fraction_n_m: T,
-    /// `M11 w_t'` times the deviation of `M11`.
+    /// `M11 w_t'` times the standard deviation of `M11`.
     pub(super) inertia_n_m: T,
     pub(super) clutches: [ClutchTorque<T>; 2],
 }

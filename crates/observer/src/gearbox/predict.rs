@@ -139,7 +139,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         // What the model leaves out moves both speeds alike while a clutch ties them.
         let model =
-            |k: usize| T::of(MODEL_FRACTION * MODEL_FRACTION * 100.0) * dt_s * square(self.readings[k].deviation_rad_s);
+            |k: usize| T::of(MODEL_FRACTION * MODEL_FRACTION * 100.0) * dt_s * square(self.readings[k].std_dev_rad_s);
         x.add(WHEEL, WHEEL, model(WHEEL));
         x.add(OUTPUT, OUTPUT, model(OUTPUT));
         match self.tied_ratio(running) {

@@ -146,7 +146,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
             let taken = self.limits.speed_valid(reading.value)
                 && aged
-                && Newest::take(newest, reading.value, self.age_and_late(sensor, &reading), sensor.deviation_rad_s);
+                && Newest::take(newest, reading.value, self.age_and_late(sensor, &reading), sensor.std_dev_rad_s);
             *health = if taken { ChannelHealth::Good } else { ChannelHealth::Refused };
         }
         state.wheel_came |= input.wheel_rad_s.is_some();
@@ -177,13 +177,13 @@ impl<T: Real> GearboxFilter<'_, T> {
         [TURBINE, OUTPUT].iter().all(|&k| newest[k].is_some_and(|newest| newest.age_s <= T::of(FIRST_S)))
     }
 
-    /// Slip now at the turbine, and its error: `None` where the readings bound none. It errs by 7 deviations and 0.6 rad/s, by
+    /// Slip now at the turbine, and its error: `None` where the readings bound none. It errs by 7 standard deviations and 0.6 rad/s, by
     /// twice its change since the older reading, and by what readings of both speeds do not show ([`Newest::now`]).
     pub(super) fn bounded_slip(&self, ratio: T, newest: &[Option<Newest<T>>; SPEEDS]) -> Option<[T; 2]> {
-        let now = |k: usize| newest[k].and_then(|newest| newest.now(self.readings[k].deviation_rad_s, T::of(FIRST_S)));
+        let now = |k: usize| newest[k].and_then(|newest| newest.now(self.readings[k].std_dev_rad_s, T::of(FIRST_S)));
         let (turbine, output) = (now(TURBINE)?, now(OUTPUT)?);
-        let deviation = (square(turbine.deviation) + square(ratio * output.deviation)).sqrt();
-        let slip = Slip { value: turbine.value - ratio * output.value, deviation };
+        let std_dev = (square(turbine.std_dev) + square(ratio * output.std_dev)).sqrt();
+        let slip = Slip { value: turbine.value - ratio * output.value, std_dev };
         let changed = (slip.value - self.slip(ratio, self.measured(newest, None)).value).abs();
         let error = T::of(2.0) * (slip.threshold() + changed) + turbine.drift + ratio.abs() * output.drift;
         (slip.value.is_finite() && error.is_finite()).then_some([slip.value, error])
@@ -205,19 +205,19 @@ impl<T: Real> GearboxFilter<'_, T> {
         };
         let engine = state.engine.as_ref().map(|engine| {
             let now = engine.speed_before(T::zero());
-            let (acceleration, deviation) = engine.acceleration();
-            [now, engine.variance(), acceleration, deviation * deviation]
+            let (acceleration, std_dev) = engine.acceleration();
+            [now, engine.variance(), acceleration, std_dev * std_dev]
         });
-        let deviation = self.readings[TURBINE].deviation_rad_s;
+        let std_dev = self.readings[TURBINE].std_dev_rad_s;
         let reported_n_m = state.reported.map(|(torque, _)| torque);
-        let turbine = [turbine, deviation * deviation];
+        let turbine = [turbine, std_dev * std_dev];
         Some(InputSide { engine, turbine, reported_n_m, lock_up_applied: input.lock_up_applied })
     }
 
     pub(super) fn slip(&self, ratio: T, [turbine, output]: [T; 2]) -> Slip<T> {
-        let [turbine_deviation, output_deviation] = [TURBINE, OUTPUT].map(|k| self.readings[k].deviation_rad_s);
-        let deviation = (square(turbine_deviation) + square(ratio * output_deviation)).sqrt();
-        Slip { value: turbine - ratio * output, deviation }
+        let [turbine_std_dev, output_std_dev] = [TURBINE, OUTPUT].map(|k| self.readings[k].std_dev_rad_s);
+        let std_dev = (square(turbine_std_dev) + square(ratio * output_std_dev)).sqrt();
+        Slip { value: turbine - ratio * output, std_dev }
     }
 }
 
@@ -240,7 +240,7 @@ mod tests {
 
     const PITCH: f64 = core::f64::consts::TAU / 60.0;
     const WHEEL: SpeedReading<f64> =
-        SpeedReading { deviation_rad_s: 0.1, lag_rad: 0.5 * 11.0 * PITCH, pitch_rad: PITCH, delay_s: 0.0 };
+        SpeedReading { std_dev_rad_s: 0.1, lag_rad: 0.5 * 11.0 * PITCH, pitch_rad: PITCH, delay_s: 0.0 };
 
     #[test]
     fn a_toothed_wheel_that_slows_down_is_within_the_drift_of_its_readings() {

@@ -51,7 +51,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let u = &element.uncertainty;
         let ([s, k], [[s_s, s_k], [_, k_k]]) = learnt.of_element(at)?;
         let torque = u.torque_fraction * u.slow_part.sqrt();
-        let kiss_pa = element.kiss_deviation_pa() * u.slow_part.sqrt();
+        let kiss_pa = element.kiss_std_dev_pa() * u.slow_part.sqrt();
         let [by_s, by_k] = element.gain_by(T::one());
         // Unlearnt both vary by one, with their correlation.
         let both = element.correlation();
@@ -66,7 +66,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         })
     }
 
-    /// What is learnt of the turbine-side inertia between two gears: its error as a fraction, and the deviation; `None` if it is
+    /// What is learnt of the turbine-side inertia between two gears: its error as a fraction, and the standard deviation; `None` if it is
     /// not learnt.
     pub fn learnt_inertia(&self, learnt: &Learnt<T>, from: usize, to: usize) -> Option<[T; 2]> {
         let of = learnt.of_pair(self.tables.pair(from, to)?)?;
@@ -74,7 +74,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// What is learnt of the torque at the gearbox input, as a fraction of that by the converter's maps (without a converter, of the reported one);
-    /// and of the reported engine torque beside a converter, as a fraction of the true one: error and deviation.
+    /// and of the reported engine torque beside a converter, as a fraction of the true one: error and standard deviation.
     pub fn learnt_sources(&self, learnt: &Learnt<T>) -> [[T; 2]; 2] {
         let (of, turbine) = (learnt.of_sources(), &self.turbine);
         let first = if turbine.converter.is_some() { turbine.converter_share } else { turbine.engine_share };
@@ -83,17 +83,16 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// What is learnt of the valve of an element: error of its lag as a fraction, and of its delay beside that of the tables, s, each with its
-    /// deviation; `None` if there is no such element.
+    /// standard deviation; `None` if there is no such element.
     pub fn learnt_timing(&self, learnt: &Learnt<T>, at: usize) -> Option<[[T; 2]; 2]> {
         let ([lag, delay], [lag_variance, delay_variance]) = learnt.of_timing(at)?;
         let u = &self.tables.elements.get(at)?.uncertainty;
-        let [per_lag, per_delay] =
-            [u.valve_lag_fraction, u.valve_delay_s].map(|deviation| u.slow_part.sqrt() * deviation);
+        let [per_lag, per_delay] = [u.valve_lag_fraction, u.valve_delay_s].map(|std_dev| u.slow_part.sqrt() * std_dev);
         let of = |per: T, mean: T, variance: T| [per * mean, per * variance.sqrt()];
         Some([of(per_lag, lag, lag_variance), of(per_delay, delay, delay_variance)])
     }
 
-    /// What is learnt of the scale of the wheel speed: its error as a fraction, and the deviation.
+    /// What is learnt of the scale of the wheel speed: its error as a fraction, and the standard deviation.
     pub fn learnt_wheel_scale(&self, learnt: &Learnt<T>) -> [T; 2] {
         let [mean, variance] = learnt.of_wheel();
         [mean, variance.sqrt()].map(|value| self.uncertainty.wheel_scale * value)
@@ -125,7 +124,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         elements.map(|at| self.tables.elements.get(at).map_or(T::infinity(), |element| of(&element.uncertainty)))
     }
 
-    /// How an error of the stiffness of the drive shafts shows in the lasting states, per deviation of it: as one of all
+    /// How an error of the stiffness of the drive shafts shows in the lasting states, per standard deviation of it: as one of all
     /// torques alike, and of no kiss point and no timing.
     fn by_stiffness(&self, elements: [usize; 2]) -> [T; ACTING] {
         let u = &self.uncertainty;

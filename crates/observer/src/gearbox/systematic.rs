@@ -3,7 +3,7 @@
 //! The equations of a shift are not those of the car: a reading has an age, a valve has hysteresis, near the kiss point a clutch has the mean
 //! torque of an uncertain pressure, open clutches drag. Such an error is much the same in all shifts, so a quantity `a` is shown as `a + u` with
 //! one `u` of variance `beta`. For the next shift `a + u` is what counts, so the filter begins it with the mean `m` and the variance `P` by shifts
-//! that are taken to err independently. What is said of the car itself is `a`, in units of the deviation unlearnt:
+//! that are taken to err independently. What is said of the car itself is `a`, in units of the standard deviation unlearnt:
 //!
 //! ```text
 //! mean s m     variance 1 - s (1 - P)     s = 1/(1 + beta (1 - P))

@@ -2,10 +2,10 @@
 //!
 //! Both are constants of a shift, and the filter has no states of them: it goes on with the valve models as they are, and how far
 //! its states would be off by an error of the timing is carried beside them (a filter in two stages, after Friedland). With the
-//! errors `b` of the timing, each in its deviation, the states are off by `V b`:
+//! errors `b` of the timing, each in its standard deviation, the states are off by `V b`:
 //!
 //! ```text
-//! V+ = F V + G w        w: pressure by the timing, in deviations of the pressure's error `x`
+//! V+ = F V + G w        w: pressure by the timing, in standard deviations of the pressure's error `x`
 //! S = H V               by so much is a reading off, beside noise of the variance s^2 of its innovation e
 //! V+ = V - K S          I+ = I + S S'/s^2,  i+ = i + S e/s^2
 //! ```
@@ -23,15 +23,15 @@ use super::{LASTING, N, OUTPUT, PRESSURE, TURBINE};
 /// Lag and delay of the offgoing, then of the oncoming clutch.
 pub(super) const TIMINGS: usize = ACTING - STATES_ACTING;
 
-/// Per deviation of lag and of delay of each clutch.
+/// Per standard deviation of lag and of delay of each clutch.
 pub(super) type ByTiming<T> = [[T; 2]; 2];
 
 /// What the readings have shown of the timing since the shift began.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Timing<T> {
-    /// Errors of the timing that the valve models have taken off, in deviations.
+    /// Errors of the timing that the valve models have taken off, in standard deviations.
     taken_off: [T; TIMINGS],
-    /// By how much each state is off per deviation of each.
+    /// By how much each state is off per standard deviation of each.
     off: [[T; TIMINGS]; N],
     information: [[T; TIMINGS]; TIMINGS],
     /// Information times mean.
@@ -84,7 +84,7 @@ impl<T: Real> Timing<T> {
         sum
     }
 
-    /// Takes a reading that the timing moves by `seen`, with its innovation and what that moves the states, all in deviations of
+    /// Takes a reading that the timing moves by `seen`, with its innovation and what that moves the states, all in standard deviations of
     /// the innovation.
     #[inline]
     pub(super) fn take(&mut self, seen: &[T; TIMINGS], innovation: T, moves: &[T; N]) {
@@ -99,7 +99,7 @@ impl<T: Real> Timing<T> {
 
     /// What was known before the shift, and what is known after it, of all that acts in it. `before` and `after` are that of the states with the
     /// timing as the valve models have it. Of the timing it does not matter what is taken to be known before the shift:
-    /// here one deviation about what the models have taken off.
+    /// here one standard deviation about what the models have taken off.
     pub(super) fn together(&self, mut before: Known<T>, mut after: Known<T>) -> Option<(Known<T>, Known<T>)> {
         let mut precision = self.information;
         for (k, row) in precision.iter_mut().enumerate() {

@@ -40,7 +40,7 @@ pub(super) struct InputSide<T> {
     pub(super) lock_up_applied: bool,
 }
 
-/// The torque, N m, its variance from the noise of the speeds, and its deviation as a fraction.
+/// The torque, N m, its variance from the noise of the speeds, and its standard deviation as a fraction.
 pub(super) struct Found<T> {
     pub(super) turbine_n_m: T,
     pub(super) noise: T,

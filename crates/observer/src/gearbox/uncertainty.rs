@@ -104,7 +104,7 @@ impl<T: Real> ShiftUncertainty<T> {
 
 impl<T: Real> FrictionElement<T> {
     /// Standard deviation of the kiss point, Pa: what lasts is an own one and that of the valve's gain.
-    pub(super) fn kiss_deviation_pa(&self) -> T {
+    pub(super) fn kiss_std_dev_pa(&self) -> T {
         let u = &self.uncertainty;
         let by_gain_pa = u.valve_gain * self.clutch.kiss_pressure();
         ((square(u.kiss_point_pa) + square(by_gain_pa)) / u.slow_part).sqrt()
@@ -112,7 +112,7 @@ impl<T: Real> FrictionElement<T> {
 
     /// Standard deviation of the pressure at rest above the kiss point, Pa: what drives the piston of a slow fill.
     pub(super) fn above_kiss_pa(&self) -> T {
-        (square(self.kiss_deviation_pa()) + square(self.uncertainty.pressure_pa)).sqrt()
+        (square(self.kiss_std_dev_pa()) + square(self.uncertainty.pressure_pa)).sqrt()
     }
 
     /// Error of the valve's gain, as a fraction, that the factor of the torque `f` and the kiss point `k` speak for.
@@ -121,14 +121,14 @@ impl<T: Real> FrictionElement<T> {
         by_f * f + by_k * k
     }
 
-    /// Regression of the gain on torque factor and kiss point; `slow` is the deviation of what lasts of them in their own.
+    /// Regression of the gain on torque factor and kiss point; `slow` is the standard deviation of what lasts of them in their own.
     pub(super) fn gain_by(&self, slow: T) -> [T; 2] {
         let u = &self.uncertainty;
         let variance = u.valve_gain * u.valve_gain;
         // Covariances of the gain with both, and of these two.
         let per = variance * slow / u.slow_part.sqrt();
         let with_f = per / u.torque_fraction;
-        let with_k = -per * self.clutch.kiss_pressure() / self.kiss_deviation_pa();
+        let with_k = -per * self.clutch.kiss_pressure() / self.kiss_std_dev_pa();
         let both = slow * slow * self.correlation();
         let left = T::one() - both * both;
         [(with_f - both * with_k) / left, (with_k - both * with_f) / left]
@@ -139,7 +139,7 @@ impl<T: Real> FrictionElement<T> {
         let u = &self.uncertainty;
         let slow = u.torque_fraction * u.slow_part.sqrt();
         let by_gain = u.valve_gain * u.valve_gain * self.clutch.kiss_pressure();
-        -by_gain / (slow * u.slow_part.sqrt() * self.kiss_deviation_pa())
+        -by_gain / (slow * u.slow_part.sqrt() * self.kiss_std_dev_pa())
     }
 
     /// The same of the states of a shift, of which a part does not last.

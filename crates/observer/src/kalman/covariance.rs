@@ -48,11 +48,11 @@ pub(super) struct Row<T> {
 
 impl<T: Real> Covariance<T> {
     /// Independent states with these standard deviations, without a past.
-    pub(super) fn of(deviations: [T; N]) -> Self {
+    pub(super) fn of(std_devs: [T; N]) -> Self {
         let zero = T::zero();
         let mut upper = [[zero; N]; N];
-        for (i, deviation) in deviations.into_iter().enumerate() {
-            upper[i][i] = deviation * deviation;
+        for (i, std_dev) in std_devs.into_iter().enumerate() {
+            upper[i][i] = std_dev * std_dev;
         }
         Self { upper, earlier: [[zero; N]; SPEEDS], among: [[zero; SPEEDS]; SPEEDS] }
     }
@@ -239,7 +239,7 @@ impl<T: Real> Covariance<T> {
     }
 
     /// Makes a state independent of all others, with this standard deviation.
-    pub(super) fn renew(&mut self, state: usize, deviation: T) {
+    pub(super) fn renew(&mut self, state: usize, std_dev: T) {
         let state = state.min(N - 1);
         for i in 0..N {
             self.set(i, state, T::zero());
@@ -247,7 +247,7 @@ impl<T: Real> Covariance<T> {
         for earlier in &mut self.earlier {
             earlier[state] = T::zero();
         }
-        self.upper[state][state] = deviation * deviation;
+        self.upper[state][state] = std_dev * std_dev;
     }
 
     /// Corrects for a measurement by Joseph's form `P - K S' - S K' + K V K'`, which holds for any gain, and returns how all

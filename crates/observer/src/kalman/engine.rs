@@ -10,7 +10,7 @@ const SILENT_S: f64 = 0.05;
 /// Time without a reading after which its error is one that lasts, and no noise, s: longer than from one reading to the next.
 const LATE_S: f64 = 0.025;
 
-/// Innovation beyond which a reading is refused, in its deviations: fewer than for the other speeds, as nothing else tells
+/// Innovation beyond which a reading is refused, in its standard deviations: fewer than for the other speeds, as nothing else tells
 /// the engine speed, and it is the turbine torque within the same step.
 const GATE: u8 = 3;
 

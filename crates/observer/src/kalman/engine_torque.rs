@@ -78,7 +78,7 @@ impl<T: Real> KalmanFilter<T> {
     ) {
         let Some(running) = &mut state.running else { return };
         let (one, told) = (T::one(), &self.reported);
-        let (acceleration, acceleration_deviation) = engine.acceleration();
+        let (acceleration, acceleration_std_dev) = engine.acceleration();
         let (speed, turbine) = (engine.speed_before(reading.age_s), running.mean[TURBINE]);
         let by_map = self.model.rigid.converter.torques(speed, turbine);
         let ratio = self.model.rigid.converter.torque_ratio.at(turbine / speed.at_least(one));
@@ -89,7 +89,7 @@ impl<T: Real> KalmanFilter<T> {
         // It is old, and compared with an acceleration that is found late.
         let changed = rate_n_m_s * (reading.age_s + T::of(SETTLED_S));
         let own = alike * (square(told.fraction * reading.value.abs() + told.beside_n_m) + square(changed));
-        let noise = square(ratio) * (own + square(told.engine_kg_m2 * acceleration_deviation));
+        let noise = square(ratio) * (own + square(told.engine_kg_m2 * acceleration_std_dev));
         let mut measured = running.covariance.with_state::<FRACTION>(by_map.turbine_n_m);
         measured.variance = (by_map.turbine_n_m * measured.with[FRACTION]).at_least(T::zero()) + noise;
         let innovation = found - by_map.turbine_n_m * (one + running.mean[FRACTION]);

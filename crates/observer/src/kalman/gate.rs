@@ -20,7 +20,7 @@ pub(crate) enum Verdict {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Gate {
     /// Largest innovation of a reading that is believed, in its own standard deviations.
-    deviations: u8,
+    std_devs: u8,
     /// Readings of this channel that may not be refused.
     believed: u8,
     /// Whether a reading that agrees ends them.
@@ -29,8 +29,8 @@ pub(crate) struct Gate {
 
 impl Gate {
     /// An open one.
-    pub(crate) fn new(deviations: u8) -> Self {
-        Self { deviations, believed: 0, ended_by_agreement: false }
+    pub(crate) fn new(std_devs: u8) -> Self {
+        Self { std_devs, believed: 0, ended_by_agreement: false }
     }
 
     /// The same, but after a refused reading one within half of the gate tells that nothing has jumped: the next one beyond
@@ -43,7 +43,7 @@ impl Gate {
     /// Judges an innovation with this variance, by the chi-square distribution of its square over its variance.
     #[inline]
     pub(crate) fn judge<T: Real>(&mut self, innovation: T, variance: T) -> Verdict {
-        let most = T::of(f64::from(self.deviations));
+        let most = T::of(f64::from(self.std_devs));
         let (square, limit) = (innovation * innovation, most * most * variance);
         let (far, near) = (square > limit, square <= T::of(0.25) * limit);
         let believed = self.believed > 0;
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
     use Verdict::{Jumped, Refused, Taken};
 
-    /// What becomes of innovations, in deviations.
+    /// What becomes of innovations, in standard deviations.
     fn verdicts<const K: usize>(mut gate: Gate, innovations: [f64; K]) -> [Verdict; K] {
         innovations.map(|innovation| gate.judge(innovation, 1.0))
     }

@@ -77,7 +77,7 @@ impl<T: Real> OffgoingPressure<T> {
 
 impl<T: Real> KalmanFilter<T> {
     /// Takes in that the offgoing clutch carries no more than its capacity. A capacity is a limit and no reading: only a
-    /// torque that is beyond it by more than its own deviation is corrected, and towards that.
+    /// torque that is beyond it by more than its own standard deviation is corrected, and towards that.
     #[inline]
     pub(super) fn limit_offgoing(&self, running: &mut Running<T>, offgoing: &OffgoingPressure<T>) {
         let u = &self.uncertainty;
@@ -93,13 +93,13 @@ impl<T: Real> KalmanFilter<T> {
         // Lag and delay err in proportion to what the pressure still has to go.
         let by_valve = hypot(u.valve_gain * pressure_pa, u.valve_fraction * (pressure_pa - offgoing.settled_pa));
         let per_pa = clutch.static_friction * clutch.lever() * clutch.piston_area_m2;
-        let deviation = hypot(u.friction * capacity, per_pa * by_valve) + self.offgoing.open_n_m;
-        let most = capacity + deviation;
+        let std_dev = hypot(u.friction * capacity, per_pa * by_valve) + self.offgoing.open_n_m;
+        let most = capacity + std_dev;
         if torque.abs() <= most {
             return;
         }
         let mut measured = running.covariance.with_state::<OFFGOING>(T::one());
-        measured.variance = measured.with[OFFGOING].at_least(T::zero()) + deviation * deviation;
+        measured.variance = measured.with[OFFGOING].at_least(T::zero()) + std_dev * std_dev;
         let beyond = if torque > T::zero() { most - torque } else { -most - torque };
         running.correct(&measured, beyond, &[T::one(); CONSIDERED], SPEEDS);
     }

@@ -7,7 +7,7 @@ use drivetrain::Real;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SpeedReading<T> {
     /// Standard deviation of a reading, rad/s.
-    pub deviation_rad_s: T,
+    pub std_dev_rad_s: T,
     /// Angle by which a reading lags, rad: it spans several teeth, and its middle is half of them ago. Zero for a
     /// reading of the moment.
     pub lag_rad: T,
@@ -67,7 +67,7 @@ impl<T: Real> SpeedReading<T> {
     pub fn cast<U: Real>(&self) -> SpeedReading<U> {
         let to = |x: T| U::of(x.to_f64_exact());
         SpeedReading {
-            deviation_rad_s: to(self.deviation_rad_s),
+            std_dev_rad_s: to(self.std_dev_rad_s),
             lag_rad: to(self.lag_rad),
             pitch_rad: to(self.pitch_rad),
             delay_s: to(self.delay_s),

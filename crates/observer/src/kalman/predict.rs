@@ -13,9 +13,9 @@ use super::{
 };
 use crate::Phase;
 
-/// Innovation beyond which a reading is refused, in its deviations.
+/// Innovation beyond which a reading is refused, in its standard deviations.
 const GATE: u8 = 4;
-/// Deviations that the filter begins with \[chosen\]: of the wheel speed about the output's, rad/s; of shaft, offgoing and load
+/// Standard deviations that the filter begins with \[chosen\]: of the wheel speed about the output's, rad/s; of shaft, offgoing and load
 /// torque, as a fraction of the shaft or holding torque and beside it, N m; of the pressure of a clutch under command, as a fraction of it.
 const WHEEL_START_RAD_S: f64 = 0.3;
 const SHAFT_START: (f64, f64) = (0.3, 100.0);
@@ -27,7 +27,7 @@ const PRESSURE_START: f64 = 0.3;
 const FADING_S: f64 = 0.0487;
 /// After so long without a command the valve may have had any other, s \[chosen\]: rows of a slow log are 0.1 s apart.
 pub(super) const UNHEARD_S: f64 = 0.12;
-/// Deviation of the speeds' model over 10 ms, in deviations of a reading.
+/// Standard deviation of the speeds' model over 10 ms, in standard deviations of a reading.
 const MODEL_FRACTION: f64 = 0.1;
 
 impl<T: Real> KalmanFilter<T> {
@@ -99,25 +99,25 @@ impl<T: Real> KalmanFilter<T> {
     /// The first covariance; the readings of turbine and output speed are old by this, rad/s.
     fn first_covariance(&self, mean: &[T; N], old_rad_s: [T; 2], acting: Phase) -> Covariance<T> {
         let (u, shaft) = (&self.uncertainty, mean[SPRING]);
-        let mut deviations = [T::zero(); N];
+        let mut std_devs = [T::zero(); N];
         for k in [TURBINE, OUTPUT] {
-            deviations[k] = hypot(self.readings[k].deviation_rad_s, old_rad_s[k]);
+            std_devs[k] = hypot(self.readings[k].std_dev_rad_s, old_rad_s[k]);
         }
         // Out of balance the shafts swing, at the start of a log as much as the torque itself.
-        deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
-        deviations[SPRING] = at_start(SHAFT_START, shaft);
-        deviations[PRESSURE] = self.first_pressure_deviation(acting, mean[PRESSURE]);
-        deviations[FRACTION] = u.turbine_share;
-        deviations[OFFGOING] = at_start(OFFGOING_START, mean[OFFGOING]);
-        deviations[LOAD] = at_start(LOAD_START, shaft);
-        deviations[FRICTION] = u.friction;
-        deviations[GAIN] = u.valve_gain;
-        deviations[SCALE] = u.wheel_scale;
+        std_devs[WHEEL] = T::of(WHEEL_START_RAD_S);
+        std_devs[SPRING] = at_start(SHAFT_START, shaft);
+        std_devs[PRESSURE] = self.first_pressure_std_dev(acting, mean[PRESSURE]);
+        std_devs[FRACTION] = u.turbine_share;
+        std_devs[OFFGOING] = at_start(OFFGOING_START, mean[OFFGOING]);
+        std_devs[LOAD] = at_start(LOAD_START, shaft);
+        std_devs[FRICTION] = u.friction;
+        std_devs[GAIN] = u.valve_gain;
+        std_devs[SCALE] = u.wheel_scale;
         // A uniform distribution between its limits, about zero.
         let [least, most] = u.wheel_delay_s;
-        deviations[DELAY] = ((most * most * most - least * least * least) / (T::of(3.0) * (most - least))).sqrt();
-        deviations[SKEW] = u.skew_s / T::of(3.0).sqrt();
-        let mut covariance = Covariance::of(deviations);
+        std_devs[DELAY] = ((most * most * most - least * least * least) / (T::of(3.0) * (most - least))).sqrt();
+        std_devs[SKEW] = u.skew_s / T::of(3.0).sqrt();
+        let mut covariance = Covariance::of(std_devs);
         // An error of the turbine torque is one of the shaft torque in balance with it.
         let shared = u.turbine_share * u.turbine_share * shaft;
         covariance.set(SPRING, FRACTION, shared);
@@ -133,7 +133,7 @@ impl<T: Real> KalmanFilter<T> {
     }
 
     /// An open cylinder is empty; of one under pressure the command before the log is not known.
-    fn first_pressure_deviation(&self, acting: Phase, pressure_pa: T) -> T {
+    fn first_pressure_std_dev(&self, acting: Phase, pressure_pa: T) -> T {
         let known = T::of(1e3);
         if acting == Phase::BeforeShift { known } else { known + T::of(PRESSURE_START) * pressure_pa }
     }
@@ -245,7 +245,7 @@ impl<T: Real> KalmanFilter<T> {
         let twist_rate = x[OUTPUT] * step.per_ratio - x[WHEEL];
         let p = &mut running.covariance;
         for k in [TURBINE, OUTPUT] {
-            p.add(k, per_10_ms * square(T::of(MODEL_FRACTION) * self.readings[k].deviation_rad_s));
+            p.add(k, per_10_ms * square(T::of(MODEL_FRACTION) * self.readings[k].std_dev_rad_s));
         }
         // Within the backlash the shafts twist without torque.
         let stiffness_fraction = if x[SPRING].abs() < u.backlash_n_m { one } else { u.stiffness_fraction };
@@ -257,8 +257,8 @@ impl<T: Real> KalmanFilter<T> {
         }
         if step.last < one {
             p.add(FRACTION, square(u.turbine_share) * (one - square(step.stay)));
-            for (state, deviation) in [(FRICTION, u.friction), (GAIN, u.valve_gain)] {
-                p.add(state, square(deviation) * (one - square(step.last)));
+            for (state, std_dev) in [(FRICTION, u.friction), (GAIN, u.valve_gain)] {
+                p.add(state, square(std_dev) * (one - square(step.last)));
             }
         }
         // How fast it drains is not known: the rate may be wrong by its own size for as long as it lasts.
@@ -285,7 +285,7 @@ impl<T: Real> KalmanFilter<T> {
     }
 }
 
-/// A deviation that is a fraction of a torque and something beside it.
+/// A standard deviation that is a fraction of a torque and something beside it.
 #[inline]
 pub(super) fn at_start<T: Real>((fraction, beside): (f64, f64), torque_n_m: T) -> T {
     T::of(fraction) * torque_n_m.abs() + T::of(beside)
@@ -310,15 +310,15 @@ pub(super) fn above<T: Real>(x: T, variance: T) -> (T, T) {
     if !near {
         return if x > T::zero() { (x, T::one()) } else { (T::zero(), T::zero()) };
     }
-    let deviation = variance.sqrt();
-    let z = x / deviation.at_least(T::min_positive_value());
+    let std_dev = variance.sqrt();
+    let z = x / std_dev.at_least(T::min_positive_value());
     let density = (T::of(-0.5) * z * z).exp() * T::of(0.398_942_280_401_432_7);
     // Abramowitz and Stegun, Handbook of Mathematical Functions (1964), 26.2.17: error below 7.5e-8.
     let t = (T::one() + T::of(0.231_641_9) * z.abs()).recip();
     let series = [1.330_274_429, -1.821_255_978, 1.781_477_937, -0.356_563_782, 0.319_381_530];
     let tail = density * series.into_iter().fold(T::zero(), |sum, c| (sum + T::of(c)) * t);
     let below = if z > T::zero() { T::one() - tail } else { tail };
-    (deviation * density + x * below, below)
+    (std_dev * density + x * below, below)
 }
 
 #[cfg(test)]
@@ -327,10 +327,10 @@ mod tests {
 
     #[test]
     fn the_mean_above_zero_is_that_of_the_distribution() {
-        // At zero: deviation/sqrt(2 pi), and half of the samples.
+        // At zero: standard deviation/sqrt(2 pi), and half of the samples.
         let (mean, fraction) = above(0.0_f64, 4.0);
         assert!((mean - 2.0 * 0.398_942_28).abs() < 1e-6 && (fraction - 0.5).abs() < 1e-6);
-        // One deviation above: 1.0833, 84.13 %.
+        // One standard deviation above: 1.0833, 84.13 %.
         let (mean, fraction) = above(1.0_f64, 1.0);
         assert!((mean - 1.083_315_47).abs() < 1e-6 && (fraction - 0.841_344_75).abs() < 1e-6);
         assert_eq!(above(5.0_f64, 0.0), (5.0, 1.0));

@@ -52,7 +52,7 @@ impl<T: Real> KalmanFilter<T> {
         // Readings that come more often than teeth tell no more than the teeth do.
         let since_s = core::mem::replace(&mut running.silent_s[K], zero);
         let repeated = if since_s > zero { (sensor.pitch_rad / (size_rad_s * since_s)).at_least(one) } else { one };
-        let noise = repeated * (sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance);
+        let noise = repeated * (sensor.std_dev_rad_s * sensor.std_dev_rad_s + line.variance);
         let innovation = reading.value - scale * line.value;
         let learnt = by_learnt::<T, K>(running.mean[SKEW], line.value, scale * line.per_age);
         let row = Row { now: scale * line.fractions[0], earlier: scale * line.fractions[1], learnt };
@@ -105,9 +105,9 @@ impl<T: Real> KalmanFilter<T> {
     pub(super) fn tie(&self, running: &mut Running<T>, dt_s: T) {
         let ratio = self.model.shift.ratio_offgoing();
         let mut measured = running.covariance.with_two::<TURBINE, OUTPUT>([T::one(), -ratio]);
-        let deviation = self.readings[TURBINE].deviation_rad_s;
+        let std_dev = self.readings[TURBINE].std_dev_rad_s;
         let own = measured.with[TURBINE] - ratio * measured.with[OUTPUT];
-        measured.variance = own.at_least(T::zero()) + deviation * deviation;
+        measured.variance = own.at_least(T::zero()) + std_dev * std_dev;
         let innovation = ratio * running.mean[OUTPUT] - running.mean[TURBINE];
         self.apply(running, &measured, innovation, dt_s, SPEEDS);
     }

@@ -273,9 +273,9 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         }
     }
     if car.gearbox.has_ratios_alone() {
-        let [mean, deviation] = shift.mean_at_turbine_n_m().unwrap_or([f64::NAN; 2]);
+        let [mean, std_dev] = shift.mean_at_turbine_n_m().unwrap_or([f64::NAN; 2]);
         cells.push(number("at_turbine_mean_n_m", mean));
-        cells.push(number("at_turbine_mean_deviation_n_m", deviation));
+        cells.push(number("at_turbine_mean_deviation_n_m", std_dev));
     }
     cells.push(number("hidden_share", shift.hidden().unwrap_or(f64::NAN)));
     let inside = shift.inside().filter(|_| shift.has_truth());

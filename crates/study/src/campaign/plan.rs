@@ -93,10 +93,10 @@ pub(crate) fn value_at(values: &Values, place: f64) -> f64 {
         }
         Values::Uniform(low, high, _) => low + place * (high - low),
         Values::LogUniform(low, high, _) => low * Real::powf(high / low, place),
-        Values::Normal(mean, deviation, _) => {
-            // Cut off at three deviations.
+        Values::Normal(mean, std_dev, _) => {
+            // Cut off at three standard deviations.
             let [low, high] = [-3.0, 3.0].map(normal_cdf);
-            mean + deviation * normal_quantile(low + place * (high - low)).clamp(-3.0, 3.0)
+            mean + std_dev * normal_quantile(low + place * (high - low)).clamp(-3.0, 3.0)
         }
         Values::Sometimes(Sometimes { chance, otherwise, ref values }) => {
             let rest = 1.0 - chance;
@@ -131,7 +131,7 @@ pub(crate) fn place_of(values: &Values, value: f64) -> f64 {
         }
         Values::Uniform(low, high, _) => (value - low) / (high - low),
         Values::LogUniform(low, high, _) => Real::ln(value / low) / Real::ln(high / low),
-        Values::Normal(mean, deviation, _) => normal_cdf((value - mean) / deviation),
+        Values::Normal(mean, std_dev, _) => normal_cdf((value - mean) / std_dev),
         Values::Sometimes(sometimes) if value.total_cmp(&sometimes.otherwise).is_eq() => 0.5 * (1.0 - sometimes.chance),
         Values::Sometimes(sometimes) => sometimes.place_within(place_of(&sometimes.values, value)),
     }
@@ -212,12 +212,12 @@ mod tests {
     }
 
     #[test]
-    fn a_normal_factor_has_its_mean_and_deviation() {
+    fn a_normal_factor_has_its_mean_and_standard_deviation() {
         let normal = Values::Normal(10.0, 2.0, 3);
         let draws: Vec<f64> = (0..1000).map(|i| value_at(&normal, (f64::from(i) + 0.5) / 1000.0)).collect();
         let mean = draws.iter().sum::<f64>() / 1000.0;
-        let deviation = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 1000.0).sqrt();
-        assert!((mean - 10.0).abs() < 1e-6 && (deviation - 1.973).abs() < 0.01, "{mean} {deviation}");
+        let std_dev = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 1000.0).sqrt();
+        assert!((mean - 10.0).abs() < 1e-6 && (std_dev - 1.973).abs() < 0.01, "{mean} {std_dev}");
         assert!(draws.iter().all(|x| (4.0..=16.0).contains(x)));
     }
 }

@@ -13,7 +13,7 @@ use super::nominal::{NominalShift, nominal_shifts};
 use super::{EvaluateError, ShiftScoreRow, TruePhase};
 use crate::StudyError;
 
-/// Fraction of the valve model's deviation above which the speeds are of no use.
+/// Fraction of the valve model's standard deviation above which the speeds are of no use.
 const HIDDEN: f64 = 0.9;
 /// Rows that a phase needs.
 const LEAST_ROWS: usize = 3;
@@ -129,22 +129,22 @@ pub struct PhaseOfShift {
 impl PhaseOfShift {
     /// Standard deviation of the torque by the filter and by the valve model alone, N m: each error anywhere within its bound, and
     /// independent of the others.
-    pub fn deviation_n_m(&self) -> [f64; 2] {
-        self.deviation(|effect| effect.torque_n_m)
+    pub fn std_dev_n_m(&self) -> [f64; 2] {
+        self.std_dev(|effect| effect.torque_n_m)
     }
 
     /// The same of the pressure, Pa.
-    pub fn deviation_pa(&self) -> [f64; 2] {
-        self.deviation(|effect| effect.pressure_pa)
+    pub fn std_dev_pa(&self) -> [f64; 2] {
+        self.std_dev(|effect| effect.pressure_pa)
     }
 
-    fn deviation(&self, of: fn(&EffectInShift) -> [f64; 2]) -> [f64; 2] {
+    fn std_dev(&self, of: fn(&EffectInShift) -> [f64; 2]) -> [f64; 2] {
         [0, 1].map(|at| (self.effects.iter().map(|effect| Real::powi(of(effect)[at], 2)).sum::<f64>() / 3.0).sqrt())
     }
 
-    /// Deviation of the torque by the filter over that by the valve model alone.
+    /// Standard deviation of the torque by the filter over that by the valve model alone.
     pub fn ratio(&self) -> f64 {
-        let [filter, alone] = self.deviation_n_m();
+        let [filter, alone] = self.std_dev_n_m();
         filter / alone
     }
 

@@ -563,7 +563,7 @@ fn input_without_sense_gives_numbers_and_a_word() {
             for clutch in estimate.clutches.iter().flatten() {
                 let limits = &filter.limits;
                 assert!((0.0..=limits.pressure_max_pa).contains(&clutch.pressure_pa), "{clutch:?}");
-                assert!(clutch.torque_n_m.is_finite() && clutch.deviation_n_m >= 0.0, "{clutch:?}");
+                assert!(clutch.torque_n_m.is_finite() && clutch.std_dev_n_m >= 0.0, "{clutch:?}");
             }
             assert!(estimate.shaft_n_m.is_none_or(f64::is_finite), "{estimate:?}");
             assert!(estimate.turbine_n_m.is_none_or(f64::is_finite), "{estimate:?}");

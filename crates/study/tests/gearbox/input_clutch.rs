@@ -21,7 +21,7 @@ struct Errors {
     reported: f64,
 }
 
-/// Squared errors of the torque, of the same over the stated deviation, and the torque's own squares.
+/// Squared errors of the torque, of the same over the stated standard deviation, and the torque's own squares.
 #[derive(Default)]
 struct Score {
     rows: f64,
@@ -36,11 +36,11 @@ impl Score {
         let error = clutch.torque_n_m - truth;
         self.rows += 1.0;
         self.error += error * error;
-        self.standardised += (error / clutch.deviation_n_m).powi(2);
+        self.standardised += (error / clutch.std_dev_n_m).powi(2);
         self.size += truth * truth;
     }
 
-    /// RMS error, N m, over the deviations, and RMS torque, N m.
+    /// RMS error, N m, over the standard deviations, and RMS torque, N m.
     fn rms(&self) -> [f64; 3] {
         [self.error, self.standardised, self.size].map(|sum| (sum / self.rows).sqrt())
     }
@@ -101,7 +101,7 @@ fn the_lock_up_clutch_has_its_torque_while_it_closes_slips_and_holds() {
                 found.rows
             );
             assert!(found.rows > 500.0, "{how}, {name}: {} rows", found.rows);
-            // An error at its bound, the edge of a uniform distribution, is 1.73 of its deviations.
+            // An error at its bound, the edge of a uniform distribution, is 1.73 of its standard deviations.
             assert!(standardised < 1.74 && error < 0.2 * size, "{how}, {name}: {error} {standardised} {size}");
         }
     }

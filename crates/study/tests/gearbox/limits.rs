@@ -54,7 +54,7 @@ const ALL: [(Without, &str); 9] = [
 
 /// An error that is almost none, as a fraction.
 const LITTLE: f64 = 0.005;
-/// Deviation of a speed that is read exactly, rad/s: that of turbine, output and wheel.
+/// Standard deviation of a speed that is read exactly, rad/s: that of turbine, output and wheel.
 const EXACT_RAD_S: [f64; 3] = [0.01, 0.01, 0.002];
 
 impl Without {
@@ -148,8 +148,8 @@ impl Without {
             (filter.turbine.engine_share, filter.uncertainty.turbine_share) = (LITTLE, 0.5 * LITTLE);
         }
         if self == Self::SpeedErrors {
-            for (reading, deviation_rad_s) in filter.readings.iter_mut().zip(EXACT_RAD_S) {
-                (reading.deviation_rad_s, reading.lag_rad, reading.pitch_rad) = (deviation_rad_s, 0.0, 0.0);
+            for (reading, std_dev_rad_s) in filter.readings.iter_mut().zip(EXACT_RAD_S) {
+                (reading.std_dev_rad_s, reading.lag_rad, reading.pitch_rad) = (std_dev_rad_s, 0.0, 0.0);
             }
         }
         if self == Self::AllButDrawn {

@@ -23,7 +23,7 @@ fn three_times_the_stated_noise_of_turbine_and_output_costs_little() {
     for known in &cars()[..3] {
         let (stated, noisy) = (ratios(known, [1.0, 1.0]), ratios(known, [3.0, 1.0]));
         println!("{}: {stated:.3?} as stated, {noisy:.3?} with three times the noise", known.gearbox.gears.len());
-        // With the stated deviations alone it is worse than the open loop, by a factor of up to 2.7.
+        // With the stated standard deviations alone it is worse than the open loop, by a factor of up to 2.7.
         for (noisy, stated) in noisy.into_iter().zip(stated) {
             assert!(noisy < 1.0 && noisy < 1.25 * stated, "{noisy} {stated}");
         }

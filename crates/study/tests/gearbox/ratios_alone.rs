@@ -52,7 +52,7 @@ fn true_sum(car: &Car, sample: &CarSample) -> Option<f64> {
     )
 }
 
-/// RMS error in N m, RMS over the stated deviation, RMS torque, and rows, of the inertia phases.
+/// RMS error in N m, RMS over the stated standard deviation, RMS torque, and rows, of the inertia phases.
 fn score(truth: &CarFile, with_masses: bool) -> [f64; 4] {
     let known = by_ratios(truth, with_masses);
     let model = CarModel::new(truth.car.clone()).unwrap();
@@ -72,7 +72,7 @@ fn score(truth: &CarFile, with_masses: bool) -> [f64; 4] {
         assert!(estimate.health == Health::Good || estimate.health == Health::ReadingRefused, "{:?}", estimate.health);
         let found = estimate.at_turbine.unwrap();
         error += (found.torque_n_m - truth).powi(2);
-        standardised += ((found.torque_n_m - truth) / found.deviation_n_m).powi(2);
+        standardised += ((found.torque_n_m - truth) / found.std_dev_n_m).powi(2);
         size += truth * truth;
         rows += 1.0;
     }
@@ -89,7 +89,7 @@ fn the_clutches_have_their_torque_at_the_turbine() {
                 "{}, {how}: {error:.1} of {size:.0} N m, {standardised:.2} deviations, {rows} rows",
                 car.gearbox.name
             );
-            // An error at its bound, the edge of a uniform distribution, is 1.73 of its deviations.
+            // An error at its bound, the edge of a uniform distribution, is 1.73 of its standard deviations.
             assert!(standardised < 1.74 && rows > 100.0, "{}, {how}: {standardised}, {rows} rows", car.gearbox.name);
             if with_masses {
                 assert!(error < 0.15 * size, "{}: {error} of {size}", car.gearbox.name);

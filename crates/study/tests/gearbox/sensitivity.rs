@@ -42,7 +42,7 @@ fn the_valve_model_alone_has_its_own_errors_and_no_other() {
             assert!(alone(ShiftErrorKind::Friction) <= 0.15 * 2.0 * phase.torque_n_m.max(10.0), "{phase:?}");
             let pressure = effect(phase, ShiftErrorKind::Friction).unwrap().pressure_pa;
             assert_eq!(pressure[1], 0.0, "friction is no error of the valve's pressure");
-            let [filter, alone] = phase.deviation_n_m();
+            let [filter, alone] = phase.std_dev_n_m();
             assert!(filter > 0.0 && alone > 0.0 && (phase.ratio() - filter / alone).abs() < 1e-12);
             assert!(phase.largest().unwrap().torque_n_m[0] <= 3.0_f64.sqrt() * filter);
         }

@@ -207,7 +207,7 @@ impl Known {
     }
 }
 
-/// What a filter has learnt of the scale in its state, as a fraction, and the deviation.
+/// What a filter has learnt of the scale in its state, as a fraction, and the standard deviation.
 fn learnt(filter: &GearboxFilter<'_, f64>, state: &GearboxState<f64>) -> [f64; 2] {
     filter.learnt_wheel_scale(state.learnt())
 }
@@ -225,12 +225,9 @@ fn the_scale_of_the_wheel_speed_is_learnt_and_kept() {
         for input in &inputs {
             filter.step(&mut state, input);
         }
-        let [found, deviation] = learnt(&filter, &state);
-        println!("{scale}: {:.3} % +- {:.3} %", 100.0 * found, 100.0 * deviation);
-        assert!(
-            (found - (scale - 1.0)).abs() < LITTLE.min(4.0 * deviation) && deviation < LITTLE,
-            "{found} {deviation}"
-        );
+        let [found, std_dev] = learnt(&filter, &state);
+        println!("{scale}: {:.3} % +- {:.3} %", 100.0 * found, 100.0 * std_dev);
+        assert!((found - (scale - 1.0)).abs() < LITTLE.min(4.0 * std_dev) && std_dev < LITTLE, "{found} {std_dev}");
         // Another drive begins with half of it: it may be another car. The same drive goes on with all.
         let mut later = filter.start_with(state.learnt());
         let [half, doubted] = learnt(&filter, &later);
@@ -240,7 +237,7 @@ fn the_scale_of_the_wheel_speed_is_learnt_and_kept() {
         }
         assert!((learnt(&filter, &later)[0] - (scale - 1.0)).abs() < LITTLE);
         let went_on = filter.go_on_with(state.learnt());
-        assert_eq!(learnt(&filter, &went_on), [found, deviation]);
+        assert_eq!(learnt(&filter, &went_on), [found, std_dev]);
     }
 }
 
@@ -282,8 +279,8 @@ fn what_is_no_scale_is_not_learnt() {
             furthest = furthest.max((learnt(&filter, &state)[0] - 0.01).abs());
             assert!(learnt(&filter, &state)[0].abs() <= 0.02 + 1e-9, "{name}");
         }
-        let [found, deviation] = learnt(&filter, &state);
-        println!("{name}: {:.3} % +- {:.3} %, at most {:.2} % off", 100.0 * found, 100.0 * deviation, 100.0 * furthest);
+        let [found, std_dev] = learnt(&filter, &state);
+        println!("{name}: {:.3} % +- {:.3} %, at most {:.2} % off", 100.0 * found, 100.0 * std_dev, 100.0 * furthest);
         assert!((found - 0.01).abs() < LITTLE, "{name}: {found}");
     }
 }

@@ -136,7 +136,7 @@ fn an_element_whose_plates_do_not_touch_carries_nothing() {
     assert!(states.iter().all(|(_, state)| state.newest.is_some_and(|newest| newest.rests_s.is_some())));
 }
 
-/// A valve model with what is learnt is that of a valve with this lag and delay, which are so far off by the change per deviation.
+/// A valve model with what is learnt is that of a valve with this lag and delay, which are so far off by the change per standard deviation.
 #[test]
 fn a_learnt_lag_and_delay_are_those_of_the_valve() {
     let known = element();

@@ -338,23 +338,23 @@ fn what_depends_on_the_oil_is_forgotten_with_its_temperature() {
 /// Two errors of which only the sum is seen: each gets its part of it, and the same sum again is no news.
 #[test]
 fn a_reported_torque_moves_the_capacity_by_its_fraction_of_the_variance_and_once() {
-    let (deviations, noise) = ([0.05, 0.035], 1e-8);
+    let (std_devs, noise) = ([0.05, 0.035], 1e-8);
     let part = 0.05_f64.powi(2) / (0.05_f64.powi(2) + 0.035_f64.powi(2));
     let mut learnt = Learnt::nothing(&CORRELATIONS);
     let capacity = |learnt: &Learnt<f64>| 0.05 * learnt.mean[TURBINE_AT];
-    learnt.take_capacity(0.04, deviations, noise);
+    learnt.take_capacity(0.04, std_devs, noise);
     let (once, left) = (capacity(&learnt), learnt.covariance[TURBINE_AT][TURBINE_AT]);
     assert!((once - 0.04 * part).abs() < 1e-5 && (left - (1.0 - part)).abs() < 1e-3, "{once} {left}");
-    (0..100).for_each(|_| learnt.take_capacity(0.04, deviations, noise));
+    (0..100).for_each(|_| learnt.take_capacity(0.04, std_devs, noise));
     assert!((capacity(&learnt) - once).abs() < 1e-3, "{}", capacity(&learnt));
     assert!(learnt.covariance[TURBINE_AT][TURBINE_AT] > 0.9 * left && learnt.checked().is_some());
     // Of neither of these cars, and no numbers.
     let known = learnt;
     for fraction in [0.2, -0.3, f64::NAN, f64::INFINITY] {
-        learnt.take_capacity(fraction, deviations, noise);
+        learnt.take_capacity(fraction, std_devs, noise);
     }
-    for (deviations, noise) in [([f64::NAN, 0.1], 0.1), ([0.05, 0.035], f64::NAN), ([0.0, 0.0], 0.0)] {
-        learnt.take_capacity(0.01, deviations, noise);
+    for (std_devs, noise) in [([f64::NAN, 0.1], 0.1), ([0.05, 0.035], f64::NAN), ([0.0, 0.0], 0.0)] {
+        learnt.take_capacity(0.01, std_devs, noise);
     }
     assert_eq!(learnt, known);
 }

@@ -215,7 +215,7 @@ fn torques(knows: Knows) -> Vec<Column> {
         ));
         columns.push(number(
             "clutches_at_turbine_deviation_n_m",
-            Value::Of(|row| of(row.estimate.at_turbine.map(|sum| sum.deviation_n_m))),
+            Value::Of(|row| of(row.estimate.at_turbine.map(|sum| sum.std_dev_n_m))),
         ));
     }
     columns.push(number(trace::signal::SHAFT_ESTIMATE, Value::Of(|row| of(row.estimate.shaft_n_m))));
@@ -226,7 +226,7 @@ fn torques(knows: Knows) -> Vec<Column> {
     ));
     columns.push(number(
         format!("{clutch}_torque_deviation_n_m"),
-        Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.deviation_n_m))),
+        Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.std_dev_n_m))),
     ));
     columns
 }

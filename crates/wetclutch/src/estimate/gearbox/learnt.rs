@@ -6,7 +6,7 @@ use evaluate::logged::LoggedDrive;
 use observer::ShiftTables;
 use observer::gearbox::{Learnt, LearntElement};
 
-/// Part of the unlearnt deviation from which on nothing is said of a quantity \[chosen\]: the log has shown next to nothing of it.
+/// Part of the unlearnt standard deviation from which on nothing is said of a quantity \[chosen\]: the log has shown next to nothing of it.
 const SHOWN: f64 = 0.9;
 
 /// What was learnt of a car in a log, beside its vehicle file.
@@ -46,8 +46,8 @@ fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> V
         .collect();
     let list = |value: &dyn Fn(&LearntElement<f64>) -> [f64; 2], per_unit: f64| {
         let of = |(name, element): &(&str, _)| {
-            let [error, deviation] = value(element).map(|value| per_unit * value);
-            format!("{name} {error:+.1} +-{deviation:.1}")
+            let [error, std_dev] = value(element).map(|value| per_unit * value);
+            format!("{name} {error:+.1} +-{std_dev:.1}")
         };
         elements.iter().map(of).collect::<Vec<_>>().join(", ")
     };
@@ -82,12 +82,12 @@ fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> V
             reported[0], reported[1]
         ));
     }
-    let [scale, deviation] = filter.learnt_wheel_scale(learnt);
-    if deviation < SHOWN * filter.uncertainty.wheel_scale {
+    let [scale, std_dev] = filter.learnt_wheel_scale(learnt);
+    if std_dev < SHOWN * filter.uncertainty.wheel_scale {
         said.push(format!(
             "learnt scale of the wheel speed: it reads {:+.2} +-{:.2} % of the true one",
             100.0 * scale,
-            100.0 * deviation
+            100.0 * std_dev
         ));
     }
     said
