@@ -1,7 +1,7 @@
 //! What the closed elements of a car hold at line pressure, beside the most that its engine asks of them.
 //!
-//! The most that is asked of a gear \[chosen\] is the larger of two turbine torques: the greatest engine torque, as it comes with
-//! the lock-up clutch closed or without a converter; and the greatest one that the converter makes of full throttle at steady speeds,
+//! The most that is asked of a gear \[chosen\] is the larger of two turbine torques: the maximum engine torque, as it comes with
+//! the lock-up clutch closed or without a converter; and the maximum that the converter makes of full throttle at steady speeds,
 //! with the turbine at any speed that it has in this gear. In the lowest forward gear and in reverse a car starts: there the turbine may be at
 //! rest, where a converter multiplies most. In the other gears it turns at [`SLOWEST_TURBINE_RAD_S`] or faster, since a gearbox controller
 //! shifts down before.
@@ -16,11 +16,11 @@ use crate::{Car, ShiftClutch};
 /// Slowest turbine in gears in which a car does not start, rad/s \[chosen\]: a little above idle speed, and below the downshifts of
 /// `drives/city.toml`.
 const SLOWEST_TURBINE_RAD_S: f64 = 100.0;
-/// Turbine speeds at which the greatest torque is sought, from the slowest to the end of the engine map.
+/// Turbine speeds at which the maximum torque is sought, from the slowest to the end of the engine map.
 const TURBINE_SPEEDS: u32 = 40;
 impl Car {
-    /// The greatest turbine torque in a gear, N m.
-    pub fn greatest_turbine_torque(&self, gear: usize) -> f64 {
+    /// The maximum turbine torque in a gear, N m.
+    pub fn max_turbine_torque(&self, gear: usize) -> f64 {
         let direct_n_m = self.engine.largest_torque();
         let Some(converter) = &self.converter else { return direct_n_m };
         let is_reverse = self.gearbox.gears.get(gear).is_some_and(|gear| gear.ratio < 0.0);
@@ -37,7 +37,7 @@ impl Car {
     /// What each element with plates holds at line pressure, in the gear that asks most of it.
     pub fn capacities(&self) -> Vec<Capacity> {
         let gears = &self.gearbox.gears;
-        let turbine_n_m: Vec<f64> = (0..gears.len()).map(|gear| self.greatest_turbine_torque(gear)).collect();
+        let turbine_n_m: Vec<f64> = (0..gears.len()).map(|gear| self.max_turbine_torque(gear)).collect();
         let of = |(element, clutch): (usize, &Option<ShiftClutch>)| {
             let holds_n_m = clutch.as_ref()?.clutch.static_capacity(self.line_pressure_pa);
             Capacity::where_most_is_asked(element, holds_n_m, gears, |gear| turbine_n_m.get(gear).copied())

@@ -33,7 +33,7 @@ pub struct ShiftSchedule {
     pub up_rad_s: Table1<f64>,
     /// Input speed below which the gear below is taken, over throttle, rad/s.
     pub down_rad_s: Table1<f64>,
-    /// Least time in a gear, s.
+    /// Minimum time in a gear, s.
     pub time_in_gear_s: f64,
 }
 

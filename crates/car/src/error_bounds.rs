@@ -37,7 +37,7 @@ pub struct ErrorBounds {
     pub slip_quantum_rad_s: f64,
     /// Error of the change of the wheel speed from one sample to the next, rad/s.
     pub wheel_quantum_rad_s: f64,
-    /// Greatest age of a reading, s.
+    /// Maximum age of a reading, s.
     pub sampling_delay_s: f64,
     /// Rounding of one operation in single precision, as a fraction.
     pub float32_rounding: f64,
@@ -45,21 +45,21 @@ pub struct ErrorBounds {
     pub shift_pressure_pa: f64,
     /// Rate of the pressure in a shift, at which errors of lag and delay are weighed, Pa/s.
     pub shift_ramp_pa_s: f64,
-    /// Least and greatest factor on the lag of the oncoming clutch's valve.
+    /// Minimum and maximum factor on the lag of the oncoming clutch's valve.
     pub valve_lag_factor: [f64; 2],
-    /// Least and greatest factor on its gain.
+    /// Minimum and maximum factor on its gain.
     pub valve_gain_factor: [f64; 2],
-    /// Its least and greatest delay, s.
+    /// Its minimum and maximum delay, s.
     pub valve_delay_s: [f64; 2],
-    /// Greatest half-width of its hysteresis, Pa.
+    /// Maximum half-width of its hysteresis, Pa.
     pub valve_hysteresis_pa: f64,
-    /// Greatest time between a command and the sample that first shows it, s.
+    /// Maximum time between a command and the sample that first shows it, s.
     pub command_age_s: f64,
-    /// Least and greatest line pressure, Pa.
+    /// Minimum and maximum line pressure, Pa.
     pub line_pressure_pa: [f64; 2],
     /// Limits of the oncoming clutch's piston stroke, if it is part of the budget.
     pub fill: Option<FillBudget<f64>>,
-    /// Least and greatest factor on the friction of the oncoming clutch.
+    /// Minimum and maximum factor on the friction of the oncoming clutch.
     pub friction_factor: [f64; 2],
     /// Error of a reading of the valve's command, A or %.
     pub command: f64,
@@ -75,7 +75,7 @@ pub struct ErrorBounds {
     pub channel_skew_s: f64,
     /// Error of the torque that the engine controller reports, as a fraction.
     pub engine_torque_share: f64,
-    /// Least and greatest factor on the stiffness of the drive shafts.
+    /// Minimum and maximum factor on the stiffness of the drive shafts.
     pub shaft_stiffness_factor: [f64; 2],
     /// Twist over which the driveline carries no torque, rad at the wheels.
     pub backlash_rad: f64,
@@ -126,15 +126,15 @@ pub struct CarErrorBounds {
 /// Bounds on the errors of one friction element and its valve; none where the file says nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ElementErrorBounds {
-    /// Least and greatest factor on the friction.
+    /// Minimum and maximum factor on the friction.
     pub friction_factor: Option<[f64; 2]>,
-    /// Least and greatest factor on the gain of the valve.
+    /// Minimum and maximum factor on the gain of the valve.
     pub valve_gain_factor: Option<[f64; 2]>,
-    /// Least and greatest factor on its lag.
+    /// Minimum and maximum factor on its lag.
     pub valve_lag_factor: Option<[f64; 2]>,
-    /// Its least and greatest delay, s.
+    /// Its minimum and maximum delay, s.
     pub valve_delay_s: Option<[f64; 2]>,
-    /// Greatest half-width of its hysteresis, Pa.
+    /// Maximum half-width of its hysteresis, Pa.
     pub valve_hysteresis_pa: Option<f64>,
     /// Maximum error of a reading of its command, A or %.
     pub command: Option<f64>,

@@ -6,17 +6,17 @@ use drivetrain::{Passage, Real};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FillBudget<T> {
-    /// Least and greatest volume of the stroke `V_k`, m^3.
+    /// Minimum and maximum volume of the stroke `V_k`, m^3.
     pub volume_m3: [T; 2],
-    /// Least and greatest pressure `p0` at which the piston leaves its stop, Pa.
+    /// Minimum and maximum pressure `p0` at which the piston leaves its stop, Pa.
     pub preload_pressure_pa: [T; 2],
-    /// Least and greatest pressure `p1` at which the plates touch, Pa.
+    /// Minimum and maximum pressure `p1` at which the plates touch, Pa.
     pub kiss_pressure_pa: [T; 2],
-    /// The passage into the cylinder, of the least and the greatest resistance.
+    /// The passage into the cylinder, of the minimum and the maximum resistance.
     pub supply: [Passage<T>; 2],
-    /// The passage out of it, of the least and the greatest resistance.
+    /// The passage out of it, of the minimum and the maximum resistance.
     pub exhaust: [Passage<T>; 2],
-    /// Least and greatest kinematic viscosity of the oil, m^2/s.
+    /// Minimum and maximum kinematic viscosity of the oil, m^2/s.
     pub viscosity_m2_s: [T; 2],
     /// Flow that the supply gives at least if the passage takes it, m^3/s.
     pub flow_max_m3_s: T,
@@ -51,27 +51,27 @@ impl<T: Real> FillBudget<T> {
         (leak * (laminar + passage.orifice_pa_s2_m6 * leak * line_pa)).at_most(T::one())
     }
 
-    /// Greatest flow in at this pressure drop, m^3/s.
+    /// Maximum flow in at this pressure drop, m^3/s.
     #[inline]
-    pub fn most_in(&self, drop_pa: T) -> T {
+    pub fn max_in(&self, drop_pa: T) -> T {
         self.supply[0].flow(drop_pa, self.viscosity_m2_s[0])
     }
 
-    /// Least flow in at this pressure drop, m^3/s.
+    /// Minimum flow in at this pressure drop, m^3/s.
     #[inline]
-    pub fn least_in(&self, drop_pa: T) -> T {
+    pub fn min_in(&self, drop_pa: T) -> T {
         self.supply[1].flow(drop_pa, self.viscosity_m2_s[1]).at_most(self.flow_max_m3_s)
     }
 
-    /// Greatest flow out at this pressure drop, m^3/s.
+    /// Maximum flow out at this pressure drop, m^3/s.
     #[inline]
-    pub fn most_out(&self, drop_pa: T) -> T {
+    pub fn max_out(&self, drop_pa: T) -> T {
         self.exhaust[0].flow(drop_pa, self.viscosity_m2_s[0])
     }
 
-    /// Least flow out at this pressure drop, m^3/s.
+    /// Minimum flow out at this pressure drop, m^3/s.
     #[inline]
-    pub fn least_out(&self, drop_pa: T) -> T {
+    pub fn min_out(&self, drop_pa: T) -> T {
         self.exhaust[1].flow(drop_pa, self.viscosity_m2_s[1])
     }
 }

@@ -11,7 +11,7 @@ use crate::{
     ObserverSettings, PhaseSlips, Requirements, ShiftClutch, Uncertainty, ValveUncertainty, Vehicle,
 };
 
-/// The car whose values are scaled, that of `vehicles/two_speed_at.toml`: greatest engine torque, N m.
+/// The car whose values are scaled, that of `vehicles/two_speed_at.toml`: maximum engine torque, N m.
 pub const ENGINE_TORQUE_N_M: f64 = 190.0;
 /// Its ratio of the gearbox before the shift, and of the differential.
 pub const RATIO_BEFORE: f64 = 2.5;
@@ -21,7 +21,7 @@ pub const FINAL_RATIO: f64 = 3.0;
 pub const SHAFT_TORQUE_N_M: f64 = 800.0;
 /// Torque at its gearbox output that a rigid model leaves out, N m.
 pub const OUTPUT_ERROR_N_M: f64 = 175.0;
-/// How fast the torque of its offgoing clutch changes, N m per root second: 0.7 of the 285 N m that it holds at the greatest engine
+/// How fast the torque of its offgoing clutch changes, N m per root second: 0.7 of the 285 N m that it holds at the maximum engine
 /// torque. From half of them it falls to zero in a torque phase of 0.25 s.
 pub const OFFGOING_N_M: f64 = 200.0;
 /// What is left of that torque when the clutch is open, N m.
@@ -37,7 +37,8 @@ pub const PISTON_AREAS_M2: [f64; 2] = [0.012, 0.01];
 /// What its error budget does to the outputs in torque and inertia phase ([`Vehicle::acceleration_errors`]), rad/s^2.
 pub const ACCELERATION_ERRORS_RAD_S2: [f64; 2] = [63.326091034413786, 834.0051599116736];
 
-/// Turbine torque of the shift at which the errors are weighed, over the greatest torque of the engine: 133 of 190 N m in the car that is scaled.
+/// Turbine torque of the shift at which the errors are weighed, over the maximum torque of the engine: 133 of 190 N m in the car that is
+/// scaled.
 const SHIFT_TORQUE: f64 = 0.7;
 /// Friction coefficient and number of faces with which its oncoming clutch has the pressures of its error budget.
 const FRICTION: f64 = 0.13;
@@ -346,7 +347,7 @@ impl<'c> OneShift<'c> {
         CompliantRequirement { settling_time_s, kappa1_per_s: Some(kappa1_per_s), offset_max_pa, error_matrix: None }
     }
 
-    /// Greatest torque of the engine, over that of the car that is scaled.
+    /// Maximum torque of the engine, over that of the car that is scaled.
     fn torque_size(&self) -> f64 {
         self.car.engine.largest_torque() / ENGINE_TORQUE_N_M
     }
@@ -372,16 +373,16 @@ impl<'c> OneShift<'c> {
     fn pressure_size(&self) -> f64 {
         let clutch = &self.oncoming.clutch;
         let torque_n_m = self.car.engine.largest_torque() / self.slip_size() / ENGINE_TORQUE_N_M;
-        let (least, greatest) = clutch.friction.range();
-        let torque_per_pressure = 0.5 * (least + greatest) * clutch.lever() * clutch.piston_area_m2;
+        let (minimum, maximum) = clutch.friction.range();
+        let torque_per_pressure = 0.5 * (minimum + maximum) * clutch.lever() * clutch.piston_area_m2;
         torque_n_m * FRICTION * FACES * PLATE_RADII_M[1] * PISTON_AREAS_M2[1] / torque_per_pressure
     }
 
     /// The friction of the oncoming clutch: over slip, and what is not known of it.
     fn friction(&self) -> (f64, f64) {
-        let (least, greatest) = self.oncoming.clutch.friction.range();
+        let (minimum, maximum) = self.oncoming.clutch.friction.range();
         let [low, high] = self.element.friction_factor;
-        (low * least, high * greatest)
+        (low * minimum, high * maximum)
     }
 
     /// The valve of the oncoming clutch as it is at this pressure. What its lag may be besides is among the errors of the budget.

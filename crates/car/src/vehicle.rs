@@ -10,7 +10,7 @@ const SHAFT_OVER_TYRES: f64 = 2.0;
 /// Ranges of what varies in the observer's model; their corners span the polytope of Eq. (2.46).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Uncertainty {
-    /// Friction coefficient of the oncoming clutch, least and greatest.
+    /// Friction coefficient of the oncoming clutch, minimum and maximum.
     pub friction: (f64, f64),
     /// What varies in the valve.
     pub valve: ValveUncertainty,
@@ -21,7 +21,7 @@ pub struct Uncertainty {
 pub enum ValveUncertainty {
     /// Nothing.
     None,
-    /// The time constant of a proportional valve, s, least and greatest.
+    /// The time constant of a proportional valve, s, minimum and maximum.
     TimeConstant((f64, f64)),
     /// The operating points of a pulse-width valve, at which it is linearised: size of the pressure drop between its
     /// settled pressure and the cylinder, Pa, lower and upper limit.
@@ -67,7 +67,7 @@ pub struct FilterSettings {
     /// Time for which an error of the valve model persists, s.
     pub valve_rate_s: f64,
     /// How fast the torque of the offgoing clutch changes while it holds, N m per root second: about 0.7 of what it holds at the
-    /// greatest engine torque.
+    /// maximum engine torque.
     pub offgoing_n_m: f64,
     /// Time constant with which it goes once the clutch has let go, s.
     pub offgoing_release_s: f64,

@@ -123,24 +123,20 @@ fn ranges_of_elements(estimates: &str) {
     let elements: Vec<&str> = elements.into_iter().filter(|name| name.starts_with("element_")).collect();
     assert!(elements.len() >= 4, "{header}");
     for element in elements {
-        let [valve, least, greatest] = ["valve_model_pressure_pa", "pressure_least_pa", "pressure_greatest_pa"]
+        let [valve, minimum, maximum] = ["valve_model_pressure_pa", "pressure_least_pa", "pressure_greatest_pa"]
             .map(|name| numbers(estimates, &format!("{element}_{name}")));
         for row in 0..valve.len() {
             // Once the first command has had its time.
-            let valve_pa = if row > 100 { valve[row] } else { least[row] };
-            assert!(least[row] <= valve_pa && valve_pa <= greatest[row], "{element} {row}");
+            let valve_pa = if row > 100 { valve[row] } else { minimum[row] };
+            assert!(minimum[row] <= valve_pa && valve_pa <= maximum[row], "{element} {row}");
         }
         for clutch in ["offgoing", "oncoming"] {
             let own = column(estimates, clutch);
-            let [in_shift_least, in_shift_greatest] = ["pressure_least_pa", "pressure_greatest_pa"]
+            let [in_shift_min, in_shift_max] = ["pressure_least_pa", "pressure_greatest_pa"]
                 .map(|name| numbers(estimates, &format!("{clutch}_{name}")));
             let rows = (0..own.len()).filter(|&row| format!("element_{}", own[row].to_lowercase()) == element);
             for row in rows {
-                assert_eq!(
-                    [least[row], greatest[row]],
-                    [in_shift_least[row], in_shift_greatest[row]],
-                    "{element} {row}"
-                );
+                assert_eq!([minimum[row], maximum[row]], [in_shift_min[row], in_shift_max[row]], "{element} {row}");
             }
         }
     }
@@ -156,19 +152,19 @@ fn an_estimate_of_a_drive_has_both_clutches_of_every_shift_and_does_not_read_the
     let (estimates, truth) = (folder.read("whole.csv"), folder.read("sim/short.csv"));
     for clutch in ["offgoing", "oncoming"] {
         assert_eq!(column(&estimates, clutch), column(&truth, clutch), "{clutch}");
-        let [found, least, greatest] = ["pressure_estimate_pa", "pressure_least_pa", "pressure_greatest_pa"]
+        let [found, minimum, maximum] = ["pressure_estimate_pa", "pressure_least_pa", "pressure_greatest_pa"]
             .map(|name| numbers(&estimates, &format!("{clutch}_{name}")));
-        let [torque_least, torque_greatest] =
+        let [torque_min, torque_max] =
             ["torque_least_n_m", "torque_greatest_n_m"].map(|name| numbers(&estimates, &format!("{clutch}_{name}")));
         let torque = numbers(&truth, &format!("{clutch}_torque_n_m"));
         let truth = numbers(&truth, &format!("{clutch}_pressure_pa"));
         let rows = (0..truth.len()).filter(|&row| truth[row].is_finite());
         assert!(rows.clone().count() > 150);
         for row in rows {
-            assert!(least[row] - 1.0 <= truth[row] && truth[row] <= greatest[row] + 1.0, "{clutch} {row}");
-            assert!(0.0 <= least[row] && greatest[row] < 2e6, "{clutch} {row}: {} {}", least[row], greatest[row]);
+            assert!(minimum[row] - 1.0 <= truth[row] && truth[row] <= maximum[row] + 1.0, "{clutch} {row}");
+            assert!(0.0 <= minimum[row] && maximum[row] < 2e6, "{clutch} {row}: {} {}", minimum[row], maximum[row]);
             // Beside the drag of an open clutch.
-            let within = torque_least[row] - 1.2 <= torque[row] && torque[row] <= torque_greatest[row] + 1.2;
+            let within = torque_min[row] - 1.2 <= torque[row] && torque[row] <= torque_max[row] + 1.2;
             assert!(within, "{clutch} {row}: {}", torque[row]);
             assert!((found[row] - truth[row]).abs() < 0.2e6, "{clutch} {row}: {} {}", found[row], truth[row]);
         }

@@ -296,10 +296,10 @@ fn cells_that_are_no_numbers_are_counted_and_most_of_them_are_an_error() {
         let few = said(&with_cells(&folder, &text, name, cell, |row| row == 700));
         let note = format!("warning: 1 of 2400 samples of {name} are text or infinite, and are not used");
         assert!(few.contains(&note), "{few}");
-        let most = refused(&with_cells(&folder, &text, name, cell, |row| row % 5 > 1));
+        let maximum = refused(&with_cells(&folder, &text, name, cell, |row| row % 5 > 1));
         let note =
             format!("log.csv: 1440 of 2400 samples of {name} are text or infinite, and are not used\nhint: look at");
-        assert!(most.contains(&note), "{most}");
+        assert!(maximum.contains(&note), "{maximum}");
     }
 }
 
@@ -314,8 +314,11 @@ fn a_gear_that_the_gearbox_does_not_have_is_counted_and_the_gear_before_stands()
         let note = format!("warning: 1 of 2400 samples of {name} are no gear of this gearbox (255) and are not used");
         assert!(few.contains(&note) && few.contains("`valid_range` of `channel."), "{few}");
         assert!(folder.read("out.csv") == whole, "{name}");
-        let most = refused(&with_cells(&folder, &text, name, "255", |row| row % 5 > 1));
-        assert!(most.contains("are no gear of this gearbox (255) and are not used\nhint: its gears are"), "{most}");
+        let maximum = refused(&with_cells(&folder, &text, name, "255", |row| row % 5 > 1));
+        assert!(
+            maximum.contains("are no gear of this gearbox (255) and are not used\nhint: its gears are"),
+            "{maximum}"
+        );
     }
     // By a channel map, too.
     let map = folder.path("map.toml");

@@ -75,8 +75,8 @@ fn a_drive_through_sensors_is_estimated_alike_from_every_format() {
         let (truth, read) = (cells(&whole, name), cells(&measured, name));
         let off: Vec<f64> = truth.iter().zip(&read).map(|(truth, read)| (truth - read).abs()).collect();
         assert!(off.iter().filter(|off| **off > 0.0).count() > off.len() / 2, "{name}");
-        let most = if name.contains("current") { 0.02 } else { 15.0 };
-        assert!(off.iter().all(|off| *off < most), "{name} {:?}", off.iter().copied().fold(0.0, f64::max));
+        let maximum = if name.contains("current") { 0.02 } else { 15.0 };
+        assert!(off.iter().all(|off| *off < maximum), "{name} {:?}", off.iter().copied().fold(0.0, f64::max));
     }
     said(&estimate(&folder, "sim/city_measured.csv", "csv.csv", &[]));
     let csv = folder.read("csv.csv");

@@ -137,9 +137,9 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     let shifts: Vec<Vec<String>> = mdf.4[1].lines().map(|line| line.split(',').map(str::to_owned).collect()).collect();
     let column = |name: &str| shifts[0].iter().position(|title| title == name).unwrap();
     let of_vehicle = column("of_vehicle");
-    let [work, least, greatest] = ["friction_work_j", "friction_work_least_j", "friction_work_greatest_j"].map(column);
+    let [work, minimum, maximum] = ["friction_work_j", "friction_work_least_j", "friction_work_greatest_j"].map(column);
     let works: Vec<[f64; 3]> = (shifts[1..].iter().filter(|row| row[of_vehicle] == "yes"))
-        .map(|row| [work, least, greatest].map(|at| row[at].parse().unwrap_or(f64::NAN)))
+        .map(|row| [work, minimum, maximum].map(|at| row[at].parse().unwrap_or(f64::NAN)))
         .filter(|[work, ..]| !work.is_nan())
         .collect();
     assert!(works.len() as u32 >= repetitions, "{works:?}");
@@ -151,7 +151,7 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     let middle = values[values.len() / 2];
     assert!((middle / TRUE_WORK_J - 1.0).abs() < 0.1, "{values:?}");
     assert!(values.iter().all(|work| (750.0..1300.0).contains(work)), "{values:?}");
-    assert!(works.iter().all(|[_, least, greatest]| (*least..=*greatest).contains(&TRUE_WORK_J)), "{works:?}");
+    assert!(works.iter().all(|[_, minimum, maximum]| (*minimum..=*maximum).contains(&TRUE_WORK_J)), "{works:?}");
 }
 
 #[test]

@@ -40,8 +40,8 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let output = wetclutch(&["fit", &log, "--vehicle", &given, "-o", &fitted, "--page", &folder.path("fit.html")]);
     let (table, notes) = (printed(&output), stderr(&output));
     let [clutch_e, clutch_c] = ["E", "C"].map(|name| factor(&table, &format!("{name}: friction x valve gain")));
-    for ([_, least, most], truth) in [(clutch_e, 1.15), (clutch_c, 1.0)] {
-        assert!(least < truth && truth < most, "{truth}: {table}");
+    for ([_, minimum, maximum], truth) in [(clutch_e, 1.15), (clutch_c, 1.0)] {
+        assert!(minimum < truth && truth < maximum, "{truth}: {table}");
     }
     // The ratio of two frictions does not contain the common factor of all torques; in the given file it is 15 % low.
     let ratio = clutch_e[0] / clutch_c[0];

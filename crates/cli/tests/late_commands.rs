@@ -57,7 +57,7 @@ fn a_delay_of_the_commands_is_said_and_moved_by_the_channel_map() {
             torques.into_iter().filter(|torque| !torque.is_nan()).collect::<Vec<_>>()
         });
         assert_eq!(torques[0].len(), torques[1].len());
-        let most = torques[0].iter().zip(&torques[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(most < 0.5, "{most}");
+        let maximum = torques[0].iter().zip(&torques[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(maximum < 0.5, "{maximum}");
     }
 }

@@ -113,7 +113,7 @@ fn every_shift_has_its_estimate_quality_and_error() {
         assert!((number("friction_work_j") / work_j - 1.0).abs() < 0.06, "{work_j}");
         assert!(number("friction_work_least_j") < work_j && work_j < number("friction_work_greatest_j"));
         assert_eq!(number("pressure_inside_range"), 1.0);
-        // The true least shaft torque of this shift is 293 N m.
+        // The true minimum shaft torque of this shift is 293 N m.
         assert!((250.0..350.0).contains(&number("least_shaft_torque_n_m")));
     }
     let json: Vec<serde_json::Value> = serde_json::from_str(&folder.read("out_shifts.json")).unwrap();
@@ -167,7 +167,7 @@ fn estimates_in_other_formats_hold_the_same_numbers() {
     let channels = |output: &Output| -> Vec<String> {
         let text = String::from_utf8(output.stdout.clone()).unwrap();
         let is_number = |line: &&str| ["_pa ", "_n_m "].iter().any(|ending| line.contains(ending));
-        // Name, least and greatest value; in MDF an absent value is one that is not a number.
+        // Name, minimum and maximum value; in MDF an absent value is one that is not a number.
         let cells = |line: &str| {
             let words: Vec<&str> = line.split_whitespace().collect();
             let end = words.len() - if words.ends_with(&["missing"]) { 2 } else { 0 };

@@ -61,11 +61,11 @@ fn a_gearbox_by_its_fractions_has_the_estimates_of_its_stick_diagram() {
     let [_, log] = simulated(&folder, TWO_SHIFTS, &train);
     let [by_train, by_fractions] =
         [(&train, "train.csv"), (&fractions, "shares.csv")].map(|(car, output)| estimate(&folder, &log, car, output));
-    for (name, most) in [("oncoming_torque_estimate_n_m", 0.1), ("oncoming_pressure_estimate_pa", 100.0)] {
+    for (name, maximum) in [("oncoming_torque_estimate_n_m", 0.1), ("oncoming_pressure_estimate_pa", 100.0)] {
         let pairs: Vec<_> = numbers(&by_train, name).into_iter().zip(numbers(&by_fractions, name)).collect();
         let compared = pairs.iter().filter(|(one, other)| one.is_finite() && other.is_finite());
         assert!(compared.clone().count() > 100, "{name}");
-        assert!(compared.clone().all(|(one, other)| (one - other).abs() < most), "{name}");
+        assert!(compared.clone().all(|(one, other)| (one - other).abs() < maximum), "{name}");
     }
     // What cannot be simulated says so.
     let output =
@@ -97,7 +97,7 @@ fn a_gearbox_by_its_ratios_alone_has_torques_at_the_turbine() {
         .into_iter()
         .reduce(|a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect())
         .unwrap();
-    for (car, most) in [(&masses, 8.0), (&alone, 60.0)] {
+    for (car, maximum) in [(&masses, 8.0), (&alone, 60.0)] {
         let text = estimate(&folder, &log, car, "out.csv");
         assert!(!text.lines().next().unwrap().contains("pressure"), "no pressure");
         assert!(!text.lines().next().unwrap().contains("command"), "no command");
@@ -109,7 +109,7 @@ fn a_gearbox_by_its_ratios_alone_has_torques_at_the_turbine() {
         let rows = sum.iter().zip(&found).zip(&phases).filter(|(_, phase)| **phase == "both_slip");
         let errors: Vec<f64> = rows.map(|((truth, found), _)| found - truth).collect();
         let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
-        assert!(errors.len() > 40 && rms < most, "{car}: {rms} N m in {} rows", errors.len());
+        assert!(errors.len() > 40 && rms < maximum, "{car}: {rms} N m in {} rows", errors.len());
         assert!(cells(phase).zip(cells(health)).all(|(phase, health)| phase != "both_slip" || health == "good"));
     }
     let said_of =

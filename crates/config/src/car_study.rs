@@ -12,7 +12,7 @@ use crate::experiment::sensors::sensors;
 use crate::{CarFile, ConfigError, DriveFile, Kind, Source};
 
 /// Most cars of a study.
-const MOST_RUNS: f64 = 1e6;
+const MAX_RUNS: f64 = 1e6;
 /// Word for all shifts between neighbouring gears.
 const NEIGHBOURING: &str = "neighbouring";
 
@@ -25,7 +25,7 @@ pub enum CarStudyRuns {
     Shifts(Vec<[usize; 2]>),
 }
 
-/// Greatest fraction by which a car differs from the one that is known, each drawn evenly within it; `None` is that of the error
+/// Largest fraction by which a car differs from the one that is known, each drawn evenly within it; `None` is that of the error
 /// budget of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SampledErrors {
@@ -120,7 +120,7 @@ impl CarStudy {
         let check = Check::of(&source);
         let of_drive = drive.as_ref().and_then(|drive| drive.sensors);
         let own = raw.sensors.as_ref().map(|raw| sensors(&check, "sensors", raw, None)).transpose()?;
-        let runs = check.count("runs", &raw.runs, 1.0..=MOST_RUNS)? as u64;
+        let runs = check.count("runs", &raw.runs, 1.0..=MAX_RUNS)? as u64;
         Ok(Self {
             name: check.name("name", raw.name.get_ref(), raw.name.span().start)?,
             title: check.title("title", &raw.title)?,

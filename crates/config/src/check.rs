@@ -140,7 +140,7 @@ impl<'a> Check<'a> {
         Err(self.meaning(&key, value.span().start, format!("is {number}, expected an integer"), None))
     }
 
-    /// Least and greatest, if both lie in the range.
+    /// Minimum and maximum, if both lie in the range.
     pub(crate) fn pair(
         &self,
         key: impl Display,
@@ -148,7 +148,7 @@ impl<'a> Check<'a> {
         range: RangeInclusive<f64>,
     ) -> Result<[f64; 2], ConfigError> {
         match *self.numbers(&key, values, range)? {
-            [least, greatest] if least <= greatest => Ok([least, greatest]),
+            [minimum, maximum] if minimum <= maximum => Ok([minimum, maximum]),
             _ => Err(self.meaning(&key, values.span().start, "expected [least, greatest]".to_owned(), None)),
         }
     }
@@ -167,18 +167,18 @@ impl<'a> Check<'a> {
         })
     }
 
-    /// The breakpoints of an axis: between 2 and `most` of them, rising within the range.
+    /// The breakpoints of an axis: between 2 and `maximum` of them, rising within the range.
     pub(crate) fn axis<'n>(
         &self,
         key: impl Display,
         values: &'n Numbers,
         range: RangeInclusive<f64>,
-        most: usize,
+        maximum: usize,
     ) -> Result<&'n [f64], ConfigError> {
         let apart = BREAKPOINTS_APART * range.end();
         let points = self.numbers(&key, values, range)?;
         let wrong = |message: String| self.meaning(&key, values.span().start, message, None);
-        check_axis(points, most).map_err(|error| wrong(error.to_string()))?;
+        check_axis(points, maximum).map_err(|error| wrong(error.to_string()))?;
         match points.windows(2).position(|pair| pair[1] - pair[0] < apart) {
             None => Ok(points),
             Some(at) => Err(wrong(format!(

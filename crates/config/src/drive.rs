@@ -13,13 +13,13 @@ use crate::experiment::sensors::sensors;
 use crate::{CarFile, ConfigError, Kind, Source, file_of, speed_trace};
 
 /// Most repetitions of the segments.
-const MOST_REPETITIONS: f64 = 1e6;
+const MAX_REPETITIONS: f64 = 1e6;
 /// Where a schedule says nothing \[chosen\]: throttle, and speed of the gearbox input at which the gear above and the gear below
 /// are taken, rad/s.
 const SCHEDULE: [[f64; 5]; 3] =
     [[0.0, 0.1, 0.3, 0.6, 1.0], [190.0, 200.0, 260.0, 380.0, 560.0], [105.0, 110.0, 140.0, 230.0, 330.0]];
-/// Least time in a gear where a schedule says nothing, s.
-const LEAST_TIME_IN_GEAR_S: f64 = 1.0;
+/// Minimum time in a gear where a schedule says nothing, s.
+const MIN_TIME_IN_GEAR_S: f64 = 1.0;
 
 /// A drive file.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +76,7 @@ impl DriveFile {
             }
         };
         let repetitions = match &raw.repetitions {
-            Some(count) => check.count("repetitions", count, 1.0..=MOST_REPETITIONS)? as u32,
+            Some(count) => check.count("repetitions", count, 1.0..=MAX_REPETITIONS)? as u32,
             None => 1,
         };
         let shifts = plan(&check, &raw)?;
@@ -225,7 +225,7 @@ fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
         let table = |values: &[f64]| {
             Table1::new(&throttle, values).map_err(|error| check.meaning("schedule", 0, error.to_string(), None))
         };
-        let time_in_gear_s = LEAST_TIME_IN_GEAR_S;
+        let time_in_gear_s = MIN_TIME_IN_GEAR_S;
         let schedule = ShiftSchedule { up_rad_s: table(&up)?, down_rad_s: table(&down)?, time_in_gear_s };
         return Ok(ShiftPlan::Schedule(Box::new(schedule)));
     };
@@ -241,7 +241,7 @@ fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
     }
     let time_in_gear_s = match &schedule.time_in_gear_s {
         Some(time) => check.number("schedule.time_in_gear_s", time, 0.0..=100.0)?,
-        None => LEAST_TIME_IN_GEAR_S,
+        None => MIN_TIME_IN_GEAR_S,
     };
     Ok(ShiftPlan::Schedule(Box::new(ShiftSchedule { up_rad_s, down_rad_s, time_in_gear_s })))
 }

@@ -177,7 +177,7 @@ pub const QUALITY: [&str; 7] = [
 /// How long before the shift request a run is recorded, if the file does not say, s.
 pub const RECORD_BEFORE_S: f64 = 1.2;
 /// Most runs of a study.
-const MOST_RUNS: u64 = 1_000_000_000;
+const MAX_RUNS: u64 = 1_000_000_000;
 /// Dimensions of the Sobol sequence. A Sobol plan takes one for each factor, a Saltelli plan two.
 pub const SOBOL_DIMENSIONS: usize = 256;
 
@@ -364,14 +364,15 @@ fn observers(
 
 /// Each factor needs one dimension of the Sobol sequence, or two in a Saltelli plan.
 fn enough_dimensions(check: &Check<'_>, raw: &RawStudy) -> Result<(), ConfigError> {
-    let most = match raw.plan {
+    let maximum = match raw.plan {
         Plan::Sobol => SOBOL_DIMENSIONS,
         Plan::Saltelli => SOBOL_DIMENSIONS / 2,
         Plan::FullFactorial | Plan::LatinHypercube | Plan::Random => return Ok(()),
     };
     let factors = raw.factor.get_ref();
-    let Some(beyond) = factors.get(most) else { return Ok(()) };
-    let message = format!("a {} plan has at most {most} factors, but the study has {}", raw.plan.name(), factors.len());
+    let Some(beyond) = factors.get(maximum) else { return Ok(()) };
+    let message =
+        format!("a {} plan has at most {maximum} factors, but the study has {}", raw.plan.name(), factors.len());
     let hint = "plan = \"latin-hypercube\" has no limit on the number of factors".to_owned();
     Err(check.meaning("factor", beyond.key.span().start, message, Some(hint)))
 }
@@ -384,8 +385,8 @@ fn runs(check: &Check<'_>, raw: &RawStudy, factors: &[Factor]) -> Result<u64, Co
             return Err(meaning(runs.span().start, message, Some("remove `runs`".to_owned())));
         }
         let all = factors.iter().try_fold(1_u64, |n, f| n.checked_mul(f.values.levels() as u64));
-        return all.filter(|&n| n <= MOST_RUNS).ok_or_else(|| {
-            let message = format!("the levels have more than {MOST_RUNS} combinations");
+        return all.filter(|&n| n <= MAX_RUNS).ok_or_else(|| {
+            let message = format!("the levels have more than {MAX_RUNS} combinations");
             meaning(raw.factor.span().start, message, Some("use another plan, such as \"sobol\"".to_owned()))
         });
     }
@@ -393,8 +394,8 @@ fn runs(check: &Check<'_>, raw: &RawStudy, factors: &[Factor]) -> Result<u64, Co
         return Err(meaning(0, format!("the plan {} needs a number of runs", raw.plan.name()), None));
     };
     let (place, runs) = (runs.span().start, *runs.get_ref());
-    if runs == 0 || runs > MOST_RUNS {
-        return Err(meaning(place, format!("{runs} is not between 1 and {MOST_RUNS}"), None));
+    if runs == 0 || runs > MAX_RUNS {
+        return Err(meaning(place, format!("{runs} is not between 1 and {MAX_RUNS}"), None));
     }
     let group = factors.len() as u64 + 2;
     if raw.plan == Plan::Saltelli && !runs.is_multiple_of(group) {

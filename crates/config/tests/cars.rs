@@ -30,7 +30,7 @@ fn a_name_and_a_gearbox_are_a_complete_vehicle_file() {
 }
 
 #[test]
-fn the_greatest_engine_torque_scales_what_depends_on_the_size_of_a_car() {
+fn the_maximum_engine_torque_scales_what_depends_on_the_size_of_a_car() {
     let shipped = CarFile::eight_speed().unwrap();
     let same = car("[engine]\nmax_torque_n_m = 190\n").unwrap();
     assert_eq!((same.engine, same.converter, same.driveline), (shipped.engine, shipped.converter, shipped.driveline));

@@ -151,9 +151,9 @@ fn the_bounds_are_those_of_the_car_and_of_the_oncoming_element() {
     assert_eq!((bounds.valve_lag_factor, bounds.valve_delay_s), ([0.5, 1.5], [0.0, 0.03]));
     assert_eq!((bounds.valve_hysteresis_pa, bounds.shaft_stiffness_factor), (10e3, [0.8, 1.2]));
     near(bounds.pressure_max_pa, 1.1 * 1.6e6, 1e-12);
-    let (least, greatest) = vehicle.settings.uncertainty.friction;
-    near(least, 0.85 * 0.12, 1e-9);
-    near(greatest, 1.15 * 0.12 * 1.21, 1e-9);
+    let (minimum, maximum) = vehicle.settings.uncertainty.friction;
+    near(minimum, 0.85 * 0.12, 1e-9);
+    near(maximum, 1.15 * 0.12 * 1.21, 1e-9);
     // The valve is as it is at the pressure of a shift.
     let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.settings.valve else { panic!() };
     let pressure_pa = vehicle.oncoming.clutch.kiss_pressure() + bounds.shift_pressure_pa;

@@ -8,13 +8,13 @@ use config::{CarFile, GearboxFile, Source};
 
 #[test]
 fn the_inertia_of_every_shift_between_neighbours_lies_within_the_assumed_bounds() {
-    let [least, greatest] = TURBINE_SIDE_INERTIA_KG_M2;
+    let [minimum, maximum] = TURBINE_SIDE_INERTIA_KG_M2;
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gearboxes");
     for name in ["ravigneaux_4", "lepelletier_6", "8hp", "10_speed"] {
         let gearbox = GearboxFile::read(&folder.join(format!("{name}.toml"))).unwrap().gearbox;
         for pair in gearbox.forward_gears().windows(2) {
             let inertia = gearbox.shift(pair[0], pair[1]).unwrap().reduced.unwrap().mass_kg_m2[0][0];
-            assert!((least..=greatest).contains(&inertia), "{name} {pair:?} {inertia}");
+            assert!((minimum..=maximum).contains(&inertia), "{name} {pair:?} {inertia}");
         }
     }
     assert!((CarFile::eight_speed().unwrap().engine.largest_torque() - ASSUMED_OF_N_M).abs() < 0.5);
@@ -31,8 +31,8 @@ fn a_car_by_ratios_alone_has_masses_of_its_size_and_says_how_far_they_may_be_off
     let assumed = car("", "");
     let mass = |car: &Car| car.gearbox.shift(0, 1).unwrap().reduced.unwrap().mass_kg_m2[0][0];
     let fraction = assumed.error_bounds.inertia_share.unwrap();
-    let [least, greatest] = TURBINE_SIDE_INERTIA_KG_M2;
-    for (end, off) in [(least, 1.0 + fraction), (greatest, 1.0 - fraction)] {
+    let [minimum, maximum] = TURBINE_SIDE_INERTIA_KG_M2;
+    for (end, off) in [(minimum, 1.0 + fraction), (maximum, 1.0 - fraction)] {
         assert!((mass(&assumed) / (end * off) - 1.0).abs() < 1e-3, "{fraction}");
     }
     let large = car("[engine]\nmax_torque_n_m = 380\n", "");

@@ -370,8 +370,8 @@ fn smallest_gain_from(
     let (unknowns, first) = take(at_first.solve())?;
     let minimum = unknowns[0] + unknowns[1];
     let gain_unit = if minimum > 0.0 { gain_unit * minimum.sqrt() } else { gain_unit };
-    let least = 2..unknowns.len();
-    let (unknowns, more) = take(program(gain_unit, decay_per_s, requirement, vertices).solve_least(least))?;
+    let gains = 2..unknowns.len();
+    let (unknowns, more) = take(program(gain_unit, decay_per_s, requirement, vertices).solve_min_norm(gains))?;
     let gain = DMatrix::from_row_slice(2, requirement.h.nrows(), &unknowns[2..]) * gain_unit;
     check(&gain, kappa1_per_s, requirement, vertices)
         .map(|certificate| CompliantCertificate { solver_iterations: first + more, ..certificate })
@@ -474,7 +474,7 @@ mod tests {
 
     /// The gain of the inertia phase is not unique by its cost; it must not depend on how the program is scaled.
     #[test]
-    fn the_gain_of_least_norm_is_the_same_however_the_program_is_scaled() {
+    fn the_gain_of_minimum_norm_is_the_same_however_the_program_is_scaled() {
         let vehicle = VehicleFile::built_in().unwrap().vehicle;
         let phase = Phase::InertiaPhase;
         let (requirement, vertices) = (compliant_requirement(&vehicle, phase), vertices(&vehicle, phase));

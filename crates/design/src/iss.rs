@@ -23,7 +23,7 @@ use crate::{Certificate, Polytope};
 /// `kappa1` starts at this part of `kappa2` and is raised by as much each time.
 const KAPPA1_STEP: f64 = 1.0 / 40.0;
 /// The loop ends where `kappa1` reaches this many times `kappa2`; the minimum lies below `kappa2`.
-const KAPPA1_MOST: f64 = 4.0;
+const KAPPA1_MAX: f64 = 4.0;
 /// By how much the program asks for more decay than required, relatively, so that the solution satisfies
 /// the inequalities strictly: the solver meets its constraints to about 1e-8.
 const DECAY_RESERVE: f64 = 1e-7;
@@ -206,7 +206,7 @@ pub(crate) fn five_steps<C>(
     while measure(&best).1 > offset_max_pa {
         let Ok(next) = smallest_gain(measure(&best).0 + step) else { break };
         let (kappa1_per_s, offset_pa) = measure(&next);
-        if offset_pa >= measure(&best).1 || kappa1_per_s > KAPPA1_MOST * kappa2_per_s {
+        if offset_pa >= measure(&best).1 || kappa1_per_s > KAPPA1_MAX * kappa2_per_s {
             break;
         }
         best = next;

@@ -7,9 +7,7 @@ use observer::{
     ValveModel,
 };
 
-use observer::of_sensors::{
-    ENGINE_KG_M2, SCALE_LEAST, engine_noise, lag_rad, speed_reading, std_dev_of, std_dev_rad_s,
-};
+use observer::of_sensors::{ENGINE_KG_M2, SCALE_MIN, engine_noise, lag_rad, speed_reading, std_dev_of, std_dev_rad_s};
 
 use crate::budget::{ValveErrors, shift_pressure, shift_time_constant};
 use crate::compliant::compliant_model;
@@ -28,7 +26,7 @@ const LOAD_IN_GEAR_S: f64 = 0.05;
 const CLUTCH_S: f64 = 20.0;
 
 /// A delay is known no better than this, s \[chosen\].
-const DELAY_LEAST_S: f64 = 1.3e-3;
+const DELAY_MIN_S: f64 = 1.3e-3;
 
 /// Half the width of a range, as the edge of a uniform distribution.
 fn std_dev_within(range: [f64; 2]) -> f64 {
@@ -70,10 +68,10 @@ fn fraction(error: f64, weighed_at: f64) -> f64 {
 /// ```
 pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilter<f64> {
     let budget = &vehicle.error_bounds;
-    let [delay_least_s, delay_most_s] = budget.valve_delay_s;
+    let [delay_min_s, delay_max_s] = budget.valve_delay_s;
     let model = compliant_model(vehicle);
     let engine = engine_noise(sensors.map(|sensors| &sensors.engine), budget.turbine_quantum_rad_s);
-    let valve_model = |valve| ValveModel { valve, delay_s: 0.5 * (delay_least_s + delay_most_s) };
+    let valve_model = |valve| ValveModel { valve, delay_s: 0.5 * (delay_min_s + delay_max_s) };
     let offgoing = OffgoingClutch {
         valve: valve_model(vehicle.offgoing.valve),
         clutch: vehicle.offgoing.clutch,
@@ -110,9 +108,9 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
     let gearbox = shift.mass_kg_m2[1][1] * Real::powi(line.final_ratio, 2);
     let swing_rad_s = (line.shaft_stiffness_n_m_rad * (gearbox.recip() + wheels.recip())).sqrt();
     let quarter_swing_s = 0.5 * std::f64::consts::PI / swing_rad_s;
-    let [delay_least_s, delay_most_s] = budget.valve_delay_s;
+    let [delay_min_s, delay_max_s] = budget.valve_delay_s;
     let lag = std_dev_of(budget.valve_lag_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max));
-    let delay = std_dev_of(0.5 * (delay_most_s - delay_least_s)) / shift_time_constant(vehicle);
+    let delay = std_dev_of(0.5 * (delay_max_s - delay_min_s)) / shift_time_constant(vehicle);
     Uncertainty {
         turbine_share: std_dev_of(budget.turbine_torque_share),
         turbine_share_s: told.turbine_share_s,
@@ -130,8 +128,8 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
         wheel_scale: std_dev_of(budget.wheel_scale),
         wheel_delay_s: [-budget.channel_skew_s, budget.wheel_delay_s],
         skew_s: budget.channel_skew_s,
-        scale_least: SCALE_LEAST.min(std_dev_of(budget.wheel_scale)),
-        delay_least_s: DELAY_LEAST_S,
+        scale_min: SCALE_MIN.min(std_dev_of(budget.wheel_scale)),
+        delay_min_s: DELAY_MIN_S,
         output_least_rad_s: told.output_least_rad_s,
     }
 }

@@ -60,7 +60,7 @@ pub enum Outcome {
     Failed(String),
 }
 
-/// What the minimum may grow by where the least of several solutions is taken: this fraction of `1 + |minimum|`. The solver finds
+/// What the minimum may grow by where the solution of minimum norm is taken: this fraction of `1 + |minimum|`. The solver finds
 /// the minimum to a tenth of it.
 pub const TIE_SLACK: f64 = 1e-7;
 
@@ -70,17 +70,17 @@ impl Problem {
         self.solve_with(&vec![0.0; self.objective.len()])
     }
 
-    /// The solution whose unknowns in `least` have the smallest sum of squares, among those that cost at most
+    /// The solution whose unknowns in `among` have the smallest sum of squares, among those that cost at most
     /// [`TIE_SLACK`] more than the minimum. Where the minimum is not unique, this one is. If the solver gives that up, because
     /// hardly any solution is left, a hundred times as much is allowed, twice; then the solution that it found first is taken.
-    pub fn solve_least(&self, least: Range<usize>) -> Outcome {
+    pub fn solve_min_norm(&self, among: Range<usize>) -> Outcome {
         let (first, iterations) = match self.solve() {
             Outcome::Solved { unknowns, iterations } => (unknowns, iterations),
             ended => return ended,
         };
         let minimum: f64 = self.objective.iter().zip(&first).map(|(c, x)| c * x).sum();
         let dearer: Vec<f64> = self.objective.iter().map(|c| -c).collect();
-        let squares: Vec<f64> = (0..dearer.len()).map(|k| if least.contains(&k) { 1.0 } else { 0.0 }).collect();
+        let squares: Vec<f64> = (0..dearer.len()).map(|k| if among.contains(&k) { 1.0 } else { 0.0 }).collect();
         for factor in [1.0, 1e2, 1e4] {
             let mut blocks = self.blocks.clone();
             blocks.push(Block::linear(minimum + factor * TIE_SLACK * (1.0 + minimum.abs()), &dearer));
@@ -163,12 +163,12 @@ mod tests {
         assert!((unknowns[0] - largest_eigenvalue(&a)).abs() < 1e-7);
     }
 
-    /// `x1 + x2 >= 2` at the least of `x1 + x2`: a whole line of solutions, of which `(1, 1)` is the least.
+    /// `x1 + x2 >= 2` at the minimum of `x1 + x2`: a whole line of solutions, of which `(1, 1)` has the minimum norm.
     #[test]
-    fn of_many_solutions_the_least_is_taken() {
+    fn of_many_solutions_that_of_minimum_norm_is_taken() {
         for weight in [1.0, 1e-3] {
             let problem = Problem { objective: vec![weight; 2], blocks: vec![Block::linear(-2.0, &[1.0, 1.0])] };
-            let Outcome::Solved { unknowns, .. } = problem.solve_least(0..2) else { panic!("no solution") };
+            let Outcome::Solved { unknowns, .. } = problem.solve_min_norm(0..2) else { panic!("no solution") };
             // The slack moves the sum by its fraction of a cost of `2 weight`.
             let moved = TIE_SLACK * (1.0 + 2.0 * weight) / weight;
             assert!(unknowns.iter().all(|x| (x - 1.0).abs() < moved + 1e-7), "{unknowns:?}");

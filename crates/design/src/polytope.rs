@@ -63,6 +63,6 @@ pub(crate) fn slowest_valve(model: &RigidModel<f64>, uncertainty: &Uncertainty) 
 }
 
 // A range written as one number twice is one vertex.
-pub(crate) fn distinct((least, greatest): (f64, f64)) -> Vec<f64> {
-    if least == greatest { vec![least] } else { vec![least, greatest] }
+pub(crate) fn distinct((minimum, maximum): (f64, f64)) -> Vec<f64> {
+    if minimum == maximum { vec![minimum] } else { vec![minimum, maximum] }
 }

@@ -118,7 +118,7 @@ fn designs_hold(vehicle: &Vehicle, turn: usize, name: &str) {
             let mut numbers = numbers.chain([certificate.bound_pa, certificate.best_gain_bound_pa]);
             assert!(numbers.all(f64::is_finite), "{case}: {certificate:?}");
             assert!(certificate.bound_pa <= certificate.open_loop_bound_pa, "{case}: {certificate:?}");
-            assert!(certificate.margins.iter().all(|margin| margin.least >= 0.0), "{case}: {certificate:?}");
+            assert!(certificate.margins.iter().all(|margin| margin.minimum >= 0.0), "{case}: {certificate:?}");
         }
     }
 }

@@ -99,8 +99,8 @@ proptest! {
             prop_assert!(error <= left + certificate.bound_pa + 1.0, "{error} > {left} + {}", certificate.bound_pa);
         }
         // With every error at its limit and of the worst sign the inertia phase is over after 7 samples of 10 ms.
-        let least = if inertia { (0.07 / SAMPLE_TIMES_S[sample_time]) as usize } else { 60 };
-        prop_assert!(errors.len() >= least.min(60), "held for {} samples only", errors.len());
+        let minimum = if inertia { (0.07 / SAMPLE_TIMES_S[sample_time]) as usize } else { 60 };
+        prop_assert!(errors.len() >= minimum.min(60), "held for {} samples only", errors.len());
     }
 }
 

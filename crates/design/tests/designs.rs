@@ -60,7 +60,7 @@ fn the_loop_raises_kappa1_until_the_offset_is_acceptable() {
 }
 
 #[test]
-fn an_offset_below_the_least_reachable_names_that_requirement() {
+fn an_offset_below_the_minimum_reachable_names_that_requirement() {
     let wanted = IssRequirement { offset_max_pa: 0.04e6, ..requirement(None) };
     let error = design_phase(&vehicle(), Phase::InertiaPhase, &wanted).unwrap_err();
     let DesignError::OffsetUnreachable(missed) = error else { panic!("{error}") };
@@ -324,8 +324,8 @@ fn the_certificate_holds_for_backward_slip_too() {
     for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
         let certificate = design_rigid(&vehicle).unwrap().of(phase).unwrap().clone();
         let model = rigid_model(&vehicle);
-        let (least, greatest) = vehicle.settings.uncertainty.friction;
-        for (friction, vertex) in [least, greatest].into_iter().zip(&certificate.vertices) {
+        let (minimum, maximum) = vehicle.settings.uncertainty.friction;
+        for (friction, vertex) in [minimum, maximum].into_iter().zip(&certificate.vertices) {
             // The direction of the slip goes with the friction.
             let backward = model.influence(phase, -friction);
             let gain = certificate.gain_pa_s_rad.map(|l| -l);

@@ -206,7 +206,7 @@ fn one_wrong_speed_does_not_turn_the_range_of_the_torque_around() {
                 input.turbine_rad_s = input.turbine_rad_s.filter(|_| k % 2 == 0);
                 input.output_rad_s = input.output_rad_s.filter(|_| k % 2 == 1);
             }
-            let [least, greatest] = estimator.step(&mut right, &input).clutch_torque_n_m;
+            let [minimum, maximum] = estimator.step(&mut right, &input).clutch_torque_n_m;
             match k {
                 300 | 340 => input.turbine_rad_s = input.turbine_rad_s.map(|reading| add(reading, -150.0)),
                 320 => input.turbine_rad_s = input.turbine_rad_s.map(|reading| add(reading, 1e3)),
@@ -216,8 +216,8 @@ fn one_wrong_speed_does_not_turn_the_range_of_the_torque_around() {
             }
             let found = estimator.step(&mut wrong, &input).clutch_torque_n_m;
             if k >= 200 {
-                assert!(least > 50.0, "{in_turns} {k}: {least} {greatest}");
-                let middle = 0.5 * (least + greatest);
+                assert!(minimum > 50.0, "{in_turns} {k}: {minimum} {maximum}");
+                let middle = 0.5 * (minimum + maximum);
                 assert!((found[0]..=found[1]).contains(&middle), "{in_turns} {k}: {found:?} {middle}");
             }
         }

@@ -29,7 +29,7 @@ pub fn direction<T: Real>(slip_rad_s: T) -> T {
     if slip_rad_s < T::zero() { -T::one() } else { T::one() }
 }
 
-/// Slip speed at which the drag of an open clutch is greatest, rad/s \[chosen\]: above it the oil film breaks.
+/// Slip speed at which the drag of an open clutch is largest, rad/s \[chosen\]: above it the oil film breaks.
 pub const DRAG_PEAK_RAD_S: f64 = 60.0;
 
 /// Drag of the oil between open plates, N m, with the sign of the slip: `2 T_pk x / (1 + x^2)`, `x = dw/w_pk`. Hot oil has a

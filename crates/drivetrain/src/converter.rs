@@ -58,16 +58,16 @@ impl<T: Real> Converter<T> {
         (T::of(2.0) * turbine_n_m - turbine_rad_s * slope_n_m_s) / engine_rad_s.at_least(T::one())
     }
 
-    /// Least and greatest turbine torque with both speeds anywhere in these ranges, N m.
+    /// Minimum and maximum turbine torque with both speeds anywhere in these ranges, N m.
     pub fn turbine_range(&self, engine_rad_s: [T; 2], turbine_rad_s: [T; 2]) -> [T; 2] {
         let engine = engine_rad_s.map(|speed| speed.at_least(T::of(SLOWEST_ENGINE_RAD_S)));
-        // A quotient is greatest where the divisor is smallest, unless it is negative.
-        let least = turbine_rad_s[0] / if turbine_rad_s[0] < T::zero() { engine[0] } else { engine[1] };
-        let most = turbine_rad_s[1] / if turbine_rad_s[1] < T::zero() { engine[1] } else { engine[0] };
-        let capacity = self.capacity_n_m_s2.range_within(least, most);
-        let (lowest, highest) = self.torque_ratio.range_within(least, most);
+        // A quotient is largest where the divisor is smallest, unless it is negative.
+        let minimum = turbine_rad_s[0] / if turbine_rad_s[0] < T::zero() { engine[0] } else { engine[1] };
+        let maximum = turbine_rad_s[1] / if turbine_rad_s[1] < T::zero() { engine[1] } else { engine[0] };
+        let capacity = self.capacity_n_m_s2.range_within(minimum, maximum);
+        let (lowest, highest) = self.torque_ratio.range_within(minimum, maximum);
         let (ratios, squares) = ([lowest, highest], engine.map(|speed| speed * speed));
-        // In overrun the torque is negative, and least where its size is greatest.
+        // In overrun the torque is negative, and least where its size is largest.
         let end = |capacity: T, drive: usize, overrun: usize| {
             let at = if capacity < T::zero() { overrun } else { drive };
             capacity * squares[at] * ratios[at]
@@ -152,25 +152,26 @@ mod tests {
             [([180.0, 220.0], [60.0, 120.0]), ([90.0, 110.0], [95.0, 130.0]), ([0.0, 5.0], [0.0, 3.0])]
         {
             let [low, high] = converter().turbine_range(engine, turbine);
-            let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+            let (mut minimum, mut maximum) = (f64::INFINITY, f64::NEG_INFINITY);
             for i in 0..=40 {
                 for j in 0..=40 {
                     let between = |[a, b]: [f64; 2], k: i32| a + (b - a) * f64::from(k) / 40.0;
                     let torque = converter().torques(between(engine, i), between(turbine, j)).turbine_n_m;
-                    (least, most) = (least.min(torque), most.max(torque));
+                    (minimum, maximum) = (minimum.min(torque), maximum.max(torque));
                 }
             }
-            assert!(low <= least && most <= high, "{low} {least} {most} {high}");
+            assert!(low <= minimum && maximum <= high, "{low} {minimum} {maximum} {high}");
             // Beside a stalled engine speed ratio and engine speed are hardly one from the other, and it is wider.
             let stalled = engine[0] < 1.0;
-            assert!(stalled || high - low < 1.2 * (most - least), "{low} {least} {most} {high}");
+            assert!(stalled || high - low < 1.2 * (maximum - minimum), "{low} {minimum} {maximum} {high}");
         }
     }
 
     #[test]
     fn at_full_throttle_the_pump_takes_what_the_engine_gives() {
-        let map = |most: f64| crate::Table2::new(&[0.0, 400.0], &[0.0, 1.0], &[[0.0, most], [0.0, most]]).unwrap();
-        let engine = |most: f64| Engine { inertia_kg_m2: 0.2, drag_n_m_s: 0.0, torque_n_m: map(most) };
+        let map =
+            |maximum: f64| crate::Table2::new(&[0.0, 400.0], &[0.0, 1.0], &[[0.0, maximum], [0.0, maximum]]).unwrap();
+        let engine = |maximum: f64| Engine { inertia_kg_m2: 0.2, drag_n_m_s: 0.0, torque_n_m: map(maximum) };
         // 160 N m are 4e-3 N m s^2 times the square of 200 rad/s; at rest the turbine has twice that.
         let stall = converter().full_throttle_turbine_torque(&engine(160.0), 0.0);
         assert!((stall - 320.0).abs() < 1e-9, "{stall}");

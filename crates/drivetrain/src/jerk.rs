@@ -1,8 +1,9 @@
 //! Jerk of the car in a shift: one definition for simulated and measured shifts.
 //!
 //! The jerk at a time is the second derivative of the parabola with the least squares of distances to the speed of the car over
-//! 0.3 s around it, in m/s^3. That of a shift is its greatest size from 0.3 s before the shift to some tenths of a second after it. Where the
-//! acceleration is known, its integral stands for the speed. Speeds that come faster than every 10 ms are averaged over 10 ms first.
+//! 0.3 s around it, in m/s^3. That of a shift is its maximum magnitude from 0.3 s before the shift to some tenths of a second after it.
+//! Where the acceleration is known, its integral stands for the speed. Speeds that come faster than every 10 ms are averaged over 10 ms
+//! first.
 //!
 //! A longitudinal acceleration that swings with a frequency `f` and an amplitude `a` shows with a jerk of nearly `2 pi f a` up to
 //! 1 Hz, of half of it at 3 Hz, and of nothing from 6 Hz on. Shorter windows follow the noise of speeds on a vehicle bus: the
@@ -13,10 +14,10 @@ pub const WINDOW_S: f64 = 0.3;
 /// Speeds that come faster are averaged over this time, s.
 const BIN_S: f64 = 0.01;
 /// Points that a parabola needs, and most that there are.
-const LEAST: usize = 7;
-const MOST: usize = 40;
+const MINIMUM: usize = 7;
+const MAXIMUM: usize = 40;
 /// Room for a window to move on.
-const ROOM: usize = 2 * MOST;
+const ROOM: usize = 2 * MAXIMUM;
 /// Times are sums of periods, and differ in their last digits, s.
 const ROUNDING_S: f64 = 1e-6;
 /// Steps that differ by no more than this from the first of them are equal, s: in a window of them no time is further than forty times this
@@ -26,7 +27,7 @@ const EVEN_S: f64 = 1e-9;
 /// A window is whole if it is no shorter than this fraction: bins of uneven clocks.
 const WHOLE: f64 = 0.95;
 
-/// The greatest jerk of a motion that is shown time by time.
+/// The maximum jerk of a motion that is shown time by time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeakJerk {
     /// Times, s, and speeds, m/s: those of the window stand one after the other, the oldest first, and move on with it.
@@ -81,7 +82,7 @@ impl PeakJerk {
         self.speed(time_s, speed_m_s);
     }
 
-    /// The greatest size so far, m/s^3; none before there was a whole window of seven speeds.
+    /// The maximum magnitude so far, m/s^3; none before there was a whole window of seven speeds.
     pub fn peak_m_s3(&self) -> Option<f64> {
         self.peak_m_s3
     }
@@ -94,7 +95,7 @@ impl PeakJerk {
     fn point(&mut self, time_s: f64, speed_m_s: f64) {
         let points = &self.points[self.first..self.first + self.count];
         let old = points.iter().take_while(|(old_s, _)| *old_s < time_s - WINDOW_S - ROUNDING_S).count();
-        let out = old.max((self.count + 1).saturating_sub(MOST));
+        let out = old.max((self.count + 1).saturating_sub(MAXIMUM));
         (self.first, self.count) = (self.first + out, self.count - out);
         if self.first + self.count == ROOM {
             self.points.copy_within(self.first.., 0);
@@ -111,7 +112,7 @@ impl PeakJerk {
         self.count += 1;
         let points = &self.points[self.first..self.first + self.count];
         let derivative = if self.even.1 + 1 >= self.count { even_second_derivative } else { second_derivative };
-        if points.len() >= LEAST
+        if points.len() >= MINIMUM
             && time_s - points[0].0 >= WHOLE * WINDOW_S
             && let Some(jerk) = derivative(points)
         {
@@ -200,7 +201,7 @@ mod tests {
 
     #[test]
     fn even_times_have_the_parabola_of_any_times() {
-        for count in LEAST..=MOST {
+        for count in MINIMUM..=MAXIMUM {
             let speed = |i: usize| 30.0 + (0.7 * i as f64).sin() + 1e-3 * (i * i % 17) as f64;
             let points: Vec<(f64, f64)> = (0..count).map(|i| (100.0 + 0.01 * i as f64, speed(i))).collect();
             let [even, any] =

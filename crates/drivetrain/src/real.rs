@@ -163,19 +163,19 @@ pub trait Real:
         self * Self::of(core::f64::consts::PI / 180.0)
     }
 
-    /// The larger of this and `least`; `least` if this is NaN. Unlike `max`, which is a call of the mathematical library on a
-    /// controller, it says nothing for a `least` that is NaN.
+    /// The larger of this and `minimum`; `minimum` if this is NaN. Unlike `max`, which is a call of the mathematical library on a
+    /// controller, it says nothing for a `minimum` that is NaN.
     #[inline]
     #[must_use]
-    fn at_least(self, least: Self) -> Self {
-        if self > least { self } else { least }
+    fn at_least(self, minimum: Self) -> Self {
+        if self > minimum { self } else { minimum }
     }
 
-    /// The smaller of this and `most`; `most` if this is NaN.
+    /// The smaller of this and `maximum`; `maximum` if this is NaN.
     #[inline]
     #[must_use]
-    fn at_most(self, most: Self) -> Self {
-        if self < most { self } else { most }
+    fn at_most(self, maximum: Self) -> Self {
+        if self < maximum { self } else { maximum }
     }
 }
 

@@ -68,16 +68,16 @@ struct Axis<T, const N: usize> {
     bins_per_unit: T,
 }
 
-/// Whether these can be the breakpoints of an axis that holds at most `most` of them.
+/// Whether these can be the breakpoints of an axis that holds at most `maximum` of them.
 ///
 /// # Errors
 /// Too few or too many, not rising, or not finite.
-pub fn check_axis<T: Real>(points: &[T], most: usize) -> Result<(), TableError> {
+pub fn check_axis<T: Real>(points: &[T], maximum: usize) -> Result<(), TableError> {
     if points.len() < 2 {
         return Err(TableError::TooShort);
     }
-    if points.len() > most {
-        return Err(TableError::TooLong(most));
+    if points.len() > maximum {
+        return Err(TableError::TooLong(maximum));
     }
     if let Some(at) = points.iter().position(|x| !x.is_finite()) {
         return Err(TableError::NotFinite(at));
@@ -443,13 +443,13 @@ mod tests {
         for from in ends {
             for to in ends {
                 let (low, high) = table.range_from(&table.place(from), to);
-                let (least, most) = (from.min(to), from.max(to));
-                let between = axis.into_iter().filter(|x| (least..=most).contains(x)).chain([from, to]);
+                let (minimum, maximum) = (from.min(to), from.max(to));
+                let between = axis.into_iter().filter(|x| (minimum..=maximum).contains(x)).chain([from, to]);
                 let values = between.map(|x| table.at(x));
                 let expected =
                     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)]);
                 assert!((low - expected[0]).abs() < 1e-12 && (high - expected[1]).abs() < 1e-12, "{from} {to}");
-                assert_eq!(table.range_within(least, most), table.range_from(&table.place(least), most));
+                assert_eq!(table.range_within(minimum, maximum), table.range_from(&table.place(minimum), maximum));
             }
         }
     }

@@ -138,12 +138,12 @@ impl ScoredShift {
 }
 
 /// States that a drive keeps, unless more than half of them lie around its shifts: more than an hour every [`crate::SAMPLE_S`].
-pub const MOST_STATES: u32 = 400_000;
+pub const MAX_STATES: u32 = 400_000;
 
 /// A drive with its shifts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScoredDrive {
-    /// Every [`crate::SAMPLE_S`]; of a drive of more than [`MOST_STATES`] those that are kept: fewer where nothing happens.
+    /// Every [`crate::SAMPLE_S`]; of a drive of more than [`MAX_STATES`] those that are kept: fewer where nothing happens.
     pub states: Vec<DriveState>,
     /// Its shifts.
     pub shifts: Vec<ScoredShift>,
@@ -188,11 +188,11 @@ impl PassingShifts {
     pub(crate) fn state(&mut self, state: DriveState) {
         let states = &mut self.drive.states;
         states.push(state);
-        if states.len() >= (MOST_STATES as usize).max(2 * self.left) {
+        if states.len() >= (MAX_STATES as usize).max(2 * self.left) {
             let under_way = self.open.as_ref().map(|open| [open.time_s[0], f64::INFINITY]);
             let drawn = self.drive.shifts.iter().filter(|shift| shift.is_drawn);
             let shifts_s = drawn.map(|shift| shift.time_s).chain(under_way);
-            *states = thinned(states, shifts_s, MOST_STATES / 4);
+            *states = thinned(states, shifts_s, MAX_STATES / 4);
             self.left = states.len();
         }
     }
@@ -224,7 +224,7 @@ impl PassingShifts {
 
     /// Keeps what figures need of at most so many of the shifts that are wanted: those with the largest errors, of equal ones the first; where
     /// the truth is not known, those that are worth a look ([`crate::worth_a_look`]). In the end they are the same ones however often it is called.
-    pub(crate) fn draw_at_most(&mut self, most: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
+    pub(crate) fn draw_at_most(&mut self, maximum: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
         let shifts = &mut self.drive.shifts;
         for at in self.decided..shifts.len() {
             if is_wanted(&shifts[at]) {
@@ -234,17 +234,17 @@ impl PassingShifts {
             }
             self.has_truth |= shifts[at].has_truth();
             self.wanted += usize::from(self.drawn.last() == Some(&at));
-            if self.wanted > most && most > 0 && !self.has_truth {
+            if self.wanted > maximum && maximum > 0 && !self.has_truth {
                 let kept = chosen(shifts, &self.drawn);
                 let left = self.drawn.iter().filter(|place| !kept.contains(place));
                 left.for_each(|place| shifts[*place].leave_undrawn());
                 self.drawn = kept;
             }
-            if self.drawn.len() > most {
+            if self.drawn.len() > maximum {
                 let error = |place: &usize| shifts[self.drawn[*place]].worst_error_n_m();
                 // The first of equal ones is the last of these, which is left out.
-                let least = (0..self.drawn.len()).rev().min_by(|a, b| error(a).total_cmp(&error(b)));
-                if let Some(place) = least {
+                let minimum = (0..self.drawn.len()).rev().min_by(|a, b| error(a).total_cmp(&error(b)));
+                if let Some(place) = minimum {
                     shifts[self.drawn.remove(place)].leave_undrawn();
                 }
             }
@@ -440,15 +440,15 @@ mod tests {
     fn the_worst_shifts_stay_drawn_however_often_the_others_are_left_out() {
         let errors = [3.0, 1.0, 4.0, 1.0, 5.0, 9.0, 2.0, 6.0, 5.0, 3.0, 5.0];
         let is_wanted = |shift: &ScoredShift| shift.number != 6;
-        let drawn = |each: bool, most: usize| {
+        let drawn = |each: bool, maximum: usize| {
             let mut passing = PassingShifts::default();
             for (at, error_n_m) in errors.into_iter().enumerate() {
                 passing.drive.shifts.push(shift(at + 1, error_n_m));
                 if each {
-                    passing.draw_at_most(most, is_wanted);
+                    passing.draw_at_most(maximum, is_wanted);
                 }
             }
-            passing.draw_at_most(most, is_wanted);
+            passing.draw_at_most(maximum, is_wanted);
             let shifts = &passing.drive.shifts;
             assert!(shifts.iter().all(|shift| shift.is_drawn != shift.rows.is_empty() && shift.is_estimated()));
             shifts.iter().filter(|shift| shift.is_drawn).map(|shift| shift.number).collect::<Vec<_>>()
@@ -499,9 +499,9 @@ mod tests {
         };
         assert_eq!(drawn(true, 60), (1..=60).collect::<Vec<_>>());
         // The widest and the furthest with 17 usual ones each, the remarked one, and the first coasting one.
-        let most: Vec<usize> = (1..=17).chain([71, 83, 90, 95]).collect();
-        assert_eq!(drawn(true, 100), most);
-        assert_eq!(drawn(false, 100), most);
+        let maximum: Vec<usize> = (1..=17).chain([71, 83, 90, 95]).collect();
+        assert_eq!(drawn(true, 100), maximum);
+        assert_eq!(drawn(false, 100), maximum);
     }
 
     #[test]

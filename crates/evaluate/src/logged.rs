@@ -349,8 +349,8 @@ impl<'c> LoggedDrive<'c> {
 
     /// Keeps what figures need of at most so many of the shifts up to now that are wanted, those with the largest errors, or without truth those
     /// worth a look: called after each row, it bounds what is held of a long drive.
-    pub fn draw_at_most(&mut self, most: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
-        self.passing.draw_at_most(most, is_wanted);
+    pub fn draw_at_most(&mut self, maximum: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
+        self.passing.draw_at_most(maximum, is_wanted);
     }
 
     /// The drive.

@@ -8,9 +8,13 @@ const AROUND_S: f64 = 1.0;
 /// Leaves states out that say nothing of their own: those far from each shift, in the gear and with the health of the states before and
 /// after them. Of these so many stay, at most, evenly over the drive. `shifts_s` are the times from which to which the shifts last, in their order.
 /// What comes next may be another shift, so that the newest states are kept as well.
-pub(crate) fn thinned(states: &[DriveState], shifts_s: impl Iterator<Item = [f64; 2]>, most: u32) -> Vec<DriveState> {
+pub(crate) fn thinned(
+    states: &[DriveState],
+    shifts_s: impl Iterator<Item = [f64; 2]>,
+    maximum: u32,
+) -> Vec<DriveState> {
     let (Some(first), Some(last)) = (states.first(), states.last()) else { return Vec::new() };
-    let (apart_s, newest_s) = ((last.time_s - first.time_s) / f64::from(most), last.time_s - AROUND_S);
+    let (apart_s, newest_s) = ((last.time_s - first.time_s) / f64::from(maximum), last.time_s - AROUND_S);
     let says_nothing = |at: usize| {
         let same = |other: Option<&DriveState>| {
             other.is_some_and(|other| (other.gear, other.health) == (states[at].gear, states[at].health))

@@ -7,7 +7,7 @@ use crate::fitted_file::SIDES;
 /// Standard deviations in the error budget of a fitted file \[chosen: the ranges of `estimate` are to hold nearly always, not in 95 %
 /// of the cars\].
 pub(crate) const BUDGET_SIDES: f64 = 4.0;
-/// Least error of a converter's maps, as a fraction \[chosen\].
+/// Minimum error of a converter's maps, as a fraction \[chosen\].
 pub(crate) const CONVERTER_FRACTION_MIN: f64 = 0.03;
 /// What a line of the error budget says of itself.
 pub(crate) const BUDGET_COMMENT: &str =
@@ -19,23 +19,23 @@ pub(crate) fn factors(sd: f64, value: f64, given: [f64; 2]) -> [f64; 2] {
     // No wider than the whole of what was known before, however much is open of it.
     let known = Real::ln(given[1] / given[0]);
     let half = (BUDGET_SIDES * sd).min(known);
-    let [least, greatest] = given.map(|end| end / value);
+    let [minimum, maximum] = given.map(|end| end / value);
     let stated = half * SIDES / BUDGET_SIDES;
-    [Real::exp(-half).max(least.min(Real::exp(-stated))), Real::exp(half).min(greatest.max(Real::exp(stated)))]
+    [Real::exp(-half).max(minimum.min(Real::exp(-stated))), Real::exp(half).min(maximum.max(Real::exp(stated)))]
 }
 
-/// Least and greatest delay of a fitted valve, s, from its delays at the ends of the command, with so much open to each side.
+/// Minimum and maximum delay of a fitted valve, s, from its delays at the ends of the command, with so much open to each side.
 pub(crate) fn delays(at_ends_s: [f64; 2], half_s: f64) -> [f64; 2] {
     /// Longest delay of a valve that a file may have, s.
-    const MOST_S: f64 = 0.5;
+    const MAX_S: f64 = 0.5;
     let [one, other] = at_ends_s;
-    [(one.min(other) - half_s).max(0.0), (one.max(other) + half_s).min(MOST_S)]
+    [(one.min(other) - half_s).max(0.0), (one.max(other) + half_s).min(MAX_S)]
 }
 
-/// The same as a fraction on either side, of which `least` is always open.
-pub(crate) fn fraction(sd: f64, value: f64, given: f64, least: f64) -> f64 {
+/// The same as a fraction on either side, of which `minimum` is always open.
+pub(crate) fn fraction(sd: f64, value: f64, given: f64, minimum: f64) -> f64 {
     let known = given + (value - 1.0).abs();
-    (BUDGET_SIDES * sd).clamp(least, known.max(least))
+    (BUDGET_SIDES * sd).clamp(minimum, known.max(minimum))
 }
 
 #[cfg(test)]

@@ -18,8 +18,8 @@ use crate::{Series, Verdict};
 
 /// Pressure drop over the passages in a fast fill at which flows are compared, Pa \[chosen: as production gearboxes command it\].
 pub(crate) const FILL_DROP_PA: f64 = 0.15e6;
-/// Least standard deviation of a fitted fill volume: of slow and of fast flows, as passages and oil may be, one law has not both. Within 10 % of an
-/// orifice's area and 15 K the ratio of the flows at 20 and at 150 kPa has a standard deviation of 2 and of 4 %.
+/// Minimum standard deviation of a fitted fill volume: of slow and of fast flows, as passages and oil may be, one law has not both. Within
+/// 10 % of an orifice's area and 15 K the ratio of the flows at 20 and at 150 kPa has a standard deviation of 2 and of 4 %.
 const FILL_FLOOR: f64 = 0.04;
 /// What the preload of the spring may be off beside the kiss point, as a fraction \[chosen, as in the error budget\].
 const PRELOAD: f64 = 0.1;
@@ -27,7 +27,8 @@ const PRELOAD: f64 = 0.1;
 const SIDES: f64 = 3.0;
 /// Shifts that are looked at: one tells nearly what ten tell.
 const SHIFTS_MAX: usize = 5;
-/// Difference of the courses in the mean over that of the greatest and least reading, above which the pressure is not that of this clutch \[chosen\].
+/// Difference of the courses in the mean over that of the maximum and minimum reading, above which the pressure is not that of this clutch
+/// \[chosen\].
 const MISFIT: f64 = 0.1;
 const STEP_S: f64 = 0.002;
 /// Which measurement would tell a fill volume.
@@ -120,7 +121,7 @@ impl FillFit {
     }
 }
 
-/// A volume with the least difference of the courses, and that difference over the range of the readings.
+/// A volume with the minimum difference of the courses, and that difference over the range of the readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Found {
     log_volume: f64,
@@ -169,8 +170,8 @@ impl FillLog<'_> {
             step /= f64::from(FINE);
             found = best(&around(found.log_volume, FINE, step));
         }
-        let ends = self.readings().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], (_, pressure)| {
-            [least.min(pressure), most.max(pressure)]
+        let ends = self.readings().fold([f64::INFINITY, f64::NEG_INFINITY], |[minimum, maximum], (_, pressure)| {
+            [minimum.min(pressure), maximum.max(pressure)]
         });
         Found { difference: found.difference / (ends[1] - ends[0]).max(f64::MIN_POSITIVE), ..found }
     }
@@ -207,9 +208,9 @@ pub(crate) fn fill_sd(cylinder: &Cylinder<f64>, budget: &FillBudget<f64>) -> f64
 /// When the fill of a clutch begins: the first command that asks for half of the preload or more, with the next one; none where the commands begin within
 /// it.
 pub(crate) fn fill_begin_s(hydraulics: &Hydraulics, cylinder: &Cylinder<f64>, commands: &Series) -> Option<f64> {
-    let least_pa = 0.5 * cylinder.preload_pa;
+    let min_pa = 0.5 * cylinder.preload_pa;
     let asks: Vec<bool> =
-        commands.value.iter().map(|command| hydraulics.valve.settled_pressure(*command) >= least_pa).collect();
+        commands.value.iter().map(|command| hydraulics.valve.settled_pressure(*command) >= min_pa).collect();
     // One reading alone is noise.
     let first = asks.windows(2).position(|pair| pair[0] && pair[1])?;
     (first > 0).then(|| commands.time_s[first])

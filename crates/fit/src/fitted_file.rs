@@ -30,8 +30,8 @@ impl Fit {
         self.write_fill(&mut text, vehicle, &oncoming)?;
         if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
             text.put(&["driveline"], "backlash_rad", backlash.rad, &backlash.comment())?;
-            let most_rad = (backlash.rad + BUDGET_SIDES * backlash.sd_rad).min(backlash::MOST_RAD);
-            text.put(&["design", "error_bounds"], "backlash_rad", most_rad, BUDGET_COMMENT)?;
+            let max_rad = (backlash.rad + BUDGET_SIDES * backlash.sd_rad).min(backlash::MAX_RAD);
+            text.put(&["design", "error_bounds"], "backlash_rad", max_rad, BUDGET_COMMENT)?;
         }
         self.write_budget(&mut text, vehicle)?;
         let logs = logs.replace(char::is_control, " ");
@@ -97,8 +97,8 @@ impl Fit {
         if parameter == Parameter::Hysteresis {
             return format!("95 % +- {:.1} kPa, {told}", 1e-3 * SIDES * HYSTERESIS_UNIT_PA * sd);
         }
-        let (least, greatest) = (value * Real::exp(-SIDES * sd), value * Real::exp(SIDES * sd));
-        format!("x {value:.3}, 95 % {least:.3} to {greatest:.3}, {told}")
+        let (minimum, maximum) = (value * Real::exp(-SIDES * sd), value * Real::exp(SIDES * sd));
+        format!("x {value:.3}, 95 % {minimum:.3} to {maximum:.3}, {told}")
     }
 
     /// The error budget: what the fit leaves open of each parameter.
@@ -141,8 +141,8 @@ impl Fit {
         let known_kg = given.mass_kg + (mass - vehicle.road.mass_kg).abs();
         set(bound("mass_kg"), &[(half(&[Parameter::Mass]) * mass).min(known_kg)])?;
         if let Some(hysteresis_pa) = self.value(P::Hysteresis) {
-            let most_pa = hysteresis_pa + HYSTERESIS_UNIT_PA * half(&[P::Hysteresis]);
-            set(bound("valve_hysteresis_pa"), &[most_pa.min(given.valve_hysteresis_pa.max(hysteresis_pa))])?;
+            let max_pa = hysteresis_pa + HYSTERESIS_UNIT_PA * half(&[P::Hysteresis]);
+            set(bound("valve_hysteresis_pa"), &[max_pa.min(given.valve_hysteresis_pa.max(hysteresis_pa))])?;
         }
         if let Some(delay_s) = self.value(Parameter::CommandDelay) {
             let half_s = crate::parameters::DELAY_UNIT_S * half(&[Parameter::CommandDelay]);
@@ -182,10 +182,10 @@ impl Fit {
     fn preload_factor(&self, vehicle: &VehicleFile) -> f64 {
         /// Most of the force at the kiss point that it may become \[chosen: the limits of the error budget, 10 % to each side, stay below those of
         /// the kiss point\].
-        const MOST: f64 = 0.9;
+        const MAXIMUM: f64 = 0.9;
         let cylinder = &vehicle.oncoming.cylinder;
-        let most = MOST * cylinder.kiss_pa / cylinder.preload_pa;
-        self.fill.map_or(1.0, |fill| fill.preload_factor()).min(most.max(1.0))
+        let maximum = MAXIMUM * cylinder.kiss_pa / cylinder.preload_pa;
+        self.fill.map_or(1.0, |fill| fill.preload_factor()).min(maximum.max(1.0))
     }
 
     /// The limits of the piston's stroke: pressures move with the spring, the volume has what the fit leaves open of it.
@@ -251,11 +251,11 @@ fn write_clutch(
 
 /// What a fitted fill volume says of itself.
 pub(crate) fn fill_comment(fill: &FillFit) -> String {
-    let [least, value, most] = [-SIDES, 0.0, SIDES].map(|sides| Real::exp(fill.log_volume + sides * fill.sd[0]));
+    let [minimum, value, maximum] = [-SIDES, 0.0, SIDES].map(|sides| Real::exp(fill.log_volume + sides * fill.sd[0]));
     match fill.verdict() {
         Verdict::NotTold => format!("as in the given file: {}", Verdict::NotTold.name()),
         told => format!(
-            "fill volume x {value:.3}, 95 % {least:.3} to {most:.3}, {}; by the flow of the passages of this file",
+            "fill volume x {value:.3}, 95 % {minimum:.3} to {maximum:.3}, {}; by the flow of the passages of this file",
             told.name()
         ),
     }

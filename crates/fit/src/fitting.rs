@@ -29,9 +29,9 @@ pub const SHIFTS_MAX: usize = 30;
 const FIRST_SHIFTS: usize = 5;
 
 /// On these; on all shifts, with all shapes free; and with those bound that the shifts do not ask for.
-const FIRST: Iterations = Iterations { reweighted: 3, most: 5, decrease: 0.5 };
-const FREE: Iterations = Iterations { reweighted: 3, most: 14, decrease: 0.5 };
-const BOUND: Iterations = Iterations { reweighted: 1, most: 14, decrease: DECREASE };
+const FIRST: Iterations = Iterations { reweighted: 3, maximum: 5, decrease: 0.5 };
+const FREE: Iterations = Iterations { reweighted: 3, maximum: 14, decrease: 0.5 };
+const BOUND: Iterations = Iterations { reweighted: 1, maximum: 14, decrease: DECREASE };
 /// That with which a fit ends.
 pub(crate) const DECREASE: f64 = 0.1;
 
@@ -374,8 +374,8 @@ fn release(priors: &mut [Prior], held: &[Held]) {
 }
 
 /// At most so many of the shifts, evenly over all.
-fn spread_over(shifts: &[ShiftRecord], most: usize) -> impl Iterator<Item = ShiftRecord> + '_ {
-    let count = most.min(shifts.len());
+fn spread_over(shifts: &[ShiftRecord], maximum: usize) -> impl Iterator<Item = ShiftRecord> + '_ {
+    let count = maximum.min(shifts.len());
     (0..count).map(move |i| shifts[i * shifts.len() / count].clone())
 }
 

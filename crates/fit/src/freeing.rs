@@ -48,8 +48,8 @@ pub(crate) fn differing(priors: &[Prior], unknowns: &[f64], stated: &DMatrix<f64
             let size = x.dot(&(inverse * x));
             (freedom + 2.0) * Real::ln_1p(size / freedom) - Real::ln(before / of.determinant())
         };
-        let least = free.iter().enumerate().min_by(|one, other| evidence(one.1).total_cmp(&evidence(other.1)));
-        let Some((place, bound)) = least.filter(|(_, map)| evidence(map) <= 0.0) else { break };
+        let minimum = free.iter().enumerate().min_by(|one, other| evidence(one.1).total_cmp(&evidence(other.1)));
+        let Some((place, bound)) = minimum.filter(|(_, map)| evidence(map) <= 0.0) else { break };
         let columns = covariance.select_columns(&bound.1);
         let (x, of) = chosen(&at, &covariance, bound.1);
         let gain = of.try_inverse().map(|inverse| &columns * DMatrix::from_column_slice(2, 2, inverse.as_slice()));

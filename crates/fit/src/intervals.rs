@@ -15,7 +15,7 @@ use crate::shape::Map;
 use crate::solver::Normal;
 use crate::weights::FACTOR;
 
-/// Least standard deviation of the zero offset of a pressure sensor, Pa \[chosen: what a valve at rest may leave in an open clutch\].
+/// Minimum standard deviation of the zero offset of a pressure sensor, Pa \[chosen: what a valve at rest may leave in an open clutch\].
 pub(crate) const OFFSET_FLOOR_PA: f64 = 500.0;
 
 /// What is known of the parameters after a fit.
@@ -56,13 +56,13 @@ impl Precision {
 
     /// Standard deviation of a combination of unknowns as it is stated.
     pub(crate) fn combination_sd(&self, along: &DVector<f64>) -> f64 {
-        /// Least one: what the model leaves out does not shrink with more shifts.
+        /// Minimum one: what the model leaves out does not shrink with more shifts.
         const FLOOR: f64 = 0.005;
         Real::hypot(along.dot(&(&self.auto * along)).max(0.0).sqrt(), FLOOR)
     }
 }
 
-/// Least standard deviation of a parameter: what the model leaves out does not shrink with more shifts.
+/// Minimum standard deviation of a parameter: what the model leaves out does not shrink with more shifts.
 pub(crate) fn floor(parameter: Parameter) -> f64 {
     match parameter {
         Parameter::Inertia(_) | Parameter::Stiffness => 0.015,

@@ -37,7 +37,7 @@ pub(crate) trait Objective {
     /// The parameters of a point.
     fn parameters<'a>(&self, point: &'a Self::Point) -> &'a [f64];
 
-    /// Least and greatest value of a parameter.
+    /// Minimum and maximum value of a parameter.
     fn limits(&self, place: usize) -> [f64; 2];
 
     /// Takes the weights that a point asks for; the point with them.
@@ -71,7 +71,7 @@ pub(crate) struct Iterations {
     /// Steps after each of which the weights follow the residuals.
     pub(crate) reweighted: u32,
     /// All of them.
-    pub(crate) most: u32,
+    pub(crate) maximum: u32,
     /// The step that is expected to lower the cost by no more than this is the last one. From a minimum to a standard deviation of `d` away the
     /// cost grows by `d^2/2`.
     pub(crate) decrease: f64,
@@ -95,12 +95,12 @@ pub(crate) fn minimised<O: Objective>(
 ) -> Result<Minimum<O>, FitError> {
     let (mut done, mut reweighted) = (0, 0);
     loop {
-        let most = if reweighted < iterations.reweighted { done + 1 } else { iterations.most };
+        let maximum = if reweighted < iterations.reweighted { done + 1 } else { iterations.maximum };
         let cost = objective.cost(&at);
         if !cost.is_finite() {
             return Err(objective.not_finite());
         }
-        let start = Search::new(objective, at, [done, most], iterations.decrease, progress);
+        let start = Search::new(objective, at, [done, maximum], iterations.decrease, progress);
         // At kinks of the model, such as the kiss point, steps go to and fro around a minimum: there the crate ends the search.
         let solver = LevenbergMarquardt::new().with_ftol(iterations.decrease / cost);
         let (end, report) = solver.minimize(start);
@@ -116,10 +116,10 @@ pub(crate) fn minimised<O: Objective>(
             TerminationReason::Numerical(_) => return Err(objective.not_finite()),
             _ => true,
         };
-        if reweighted < iterations.reweighted && done < iterations.most {
+        if reweighted < iterations.reweighted && done < iterations.maximum {
             reweighted += 1;
             at = objective.reweighted(at);
-        } else if is_converged || done >= iterations.most {
+        } else if is_converged || done >= iterations.maximum {
             return Ok(Minimum { at, line: base.line, is_converged });
         }
     }
@@ -149,7 +149,7 @@ struct Search<'a, O: Objective> {
     base: RefCell<Option<Base<O>>>,
     /// Steps that were begun, and how many may be.
     done: Cell<u32>,
-    most: u32,
+    maximum: u32,
     /// Expected decrease of the cost with which a step is the last one.
     decrease: f64,
     error: RefCell<Option<FitError>>,
@@ -160,7 +160,7 @@ impl<'a, O: Objective> Search<'a, O> {
     fn new(
         objective: &'a O,
         at: O::Point,
-        [done, most]: [u32; 2],
+        [done, maximum]: [u32; 2],
         decrease: f64,
         progress: &'a mut dyn FnMut(u32),
     ) -> Self {
@@ -175,7 +175,7 @@ impl<'a, O: Objective> Search<'a, O> {
             unknowns,
             base: RefCell::new(None),
             done: Cell::new(done),
-            most,
+            maximum,
             decrease,
             error: RefCell::new(None),
             progress: RefCell::new(progress),
@@ -202,8 +202,8 @@ impl<'a, O: Objective> Search<'a, O> {
             let factor = information.clone().cholesky().ok_or_else(|| self.objective.not_finite())?;
             let step = -factor.solve(&gradient);
             let leaves = |j: usize| {
-                let [least, greatest] = self.objective.limits(j);
-                (parameters[j] <= least && step[j] < 0.0) || (parameters[j] >= greatest && step[j] > 0.0)
+                let [minimum, maximum] = self.objective.limits(j);
+                (parameters[j] <= minimum && step[j] < 0.0) || (parameters[j] >= maximum && step[j] > 0.0)
             };
             let leaving: Vec<usize> = (0..count).filter(|j| !held.contains(j) && leaves(*j)).collect();
             if leaving.is_empty() {
@@ -252,8 +252,8 @@ impl<O: Objective> LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, O> {
         }
         let count = unknowns.len() - 1;
         let limited = |j: usize| {
-            let [least, greatest] = self.objective.limits(j);
-            unknowns[j].clamp(least, greatest)
+            let [minimum, maximum] = self.objective.limits(j);
+            unknowns[j].clamp(minimum, maximum)
         };
         let parameters = (0..count).map(limited).collect();
         let way = unknowns[count] - base.unknowns[count];
@@ -276,7 +276,7 @@ impl<O: Objective> LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, O> {
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
         let was_last = self.base.borrow().as_ref().is_some_and(|base| base.expected <= self.decrease);
-        if was_last || self.done.get() >= self.most || self.is_limited() {
+        if was_last || self.done.get() >= self.maximum || self.is_limited() {
             return None;
         }
         (self.progress.borrow_mut())(self.done.get());
@@ -301,14 +301,14 @@ mod tests {
 
     /// Residuals `1 - x`, `x + z - 3`, 1 and, with an own unknown `w`, `10 (w - x^2)`: Rosenbrock's valley.
     struct Valley {
-        most_z: f64,
+        max_z: f64,
         /// Beyond this the cost cannot be computed.
         end_x: f64,
         reweighted: u32,
     }
 
-    const VALLEY: Valley = Valley { most_z: 10.0, end_x: 10.0, reweighted: 0 };
-    const LONG: Iterations = Iterations { reweighted: 0, most: 30, decrease: 1e-12 };
+    const VALLEY: Valley = Valley { max_z: 10.0, end_x: 10.0, reweighted: 0 };
+    const LONG: Iterations = Iterations { reweighted: 0, maximum: 30, decrease: 1e-12 };
 
     impl Objective for Valley {
         type Point = ([f64; 2], f64);
@@ -320,7 +320,7 @@ mod tests {
         }
 
         fn limits(&self, place: usize) -> [f64; 2] {
-            [-10.0, [10.0, self.most_z][place]]
+            [-10.0, [10.0, self.max_z][place]]
         }
 
         fn reweighted(&mut self, point: Self::Point) -> Self::Point {
@@ -389,7 +389,7 @@ mod tests {
 
     #[test]
     fn a_parameter_at_its_limit_is_held_and_the_others_are_best_with_it() {
-        let mut valley = Valley { most_z: 1.0, ..VALLEY };
+        let mut valley = Valley { max_z: 1.0, ..VALLEY };
         let end = minimised(&mut valley, ([-1.2, -5.0], 1.0), LONG, &mut |_| {}).unwrap();
         let ([x, z], w) = end.at;
         assert_eq!(z, 1.0);
@@ -409,9 +409,9 @@ mod tests {
     #[test]
     fn weights_follow_so_many_steps_and_no_more_steps_are_made_than_allowed() {
         // The first step ends at the x of the minimum and beside its w, the second one at the minimum.
-        for (reweighted, most, expected) in [(3, 5, (3, 4, true)), (1, 2, (1, 2, false)), (1, 1, (0, 1, false))] {
+        for (reweighted, maximum, expected) in [(3, 5, (3, 4, true)), (1, 2, (1, 2, false)), (1, 1, (0, 1, false))] {
             let (mut valley, mut steps) = (VALLEY, 0);
-            let few = Iterations { reweighted, most, decrease: 1e-12 };
+            let few = Iterations { reweighted, maximum, decrease: 1e-12 };
             let end = minimised(&mut valley, ([-1.2, 5.0], 40.0), few, &mut |_| steps += 1).unwrap();
             assert_eq!((valley.reweighted, steps, end.is_converged), expected);
         }

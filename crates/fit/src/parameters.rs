@@ -162,7 +162,7 @@ pub struct Prior {
     pub mean: f64,
     /// Standard deviation.
     pub sd: f64,
-    /// Least one that is stated after a fit: what the model leaves out does not shrink with more logs.
+    /// Minimum one that is stated after a fit: what the model leaves out does not shrink with more logs.
     pub floor: f64,
 }
 
@@ -170,10 +170,13 @@ pub struct Prior {
 pub(crate) const POSSIBLE: f64 = 4.0;
 
 impl Prior {
-    /// Least and greatest value that is held possible.
+    /// Minimum and maximum value that is held possible.
     pub(crate) fn limits(&self) -> [f64; 2] {
-        let least = self.mean - POSSIBLE * self.sd;
-        [if self.parameter == Parameter::Hysteresis { least.max(0.0) } else { least }, self.mean + POSSIBLE * self.sd]
+        let minimum = self.mean - POSSIBLE * self.sd;
+        [
+            if self.parameter == Parameter::Hysteresis { minimum.max(0.0) } else { minimum },
+            self.mean + POSSIBLE * self.sd,
+        ]
     }
 
     /// Whether a value is at its limit.
@@ -229,8 +232,8 @@ fn uniform(fraction: f64) -> f64 {
 }
 
 /// The standard deviation of the logarithm of a factor that lies anywhere between these.
-pub(crate) fn between([least, greatest]: [f64; 2]) -> f64 {
-    (Real::ln(greatest / least) / 12.0_f64.sqrt()).max(1e-3)
+pub(crate) fn between([minimum, maximum]: [f64; 2]) -> f64 {
+    (Real::ln(maximum / minimum) / 12.0_f64.sqrt()).max(1e-3)
 }
 
 /// The parameters of a fit with their priors, from the error budget of the vehicle file; what it does not have is \[chosen\].
@@ -238,7 +241,7 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
     use Parameter as P;
     let budget = &vehicle.error_bounds;
     let delay = |seconds: f64| (seconds / DELAY_UNIT_S).max(0.05);
-    let [least_s, greatest_s] = budget.valve_delay_s;
+    let [min_s, max_s] = budget.valve_delay_s;
     let mut list = vec![
         (P::Capacity, "converter capacity", 0.0, uniform(budget.turbine_torque_share)),
         (P::TorqueRatio, "converter torque ratio above 1", 0.0, uniform(0.1)),
@@ -248,7 +251,7 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
         (P::Spring, "return spring", 0.0, uniform(0.2)),
         (P::Gain, "valve gain", 0.0, between(budget.valve_gain_factor)),
         (P::Lag, "valve lag", 0.0, between(budget.valve_lag_factor)),
-        (P::CommandDelay, "delay of the command", 0.0, delay((greatest_s - least_s) / 12.0_f64.sqrt())),
+        (P::CommandDelay, "delay of the command", 0.0, delay((max_s - min_s) / 12.0_f64.sqrt())),
     ];
     let mut names: Vec<String> = list.iter().map(|(_, name, ..)| (*name).to_owned()).collect();
     for (i, shaft) in shafts.iter().enumerate() {
@@ -261,8 +264,9 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
         (P::Tyre, "tyre slip", 0.0, uniform(0.25)),
         (P::Mass, "vehicle mass", 0.0, uniform(budget.mass_kg / vehicle.road.mass_kg)),
     ];
-    let [file, most] = [vehicle.oncoming.hysteresis_pa, budget.valve_hysteresis_pa].map(|pa| pa / HYSTERESIS_UNIT_PA);
-    more.push((P::Hysteresis, "valve hysteresis, half-width", file, uniform(most).max(0.02)));
+    let [file, maximum] =
+        [vehicle.oncoming.hysteresis_pa, budget.valve_hysteresis_pa].map(|pa| pa / HYSTERESIS_UNIT_PA);
+    more.push((P::Hysteresis, "valve hysteresis, half-width", file, uniform(maximum).max(0.02)));
     if has.offgoing {
         more.push((P::OffgoingFriction, "friction of the offgoing clutch", 0.0, between(budget.friction_factor)));
     }

@@ -283,9 +283,9 @@ mod tests {
         let slow = at_rate(0.1);
         for rate in [0.01, 0.001] {
             let fast = at_rate(rate);
-            let most = slow.iter().zip(&fast).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let maximum = slow.iter().zip(&fast).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             // Steps are cut at every arrival, which changes the integral by some pascals.
-            assert!(most < 50.0 && fast[139] > 30e3, "{rate}: {most}");
+            assert!(maximum < 50.0 && fast[139] > 30e3, "{rate}: {maximum}");
         }
     }
 

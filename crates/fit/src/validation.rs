@@ -85,7 +85,7 @@ impl Fit {
         let problem = Problem { file: &car, shafts: &shafts, priors: &[], drives: &Drives::NONE };
         let own = models.iter().map(ShiftModel::start).collect();
         let start = Unknowns { shared: Vec::new(), own, drives: Vec::new() };
-        const STARTS: Iterations = Iterations { reweighted: 0, most: 6, decrease: DECREASE };
+        const STARTS: Iterations = Iterations { reweighted: 0, maximum: 6, decrease: DECREASE };
         let at = problem.solve(&models, start, self.weights.clone(), STARTS, &mut |_| {})?.at;
         let residuals = problem.residuals(&models, &at);
         let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {

@@ -114,7 +114,7 @@ impl ChannelWeights {
     }
 }
 
-/// The gain with which residuals have the least one-step errors, and the scale of these; none without residuals.
+/// The gain with which residuals have the minimum one-step errors, and the scale of these; none without residuals.
 pub(crate) fn gain_and_scale(blocks: &[&[f64]]) -> Option<(f64, f64)> {
     let found = GAINS.into_iter().map(|gain| (gain, spread(blocks, gain)));
     let (gain, (_, scale)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;

@@ -27,8 +27,8 @@ fn a_backlash_lies_in_its_interval_and_goes_into_the_file() {
     assert!(said.contains("backlash of the driveline: 0.0") && said.contains("from 4 reversals"), "{said}");
     let file = fit.vehicle_file(&car.file, "a simulation").unwrap();
     assert!((file.backlash_rad / found.rad - 1.0).abs() < 1e-3, "{}", file.backlash_rad);
-    let most = found.rad + 4.0 * found.sd_rad;
-    assert!((file.error_bounds.backlash_rad / most - 1.0).abs() < 1e-3, "{}", file.error_bounds.backlash_rad);
+    let maximum = found.rad + 4.0 * found.sd_rad;
+    assert!((file.error_bounds.backlash_rad / maximum - 1.0).abs() < 1e-3, "{}", file.error_bounds.backlash_rad);
     // The same drive once more.
     let twice = [driving.clone(), driving].concat();
     assert_eq!(fitted(&car, &shifts, &twice).backlash, fit.backlash);

@@ -127,9 +127,9 @@ fn torque_and_work_of_a_shift_are_within_their_range() {
     let times: Vec<f64> = (0..70_u32).map(|i| 4.505 + 0.01 * f64::from(i)).collect();
     let mean = times.iter().map(|t| clutches(*t)).sum::<f64>() / 70.0;
     let work: f64 = times.iter().map(|t| 0.01 * clutches(*t) * turbine(*t) * (1.0 - 2.0 / 2.5)).sum();
-    let ([low, _, high], [least, _, most]) = (found.mean_n_m.unwrap(), found.work_j.unwrap());
+    let ([low, _, high], [minimum, _, maximum]) = (found.mean_n_m.unwrap(), found.work_j.unwrap());
     assert!(low < mean && mean < high && high - low < 0.6 * mean, "{low} {mean} {high}");
-    assert!(least < work && work < most, "{least} {work} {most}");
+    assert!(minimum < work && work < maximum, "{minimum} {work} {maximum}");
     assert_eq!((found.reduction, found.no_slip_fraction), (None, 0.0));
 }
 

@@ -31,7 +31,7 @@ fn a_pressure_in_one_shift_tells_the_fill_volume_and_the_file_gets_it() {
     assert!((volumes[1] / volumes[0] / fill.log_volume.exp() - 1.0).abs() < 1e-3, "{volumes:?}");
     // The limits of the stroke contain the true volume and are narrower.
     let limits = [&car.file, &file].map(|vehicle| vehicle.error_bounds.fill.unwrap().volume_m3);
-    let width = limits.map(|[least, most]| (most / least).ln());
+    let width = limits.map(|[minimum, maximum]| (maximum / minimum).ln());
     assert!(width[1] < width[0], "{limits:?}");
     assert!((limits[1][0]..limits[1][1]).contains(&(car.fill * volumes[0])), "{limits:?} {}", car.fill * volumes[0]);
     // A file that leaves the cylinder at its defaults gets a table of its own.

@@ -176,9 +176,9 @@ fn swap_words(text: &mut Vec<u8>, random: &mut Random) {
 fn replace_separators(text: &mut [u8], random: &mut Random) {
     let separators = *b",;=\t .[]\"\n";
     let (from, to) = (*random.of(&separators), *random.of(&separators));
-    let most = *random.of(&[1, 3, usize::MAX]);
+    let maximum = *random.of(&[1, 3, usize::MAX]);
     let start = random.below(text.len());
-    text[start..].iter_mut().filter(|byte| **byte == from).take(most).for_each(|byte| *byte = to);
+    text[start..].iter_mut().filter(|byte| **byte == from).take(maximum).for_each(|byte| *byte = to);
 }
 
 fn insert(text: &mut Vec<u8>, random: &mut Random) {

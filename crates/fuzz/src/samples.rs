@@ -11,7 +11,7 @@ use crate::mutate::Random;
 /// Sample time of designed gains, s.
 const SAMPLE_S: f64 = 0.01;
 /// Most samples of an input.
-const MOST_SAMPLES: usize = 80;
+const MAX_SAMPLES: usize = 80;
 /// Numbers of a sample.
 const NUMBERS: usize = 7;
 /// Bytes of a number.
@@ -147,7 +147,7 @@ pub(crate) fn input(random: &mut Random) -> Vec<u8> {
     let ranges = [(1e-4, 0.04), (80.0, 500.0), (0.0, 400.0), (0.0, 180.0), (0.0, 60.0), (0.0, 1.0), (0.0, 0.02)];
     let mut now: [f64; NUMBERS] = [0.01, 380.0, 340.0, 159.0, 53.0, 0.25, 0.0];
     let mut bytes = Vec::new();
-    for _ in 0..=random.below(MOST_SAMPLES) {
+    for _ in 0..=random.below(MAX_SAMPLES) {
         for (value, (low, high)) in now.iter_mut().zip(ranges) {
             *value = match random.below(40) {
                 0 => low + (high - low) * random.fraction(),

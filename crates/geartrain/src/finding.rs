@@ -40,8 +40,8 @@ pub struct Finding {
 pub enum Fault {
     #[error("there are none")]
     None,
-    #[error("there are {count}, at most {most} are possible")]
-    TooMany { count: usize, most: usize },
+    #[error("there are {count}, at most {maximum} are possible")]
+    TooMany { count: usize, maximum: usize },
     #[error("two entries have the name \"{0}\"")]
     Repeated(String),
     #[error("\"{HOUSING}\" is the gearbox housing, which does not rotate")]

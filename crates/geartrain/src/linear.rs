@@ -63,7 +63,7 @@ pub(crate) fn null_space(rows: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// The smallest solution of `A x = b`, and whether it is the only one. `None` if there is no solution.
-pub(crate) fn least_norm(rows: &DMatrix<f64>, right: &DVector<f64>) -> Option<(DVector<f64>, bool)> {
+pub(crate) fn min_norm(rows: &DMatrix<f64>, right: &DVector<f64>) -> Option<(DVector<f64>, bool)> {
     let eliminated = Eliminated::of(rows, right);
     let unknowns = rows.ncols();
     let rest = |row: usize| eliminated.matrix[(row, unknowns)];
@@ -98,20 +98,20 @@ mod tests {
     #[test]
     fn of_many_solutions_the_smallest_is_taken() {
         let rows = DMatrix::from_row_slice(1, 2, &[1.0, 1.0]);
-        let (solution, only) = least_norm(&rows, &DVector::from_element(1, 2.0)).unwrap();
+        let (solution, only) = min_norm(&rows, &DVector::from_element(1, 2.0)).unwrap();
         assert!((solution - DVector::from_element(2, 1.0)).amax() < 1e-12 && !only);
     }
 
     #[test]
     fn equations_that_contradict_each_other_have_no_solution() {
         let rows = DMatrix::from_row_slice(2, 1, &[1.0, 1.0]);
-        assert_eq!(least_norm(&rows, &DVector::from_row_slice(&[1.0, 2.0])), None);
+        assert_eq!(min_norm(&rows, &DVector::from_row_slice(&[1.0, 2.0])), None);
     }
 
     #[test]
     fn without_equations_or_unknowns_nothing_is_determined_or_asked() {
         assert_eq!(null_space(&DMatrix::zeros(0, 3)).ncols(), 3);
         assert_eq!(null_space(&DMatrix::zeros(2, 0)).ncols(), 0);
-        assert!(least_norm(&DMatrix::zeros(1, 0), &DVector::zeros(1)).is_some_and(|(_, only)| only));
+        assert!(min_norm(&DMatrix::zeros(1, 0), &DVector::zeros(1)).is_some_and(|(_, only)| only));
     }
 }

@@ -6,7 +6,7 @@ use crate::teeth;
 use crate::train::{Connection, GearTrain, Member, TrainElement};
 
 /// More parts of a kind than this are a mistake; the work grows with the cube of their number.
-const MOST: usize = 32;
+const MAXIMUM: usize = 32;
 
 /// Numbers of teeth.
 const TEETH: std::ops::RangeInclusive<u32> = 1..=10_000;
@@ -21,7 +21,7 @@ pub(crate) fn names<'n>(
     let about = |fault| Err(Finding { part: list.0, key: list.1, fault });
     match count {
         0 => return about(Fault::None),
-        _ if count > MOST => return about(Fault::TooMany { count, most: MOST }),
+        _ if count > MAXIMUM => return about(Fault::TooMany { count, maximum: MAXIMUM }),
         _ => (),
     }
     for (at, name) in names.clone().enumerate() {
@@ -90,8 +90,8 @@ pub(crate) fn train(diagram: &StickDiagram) -> Result<(GearTrain, Vec<Finding>),
         _ => shaft(part, key, name).map(Member::Shaft),
     };
     for (list, count) in [("planetary_set", diagram.sets.len()), ("gear_pair", diagram.pairs.len())] {
-        if count > MOST {
-            return Err(Finding { part: Part::Gearbox, key: list, fault: Fault::TooMany { count, most: MOST } });
+        if count > MAXIMUM {
+            return Err(Finding { part: Part::Gearbox, key: list, fault: Fault::TooMany { count, maximum: MAXIMUM } });
         }
     }
     let (sets, unusual) = sets(diagram, member)?;

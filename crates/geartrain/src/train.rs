@@ -8,7 +8,7 @@ use drivetrain::{Clutch, ReducedShift};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use crate::description::{ElementKind, GearPair, PlanetarySet, Planets, Shaft};
-use crate::linear::{least_norm, null_space};
+use crate::linear::{min_norm, null_space};
 
 /// A speed or a coefficient below this is zero; shaft speeds are of the order of the turbine speed.
 pub(crate) const ZERO: f64 = 1e-9;
@@ -205,7 +205,7 @@ impl GearTrain {
     /// For every motion `N` the power is zero: `N' (e_in - i e_out - K' T) = 0`.
     pub fn holding_torques(&self, engaged: &[usize], ratio: f64) -> Option<(Vec<f64>, bool)> {
         let force = self.basis.row(self.input) - self.basis.row(self.output) * ratio;
-        let (torques, only) = least_norm(&self.slips(engaged).transpose(), &force.transpose())?;
+        let (torques, only) = min_norm(&self.slips(engaged).transpose(), &force.transpose())?;
         Some((torques.as_slice().to_vec(), only))
     }
 

@@ -34,7 +34,7 @@ fn empty_lists_are_refused() {
 
 #[test]
 fn more_parts_than_a_gearbox_has_are_refused() {
-    let too_many = Fault::TooMany { count: 50, most: 32 };
+    let too_many = Fault::TooMany { count: 50, maximum: 32 };
     let many = |d: &mut StickDiagram| d.shafts = (0..50).map(|i| shaft(&format!("s{i}"), 0.01)).collect();
     assert_finding(&wrong(many), Part::Gearbox, "shaft", &too_many);
     let many = |d: &mut StickDiagram| d.sets = vec![d.sets[0].clone(); 50];

@@ -5,7 +5,7 @@ use std::ffi::{c_char, c_int};
 use nalgebra::{Cholesky, DMatrix, RealField, SVD, SymmetricEigen};
 
 /// Iterations after which a decomposition counts as failed; they need a few per row.
-const MOST_ITERATIONS: usize = 10_000;
+const MAX_ITERATIONS: usize = 10_000;
 
 /// A size that a caller passed; negative ones become empty.
 pub(crate) fn size(n: c_int) -> usize {
@@ -91,7 +91,7 @@ pub(crate) fn cholesky<T: RealField + Copy>(matrix: DMatrix<T>) -> Option<DMatri
 /// Eigenvalues in rising order and their vectors as columns.
 pub(crate) fn eigen<T: RealField + Copy>(matrix: DMatrix<T>) -> Option<(DMatrix<T>, DMatrix<T>)> {
     let n = matrix.nrows();
-    let eigen = SymmetricEigen::try_new(matrix, T::default_epsilon(), MOST_ITERATIONS)?;
+    let eigen = SymmetricEigen::try_new(matrix, T::default_epsilon(), MAX_ITERATIONS)?;
     let mut order: Vec<usize> = (0..n).collect();
     order
         .sort_by(|&a, &b| eigen.eigenvalues[a].partial_cmp(&eigen.eigenvalues[b]).unwrap_or(std::cmp::Ordering::Equal));
@@ -102,7 +102,7 @@ pub(crate) fn eigen<T: RealField + Copy>(matrix: DMatrix<T>) -> Option<(DMatrix<
 
 /// Compact singular value decomposition `(U, s, V')`, singular values falling.
 pub(crate) fn singular<T: RealField + Copy>(matrix: DMatrix<T>) -> Option<(DMatrix<T>, DMatrix<T>, DMatrix<T>)> {
-    let svd = SVD::try_new(matrix, true, true, T::default_epsilon(), MOST_ITERATIONS)?;
+    let svd = SVD::try_new(matrix, true, true, T::default_epsilon(), MAX_ITERATIONS)?;
     let values = DMatrix::from_fn(svd.singular_values.len(), 1, |i, _| svd.singular_values[i]);
     Some((svd.u?, values, svd.v_t?))
 }

@@ -33,11 +33,11 @@ impl Arrays {
         threads: usize,
         crew: &Crew,
     ) -> Result<Self, LogError> {
-        let records = streams.iter().fold(0_usize, |records, stream| records.saturating_add(stream.most_records()));
+        let records = streams.iter().fold(0_usize, |records, stream| records.saturating_add(stream.max_records()));
         let threads = threads.min(1 + records / WORTH_A_THREAD);
         let mut waiting: Vec<_> = streams.into_iter().enumerate().collect();
         // The longest is taken first, so that the others fill the time beside it.
-        waiting.sort_by_key(|(_, stream)| stream.most_records());
+        waiting.sort_by_key(|(_, stream)| stream.max_records());
         let waiting = Mutex::new(waiting);
         let next = || waiting.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let read = || {

@@ -161,7 +161,7 @@ pub(crate) trait Stream {
     fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError>;
 
     /// How many records it has at most, as far as the file says it.
-    fn most_records(&self) -> usize {
+    fn max_records(&self) -> usize {
         0
     }
 
@@ -223,10 +223,10 @@ impl<'a> Source<'a> {
     /// Reads a stream to its end: its records as one block, or samples as one for each channel. The memory is that of the stream before.
     pub(crate) fn whole(mut self, memory: &mut Vec<Memory>, said: &mut Said) -> Result<Vec<Block>, LogError> {
         std::mem::swap(&mut self.batch.memory, memory);
-        let most = self.stream.most_records();
+        let maximum = self.stream.max_records();
         while self.read_on(said)? {
             // The first batch has made the columns.
-            self.batch.block.reserve(most.saturating_sub(self.batch.block.times_s.len()));
+            self.batch.block.reserve(maximum.saturating_sub(self.batch.block.times_s.len()));
         }
         std::mem::swap(&mut self.batch.memory, memory);
         match self.batch.samples.is_empty() {

@@ -109,12 +109,12 @@ impl Pair {
 
     /// Which of both jumped to the other, where the difference closed at once.
     fn jump(&self, before: [Stamped; 2], newest: [Stamped; 2]) -> Option<usize> {
-        let (times, least_rad_s) = SUDDEN;
+        let (times, min_rad_s) = SUDDEN;
         let [mean, last] = self.change;
         let closed = (before[0][0] - before[1][0]).abs();
         let moved = [0, 1].map(|which| (newest[which][0] - before[which][0]).abs());
         let passed_s = newest[0][1].max(newest[1][1]) - before[0][1].min(before[1][1]);
-        let is_sudden = closed > times * mean.max(last) + least_rad_s && (0.0..=SLOWEST_S).contains(&passed_s);
+        let is_sudden = closed > times * mean.max(last) + min_rad_s && (0.0..=SLOWEST_S).contains(&passed_s);
         let which = usize::from(moved[1] > moved[0]);
         let is_one = 2.0 * moved[which] > closed && 2.0 * moved[1 - which] < closed;
         (is_sudden && is_one && self.changes >= LEARNT).then_some(which)

@@ -32,7 +32,7 @@ const LATEST: f64 = 0.125;
 const STOPPED_CHANGE: f64 = 0.002;
 /// The same of an engine while the turbine changes behind a converter \[chosen\]: its load changes with the slip.
 pub const FROZEN_CHANGE_CONVERTER: f64 = 0.05;
-/// Greatest speed that an idle control holds, of a cold engine, rad/s \[chosen\]: 1500 rpm.
+/// Maximum speed that an idle control holds, of a cold engine, rad/s \[chosen\]: 1500 rpm.
 pub const IDLE_RAD_S: f64 = 157.0;
 /// A turbine above this fraction of the engine's speed takes the engine along when it changes.
 pub const COUPLED: f64 = 0.95;

@@ -13,7 +13,7 @@ pub const ENOUGH: u8 = 5;
 /// now and then.
 const AGAINST: u8 = 4;
 /// Most held values that are remembered.
-const MOST: u8 = 20;
+const MAXIMUM: u8 = 20;
 
 /// Watches a speed.
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +72,7 @@ impl HeldSpeed {
             rows if rows > self.held_rows => return,
             _ => {}
         }
-        self.seen = self.seen.saturating_add(1).min(MOST);
+        self.seen = self.seen.saturating_add(1).min(MAXIMUM);
     }
 }
 

@@ -6,7 +6,7 @@ use std::collections::BinaryHeap;
 use crate::Reading;
 use crate::map::Resolved;
 
-/// A reading with the place of its entry in the map. Of equal stamps the one that came first is the greatest.
+/// A reading with the place of its entry in the map. Of equal stamps the one that came first is the largest.
 struct Waiting {
     entry: usize,
     reading: Reading,
@@ -37,7 +37,7 @@ impl Eq for Waiting {}
 pub(crate) struct InOrder {
     waiting: BinaryHeap<Waiting>,
     /// By how much the stamps of any channel are too late at most, s.
-    most_s: f64,
+    max_s: f64,
     count: u64,
 }
 
@@ -45,8 +45,8 @@ impl InOrder {
     /// For these channels; none if no stamp is moved.
     pub(crate) fn of(channels: &[Resolved]) -> Option<Self> {
         let late_s = || channels.iter().map(|channel| channel.entry.late_s);
-        let most_s = late_s().fold(0.0, f64::max);
-        late_s().any(|late_s| late_s != 0.0).then(|| Self { waiting: BinaryHeap::new(), most_s, count: 0 })
+        let max_s = late_s().fold(0.0, f64::max);
+        late_s().any(|late_s| late_s != 0.0).then(|| Self { waiting: BinaryHeap::new(), max_s, count: 0 })
     }
 
     /// Takes a reading of an entry, whose stamps are moved.
@@ -57,7 +57,7 @@ impl InOrder {
 
     /// The next reading, if no earlier one can come from samples of this stamp on, s.
     pub(crate) fn next(&mut self, stamp_s: f64) -> Option<(usize, Reading)> {
-        let is_ready = self.waiting.peek().is_some_and(|first| first.reading.stamp_s <= stamp_s - self.most_s);
+        let is_ready = self.waiting.peek().is_some_and(|first| first.reading.stamp_s <= stamp_s - self.max_s);
         if is_ready { self.waiting.pop().map(|first| (first.entry, first.reading)) } else { None }
     }
 }

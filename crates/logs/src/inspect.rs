@@ -20,7 +20,7 @@ pub struct ChannelSummary {
     pub period_s: Option<f64>,
     /// Times of the first and the last sample, s.
     pub span_s: Option<[f64; 2]>,
-    /// Least and greatest good value.
+    /// Minimum and maximum good value.
     pub range: Option<[f64; 2]>,
     /// Intervals longer than [`GAP`] periods.
     pub gaps: u64,
@@ -59,8 +59,8 @@ impl Watched {
             }
         }
         if quality == Quality::Good {
-            let [least, greatest] = self.summary.range.unwrap_or([value, value]);
-            self.summary.range = Some([least.min(value), greatest.max(value)]);
+            let [minimum, maximum] = self.summary.range.unwrap_or([value, value]);
+            self.summary.range = Some([minimum.min(value), maximum.max(value)]);
         }
     }
 

@@ -332,11 +332,12 @@ impl Log {
         if let Some(channel) = self.channels.iter().find(similar).or_else(|| Some(alike()?.1)) {
             return format!("`{}` has a similar name", error::shown(&channel.name));
         }
-        const MOST: usize = 12;
-        let names: Vec<String> = self.channels.iter().take(MOST).map(|channel| error::shown(&channel.name)).collect();
+        const MAXIMUM: usize = 12;
+        let names: Vec<String> =
+            self.channels.iter().take(MAXIMUM).map(|channel| error::shown(&channel.name)).collect();
         match self.channels.len() {
             0 => "the log has no channels".to_owned(),
-            more if more > MOST => format!("the channels are {} and {} more", names.join(", "), more - MOST),
+            more if more > MAXIMUM => format!("the channels are {} and {} more", names.join(", "), more - MAXIMUM),
             _ => format!("the channels are {}", names.join(", ")),
         }
     }
@@ -384,16 +385,16 @@ fn beginning(path: &Path, mut reader: Box<dyn Read>) -> Result<(Vec<u8>, Box<dyn
 fn first_bytes(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
     const LINES: usize = 50;
     const LONG_LINES: usize = 3;
-    const MOST: usize = LONG_LINES * LONGEST_ROW;
+    const MAXIMUM: usize = LONG_LINES * LONGEST_ROW;
     let (mut head, mut lines, mut long_lines, mut is_text) = (Vec::new(), 0, 0, true);
     let mut bytes = vec![0; HEAD];
-    let most = |lines: usize, is_text: bool| match () {
+    let maximum = |lines: usize, is_text: bool| match () {
         () if !is_text => HEAD,
         // One byte more shows that the first line is too long.
         () if lines == 0 => LONGEST_ROW + 1,
-        () => MOST,
+        () => MAXIMUM,
     };
-    while lines < LINES && long_lines < LONG_LINES && head.len() < most(lines, is_text) {
+    while lines < LINES && long_lines < LONG_LINES && head.len() < maximum(lines, is_text) {
         match reader.read(&mut bytes) {
             Ok(0) => break,
             Ok(read) => {

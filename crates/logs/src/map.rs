@@ -43,7 +43,7 @@ pub struct Mapped {
     pub late_s: f64,
     /// Whether a command is sent when it changes: it stands until the next sample.
     pub sent_on_change: bool,
-    /// Least and greatest value in the unit; others are not used.
+    /// Minimum and maximum value in the unit; others are not used.
     pub valid_range: Option<[f64; 2]>,
 }
 
@@ -276,10 +276,10 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
             key("sent_on_change")
         ));
     }
-    if let Some([least, greatest]) = raw.valid_range
-        && (least >= greatest || least.is_nan() || greatest.is_nan())
+    if let Some([minimum, maximum]) = raw.valid_range
+        && (minimum >= maximum || minimum.is_nan() || maximum.is_nan())
     {
-        return Err(format!("{} is [{least}, {greatest}], expected a smaller value first", key("valid_range")));
+        return Err(format!("{} is [{minimum}, {maximum}], expected a smaller value first", key("valid_range")));
     }
     Ok(Mapped {
         role,

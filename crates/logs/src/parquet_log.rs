@@ -355,7 +355,7 @@ impl Stream for Groups<'_> {
         read.inspect_err(|_| block.truncate(before))
     }
 
-    fn most_records(&self) -> usize {
+    fn max_records(&self) -> usize {
         usize::try_from(self.log.reader.metadata().file_metadata().num_rows()).unwrap_or(0)
     }
 

@@ -8,13 +8,13 @@ use crate::Role;
 use crate::frozen::{COUPLED, FROZEN_CHANGE_FROM_START};
 use crate::readings::RoleSummary;
 
-/// Least and greatest of some values, and the middle of their sizes.
+/// Minimum and maximum of some values, and the middle of their sizes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extremes {
-    /// The least.
-    pub least: f64,
-    /// The greatest.
-    pub greatest: f64,
+    /// The minimum.
+    pub minimum: f64,
+    /// The maximum.
+    pub maximum: f64,
     /// Values away from zero by their size: how many lie between two powers of the eighth root of two.
     sizes: [u32; SIZES],
     count: u64,
@@ -42,7 +42,7 @@ const SIZES: usize = OCTAVES * PARTS;
 
 impl Default for Extremes {
     fn default() -> Self {
-        Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY, sizes: [0; SIZES], count: 0, above: 0, below: 0 }
+        Self { minimum: f64::INFINITY, maximum: f64::NEG_INFINITY, sizes: [0; SIZES], count: 0, above: 0, below: 0 }
     }
 }
 
@@ -52,8 +52,8 @@ impl Extremes {
         self.count += 1;
         self.above += u64::from(value > SMALL_RAD_S);
         self.below += u64::from(value < -SMALL_RAD_S);
-        self.least = self.least.min(value);
-        self.greatest = self.greatest.max(value);
+        self.minimum = self.minimum.min(value);
+        self.maximum = self.maximum.max(value);
         if value != 0.0 {
             let size = ((Real::log2(value.abs()) + 32.0) * PARTS as f64).clamp(0.0, (SIZES - 1) as f64) as usize;
             self.sizes[size] = self.sizes[size].saturating_add(1);
@@ -92,10 +92,10 @@ impl Extremes {
     /// Whether many values are all the same.
     fn stands_still(&self) -> bool {
         const MANY: u64 = 100;
-        self.count >= MANY && self.least == self.greatest
+        self.count >= MANY && self.minimum == self.maximum
     }
 
-    /// The greatest size, without the greatest hundredth of the values where that is of another order: a few readings may be wrong.
+    /// The maximum magnitude, without the largest hundredth of the values where that is of another order: a few readings may be wrong.
     fn size(&self) -> f64 {
         let octaves = self.octaves();
         let (all, mut below) = (octaves.iter().sum::<u64>(), 0);
@@ -104,11 +104,11 @@ impl Extremes {
             100 * below >= 99 * all
         });
         let limit = nearly_all.map_or(f64::INFINITY, |(size, _)| Real::exp2(f64::from(size - 31)));
-        self.greatest.abs().max(self.least.abs()).min(limit)
+        self.maximum.abs().max(self.minimum.abs()).min(limit)
     }
 
-    /// The greatest size of a speed. A shaft passes every speed between two others: a tenth of the values or less that is parted from all
-    /// others by a factor of two and more are readings that are wrong, as of a sensor that says by a number that it has no value.
+    /// The maximum magnitude of a speed. A shaft passes every speed between two others: a tenth of the values or less that is parted from
+    /// all others by a factor of two and more are readings that are wrong, as of a sensor that says by a number that it has no value.
     fn speed(&self) -> f64 {
         let octaves = self.octaves();
         let all: u64 = octaves.iter().sum();
@@ -200,12 +200,12 @@ pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
         (Role::TurbineSpeed, Role::OutputSpeed, "rad/s", 3.2, 20.0, "rpm"),
         (Role::OutputSpeed, Role::WheelSpeed, "rad/s", 1.7, 20.0, "rpm"),
     ];
-    for (of, role, unit, least, most, likely) in pairs {
+    for (of, role, unit, minimum, maximum, likely) in pairs {
         let (Some(of), Some(entry)) = (turning(of), turning(role)) else { continue };
         let ratio = entry.extremes.speed() / of.extremes.speed();
-        let is_small = most < 1.0;
+        let is_small = maximum < 1.0;
         let may_be = is_small && (seen == Seen::Beginning || creeps(of, role));
-        if entry.unit_name == unit && (least..most).contains(&ratio) && !may_be {
+        if entry.unit_name == unit && (minimum..maximum).contains(&ratio) && !may_be {
             if let Some(finding) = slow_output(of, entry, summary) {
                 findings.push(finding);
                 continue;
@@ -225,7 +225,7 @@ pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
 
 /// An output speed that is too small, where the wheels seem too fast for it: the turbine, too, is faster than any gear makes it.
 fn slow_output(output: &RoleSummary, wheel: &RoleSummary, summary: &[RoleSummary]) -> Option<Finding> {
-    const MOST_RATIO: f64 = 6.0;
+    const MAX_RATIO: f64 = 6.0;
     let turbine = summary.iter().find(|entry| entry.role == Role::TurbineSpeed)?;
     let [by_wheel, by_turbine] = [wheel, turbine].map(|entry| entry.extremes.speed() / output.extremes.speed());
     let likely = if output.unit_name == "rpm" { "rad/s" } else { "another unit or scale" };
@@ -233,13 +233,13 @@ fn slow_output(output: &RoleSummary, wheel: &RoleSummary, summary: &[RoleSummary
     let why = format!(
         "the greatest value of {of_wheel} is {by_wheel:.2} times its own, and that of {of_turbine} {by_turbine:.1} times; it looks like {likely}"
     );
-    let is_slow = wheel.role == Role::WheelSpeed && by_turbine > MOST_RATIO;
+    let is_slow = wheel.role == Role::WheelSpeed && by_turbine > MAX_RATIO;
     is_slow.then(|| finding(output, &output.unit_name, &why, likely))
 }
 
 /// A speed that is the same in all samples, while one changes that takes it along.
 fn stands_still(entry: &RoleSummary, summary: &[RoleSummary]) -> Option<Finding> {
-    let value = Some(entry.extremes.greatest).filter(|_| entry.extremes.stands_still())?;
+    let value = Some(entry.extremes.maximum).filter(|_| entry.extremes.stands_still())?;
     let takes_along: &[Role] = match entry.role {
         Role::EngineSpeed => &[Role::TurbineSpeed],
         Role::TurbineSpeed => &[Role::OutputSpeed, Role::WheelSpeed],
@@ -248,10 +248,10 @@ fn stands_still(entry: &RoleSummary, summary: &[RoleSummary]) -> Option<Finding>
         _ => &[],
     };
     let changes = |other: &&RoleSummary| {
-        let Extremes { least, greatest, .. } = other.extremes;
-        let turns = takes_along.contains(&other.role) && greatest > MOVING_RAD_S;
-        let is_coupled = entry.role != Role::EngineSpeed || greatest > COUPLED * value;
-        turns && is_coupled && greatest - least > FROZEN_CHANGE_FROM_START * greatest
+        let Extremes { minimum, maximum, .. } = other.extremes;
+        let turns = takes_along.contains(&other.role) && maximum > MOVING_RAD_S;
+        let is_coupled = entry.role != Role::EngineSpeed || maximum > COUPLED * value;
+        turns && is_coupled && maximum - minimum > FROZEN_CHANGE_FROM_START * maximum
     };
     let other = summary.iter().find(changes)?;
     let (role, name) = (entry.role, entry.name.clone());
@@ -306,7 +306,7 @@ fn alone(entry: &RoleSummary, summary: &[RoleSummary], seen: Seen) -> Option<Fin
         _ if seen == Seen::Beginning => None,
         // An offset of a command that is off is small.
         Quantity::Current | Quantity::Fraction
-            if entry.role.is_command() && entry.extremes.greatest <= 0.0 && entry.extremes.least < -0.05 =>
+            if entry.role.is_command() && entry.extremes.maximum <= 0.0 && entry.extremes.minimum < -0.05 =>
         {
             let message = format!("{} is never positive: its sign is the other way round", entry.name);
             Some(Finding { role: entry.role, name: entry.name.clone(), message, likely: Likely::OtherSign })
@@ -315,7 +315,7 @@ fn alone(entry: &RoleSummary, summary: &[RoleSummary], seen: Seen) -> Option<Fin
             say(format!("most values would be about {:.0} rpm, below idle", rpm(middle)), "rad/s")
         }
         // That of an element which no shift applies is small in any unit, and the others of its kind tell.
-        Quantity::Current | Quantity::Pressure if greatest_of_kind(entry, summary) > size => None,
+        Quantity::Current | Quantity::Pressure if max_of_kind(entry, summary) > size => None,
         Quantity::Current if unit == "mA" && size < 0.003 => {
             say(format!("its greatest value would be {:.3} mA", 1e3 * size), "A")
         }
@@ -328,8 +328,8 @@ fn alone(entry: &RoleSummary, summary: &[RoleSummary], seen: Seen) -> Option<Fin
     }
 }
 
-/// The greatest size of a value of this kind in this unit.
-fn greatest_of_kind(entry: &RoleSummary, summary: &[RoleSummary]) -> f64 {
+/// The maximum magnitude of a value of this kind in this unit.
+fn max_of_kind(entry: &RoleSummary, summary: &[RoleSummary]) -> f64 {
     let of_kind = summary.iter().filter(|other| other.role == entry.role && other.unit_name == entry.unit_name);
     of_kind.map(|other| other.extremes.size()).fold(0.0, f64::max)
 }
@@ -419,7 +419,7 @@ mod tests {
         for (role, unit, used, idle) in
             [(Role::ElementCurrent, "mA", 0.8, 0.002), (Role::ElementPressureCommand, "bar", 6e5, 2e3)]
         {
-            let log = |most: f64| [of(role, unit, 0..100, most / 99.0), of(role, unit, 0..100, idle / 99.0)];
+            let log = |maximum: f64| [of(role, unit, 0..100, maximum / 99.0), of(role, unit, 0..100, idle / 99.0)];
             assert_eq!(findings(&log(used), Seen::All), []);
             assert!(!findings(&log(idle), Seen::All).is_empty(), "{role:?}");
         }
@@ -451,8 +451,8 @@ mod tests {
             }
         }
         // One reading does not turn a sign, be the other ones large or small.
-        for most in [20.0, 600.0] {
-            let mut speeds: Vec<f64> = (0..400).map(|i| most * f64::from(i) / 400.0).collect();
+        for maximum in [20.0, 600.0] {
+            let mut speeds: Vec<f64> = (0..400).map(|i| maximum * f64::from(i) / 400.0).collect();
             let good = speeds.clone();
             speeds[200] = -1e300;
             let of = |values: &[f64]| {
@@ -460,7 +460,7 @@ mod tests {
             };
             assert_eq!(findings(&of(&speeds), Seen::All), []);
             let backward: Vec<f64> = good.iter().map(|speed| -speed).collect();
-            assert_eq!(findings(&of(&backward), Seen::All).len(), usize::from(most > SMALL_RAD_S));
+            assert_eq!(findings(&of(&backward), Seen::All).len(), usize::from(maximum > SMALL_RAD_S));
         }
     }
 
@@ -514,7 +514,9 @@ mod tests {
         let log = |unit: &str, wrong: Option<(Role, f64)>| {
             let value = |role, value| value * wrong.filter(|wrong| wrong.0 == role).map_or(1.0, |wrong| wrong.1);
             findings(
-                &speeds.map(|(role, most)| summary(role, unit, &[0.0, 0.2 * value(role, most), value(role, most)])),
+                &speeds.map(|(role, maximum)| {
+                    summary(role, unit, &[0.0, 0.2 * value(role, maximum), value(role, maximum)])
+                }),
                 Seen::All,
             )
         };

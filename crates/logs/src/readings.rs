@@ -258,7 +258,7 @@ impl<'a> Readings<'a> {
         }
         let value = channels.resolved.in_unit(value);
         if quality == Quality::Good
-            && entry.valid_range.is_some_and(|[least, greatest]| !(least..=greatest).contains(&value))
+            && entry.valid_range.is_some_and(|[minimum, maximum]| !(minimum..=maximum).contains(&value))
         {
             quality = Quality::OutOfRange;
         }

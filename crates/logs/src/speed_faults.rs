@@ -43,7 +43,7 @@ const GOES_ALONG: f64 = 0.25;
 /// Factors beyond which output over wheel speed has parted from what it was: readings that are 50 ms apart differ by less.
 const PARTED: std::ops::Range<f64> = 0.6..1.6;
 /// Faster than any shaft of a car, rad/s: not taken as a speed at all.
-const MOST_RAD_S: f64 = 1500.0;
+const MAX_RAD_S: f64 = 1500.0;
 /// How long another speed contradicts one that stands at zero before it is a fault, s, and by how many times the speed up to which a sensor may
 /// read zero \[chosen\]: the sensor of a shaft that begins to turn wakes up late.
 const STANDS_S: f64 = 0.3;
@@ -111,7 +111,7 @@ impl SpeedFaults {
     pub fn is_fault(&mut self, role: Role, rad_s: f64, time_s: f64) -> bool {
         let at = role as usize;
         // What is no number, or no speed at all, is refused elsewhere.
-        if at >= WATCHED || rad_s.is_nan() || rad_s.abs() > MOST_RAD_S {
+        if at >= WATCHED || rad_s.is_nan() || rad_s.abs() > MAX_RAD_S {
             return false;
         }
         if self.believed.iter().flatten().any(|believed| time_s < believed.time_s - FRESH_S) {
@@ -160,8 +160,8 @@ impl SpeedFaults {
     /// Whether a fault begins with a reading.
     fn begins(&self, at: usize, before: Believed, rad_s: f64, time_s: f64) -> bool {
         let change = (rad_s - before.rad_s).abs();
-        let (_, least_rad_s) = SHAFTS[at];
-        let fell = rad_s.abs() <= FELL * before.rad_s.abs() && before.rad_s.abs() > least_rad_s;
+        let (_, min_rad_s) = SHAFTS[at];
+        let fell = rad_s.abs() <= FELL * before.rad_s.abs() && before.rad_s.abs() > min_rad_s;
         let is_sudden = time_s - before.time_s <= AT_ONCE_S && fell;
         let (rate, at_once) = TO_ANOTHER;
         let to_another = change > rate * before.passed_s(time_s) + at_once && self.another(at, rad_s, time_s).is_some();
@@ -193,8 +193,8 @@ impl SpeedFaults {
     /// Whether a reading is zero, as those before it, while the others have shown for some time that the shaft turns.
     fn stands(&mut self, at: usize, rad_s: f64, time_s: f64) -> bool {
         let turns = |other: usize| {
-            let (_, least_rad_s) = SHAFTS[other];
-            self.turning(other, time_s).is_some_and(|speed| speed.abs() > AWAKE * least_rad_s)
+            let (_, min_rad_s) = SHAFTS[other];
+            self.turning(other, time_s).is_some_and(|speed| speed.abs() > AWAKE * min_rad_s)
         };
         let is_contradicted = match at {
             ENGINE => turns(TURBINE),
@@ -209,9 +209,9 @@ impl SpeedFaults {
 
     /// A speed that was believed of late and is away from zero, rad/s.
     fn turning(&self, at: usize, time_s: f64) -> Option<f64> {
-        let (_, least_rad_s) = SHAFTS[at];
+        let (_, min_rad_s) = SHAFTS[at];
         let fresh = self.believed[at].filter(|believed| time_s - believed.time_s <= FRESH_S)?;
-        Some(fresh.rad_s).filter(|rad_s| rad_s.abs() > least_rad_s)
+        Some(fresh.rad_s).filter(|rad_s| rad_s.abs() > min_rad_s)
     }
 
     /// Whether the other speeds show that this shaft turns.

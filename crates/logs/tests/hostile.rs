@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
 /// The most memory that this process has held so far, bytes, where the system says it (Linux).
-fn most_memory() -> Option<usize> {
+fn max_memory() -> Option<usize> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.trim().strip_suffix(" kB")?.parse::<usize>().ok().map(|kilobytes| kilobytes << 10)
@@ -54,7 +54,7 @@ fn attempt(folder: &Folder, name: &str, bytes: &[u8]) -> (usize, String) {
         with_dbc()
     };
     let start = Instant::now();
-    let before = most_memory();
+    let before = max_memory();
     let on_threads = |threads| match read_on(&path, &options, threads) {
         Ok((_, samples, notes)) => {
             assert!(samples.iter().all(|sample| sample.time_s.is_finite()), "{name}");
@@ -67,7 +67,7 @@ fn attempt(folder: &Folder, name: &str, bytes: &[u8]) -> (usize, String) {
         assert_eq!(on_threads(3), result);
     }
     assert!(start.elapsed() < SLOWEST, "{name}: {:?}", start.elapsed());
-    if let (Some(before), Some(after)) = (before, most_memory()) {
+    if let (Some(before), Some(after)) = (before, max_memory()) {
         // The system counts by thread and joins the counts now and then.
         let more = after.saturating_sub(before);
         assert!(more < LARGEST, "{name}: {more} bytes: {}", result.1);

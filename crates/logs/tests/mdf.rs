@@ -440,7 +440,7 @@ fn a_file_that_is_cut_within_its_data_is_read_up_to_that_place() {
             let (all, notes) = samples(&folder.write("whole.mf4", &whole));
             assert_eq!(notes, Vec::<String>::new());
             let by_channel_of_all = by_channel(&all);
-            let mut most = 0;
+            let mut maximum = 0;
             for end in (own.len()..whole.len()).step_by(7).chain([whole.len() - 1]) {
                 let said = format!("it goes on past the end of the file, byte {end}");
                 let found = match read(&folder.write("cut.mf4", &whole[..end]), &OpenOptions::default()) {
@@ -457,14 +457,14 @@ fn a_file_that_is_cut_within_its_data_is_read_up_to_that_place() {
                     assert_eq!(own, by_channel_of_all[&channel][..own.len()], "{name} {end}");
                 }
                 assert!(
-                    found.len() >= most && found.len() < all.len(),
+                    found.len() >= maximum && found.len() < all.len(),
                     "{name} {end}: {} of {}",
                     found.len(),
                     all.len()
                 );
-                most = found.len();
+                maximum = found.len();
             }
-            assert!(2 * most > all.len(), "{name}: {most} of {}", all.len());
+            assert!(2 * maximum > all.len(), "{name}: {maximum} of {}", all.len());
         }
     }
 }

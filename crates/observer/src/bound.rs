@@ -20,25 +20,25 @@ use crate::{
 pub struct Budget<T> {
     /// The valve as measured: lag, gain and delay over the operating point.
     pub valve: ClutchValve<T>,
-    /// Least and greatest factor on its lag.
+    /// Minimum and maximum factor on its lag.
     pub lag_factor: [T; 2],
-    /// Least and greatest factor on its gain.
+    /// Minimum and maximum factor on its gain.
     pub gain_factor: [T; 2],
-    /// Least and greatest delay, s.
+    /// Minimum and maximum delay, s.
     pub delay_s: [T; 2],
-    /// Greatest half-width of its hysteresis, Pa: how far the settled pressure may be from that of the command.
+    /// Maximum half-width of its hysteresis, Pa: how far the settled pressure may be from that of the command.
     pub hysteresis_pa: T,
     /// Error of a reading of the command, A or %.
     pub command: T,
-    /// Greatest time between a command and the sample that first shows it, s; it counts up to the time step.
+    /// Maximum time between a command and the sample that first shows it, s; it counts up to the time step.
     pub command_age_s: T,
-    /// Least and greatest line pressure, Pa: what the supply gives at most at any time.
+    /// Minimum and maximum line pressure, Pa: what the supply gives at most at any time.
     pub line_pressure_pa: [T; 2],
     /// Highest pressure that the supply can give, Pa.
     pub pressure_max_pa: T,
     /// The piston's stroke; without one the cylinder has the pressure of the valve's outlet.
     pub fill: Option<FillBudget<T>>,
-    /// Least and greatest factor on the clutch's friction.
+    /// Minimum and maximum factor on the clutch's friction.
     pub friction_factor: [T; 2],
     /// Error of a reading of the slip, rad/s.
     pub slip_rad_s: T,
@@ -63,7 +63,7 @@ pub struct RangeEstimator<T> {
     pub budget: Budget<T>,
     /// The oncoming clutch.
     pub clutch: Clutch<T>,
-    /// Greatest age of a reading, s.
+    /// Maximum age of a reading, s.
     pub age_s: T,
     /// The drive shafts' part; with none there is no range of their torque.
     pub shaft: Option<ShaftRange<T>>,
@@ -103,7 +103,7 @@ struct Seen<'a, T> {
     phase: Option<Phase>,
     /// The signals at the time of the step.
     sample: &'a Sample<T>,
-    /// Least and greatest slip of the oncoming clutch, rad/s, if it is known.
+    /// Minimum and maximum slip of the oncoming clutch, rad/s, if it is known.
     slip_rad_s: Option<[T; 2]>,
     /// Whether turbine, output and wheel speed were read in this step.
     read: bool,
@@ -201,7 +201,7 @@ impl<T: Real> RangeEstimator<T> {
         Seen { dt_s, command, phase, sample, slip_rad_s, read }
     }
 
-    /// Least and greatest slip by the newest readings, and by those with the one before in place of turbine or output speed. A single
+    /// Minimum and maximum slip by the newest readings, and by those with the one before in place of turbine or output speed. A single
     /// wrong reading would turn the sign of the torque around; so it makes the range wider.
     #[inline]
     fn slips(&self, alignment: &AlignmentState<T>, sample: &Sample<T>) -> Option<[T; 2]> {
@@ -223,7 +223,7 @@ impl<T: Real> RangeEstimator<T> {
     }
 }
 
-/// The ranges of pressure and clutch torque, with the least and greatest slip if it is known.
+/// The ranges of pressure and clutch torque, with the minimum and maximum slip if it is known.
 #[inline]
 pub(crate) fn pressure_and_torque<T: Real>(
     clutch: &Clutch<T>,
@@ -237,7 +237,7 @@ pub(crate) fn pressure_and_torque<T: Real>(
     if highest_force <= zero {
         return ([lower_pa, upper_pa], [zero; 2]);
     }
-    let [least, most] = budget.friction_factor;
+    let [minimum, maximum] = budget.friction_factor;
     // The sign of a slip that may be zero is not known, nor whether the clutch holds.
     let slip = slip_rad_s.filter(|[low, high]| *low > zero || *high < zero);
     let (lowest, highest) = match slip {
@@ -248,8 +248,8 @@ pub(crate) fn pressure_and_torque<T: Real>(
             (lowest.at_most(clutch.static_friction), highest.at_least(clutch.static_friction))
         }
     };
-    let at_most = most * highest * clutch.lever() * highest_force;
-    let at_least = least * lowest * clutch.lever() * lowest_force;
+    let at_most = maximum * highest * clutch.lever() * highest_force;
+    let at_least = minimum * lowest * clutch.lever() * lowest_force;
     let torque = match slip {
         None => [-at_most, at_most],
         Some([low, _]) if low > zero => [at_least, at_most],
@@ -266,7 +266,7 @@ pub(crate) fn capacity_min_n_m<T: Real>(clutch: &Clutch<T>, budget: &Budget<T>, 
     budget.friction_factor[0] * friction * clutch.lever() * lowest_force
 }
 
-/// Least and greatest force that presses the plates together, N: none before the piston has closed the clearance.
+/// Minimum and maximum force that presses the plates together, N: none before the piston has closed the clearance.
 #[inline]
 fn clamp_force<T: Real>(
     clutch: &Clutch<T>,
@@ -280,8 +280,8 @@ fn clamp_force<T: Real>(
     };
     let [kiss, kissed] = fill.kiss_pressure_pa;
     let force = |above_kiss: T| clutch.piston_area_m2 * above_kiss.at_least(zero);
-    let greatest = if piston.stroke()[1] < T::one() { zero } else { force(upper_pa - kiss) };
-    [force(lower_pa - kissed), greatest]
+    let maximum = if piston.stroke()[1] < T::one() { zero } else { force(upper_pa - kiss) };
+    [force(lower_pa - kissed), maximum]
 }
 
 impl<T: Real, O: Estimator<T>> Estimator<T> for Bounded<T, O> {

@@ -1,7 +1,7 @@
 //! Commands that may still be on their way to the valve.
 //!
 //! The command that a sample shows was sent at the sample, or up to [`Commands::send`]'s `early_s` before it; it is in
-//! force until the next one was sent. It reaches the cylinder after a delay between a least and a greatest one.
+//! force until the next one was sent. It reaches the cylinder after a delay between a minimum and a maximum.
 
 use drivetrain::Real;
 
@@ -81,15 +81,15 @@ impl<T: Real> Commands<T> {
 
     /// Lowest and highest of the commands that may be in effect from `start_s` to `end_s` from now.
     #[inline]
-    pub(crate) fn in_effect(&self, [least_s, most_s]: [T; 2], start_s: T, end_s: T) -> [T; 2] {
+    pub(crate) fn in_effect(&self, [min_s, max_s]: [T; 2], start_s: T, end_s: T) -> [T; 2] {
         let (mut lowest, mut highest) = (T::infinity(), T::zero());
         for sent in self.sent.iter().take(self.count) {
-            if sent.age_s + sent.early_s + end_s < least_s {
+            if sent.age_s + sent.early_s + end_s < min_s {
                 continue;
             }
             lowest = lowest.at_most(sent.lowest);
             highest = highest.at_least(sent.highest);
-            if sent.age_s + start_s >= most_s {
+            if sent.age_s + start_s >= max_s {
                 break;
             }
         }
@@ -104,7 +104,7 @@ mod tests {
     const DELAY_S: [f64; 2] = [0.005, 0.02];
 
     #[test]
-    fn a_command_acts_from_the_least_delay_until_the_greatest_after_the_next() {
+    fn a_command_acts_from_the_minimum_delay_until_the_maximum_after_the_next() {
         let mut commands = Commands::unknown(0.0);
         commands.send(0.0, 0.0, [1.0, 1.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.0, 0.004), [0.0, 0.0]);

@@ -9,7 +9,7 @@
 //! p = P(V)           does not fall with V;  V < 0: piston on its stop, p <= p0
 //!                    0 < V < V_k: stroke, p in [p0, p1];  V > V_k: the plates touch (kiss), p >= p1
 //!                    off the stroke dV/dp <= C
-//! Q_lo, Q_hi         flows of the passages of `drivetrain::Cylinder` with the greatest and the least resistance
+//! Q_lo, Q_hi         flows of the passages of `drivetrain::Cylinder` with the maximum and the minimum resistance
 //! ```
 //!
 //! where `s` is the outlet pressure, `V` the oil in the cylinder, `xi = V/V_k` the stroke. **Why it holds:** a larger
@@ -47,7 +47,7 @@ pub(crate) struct Outlet<T> {
 /// What is known of a piston and its cylinder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PistonRange<T> {
-    /// Least and greatest stroke over that to the kiss point, `xi_lo` and `xi_hi`.
+    /// Minimum and maximum stroke over that to the kiss point, `xi_lo` and `xi_hi`.
     stroke: [T; 2],
     /// `m`, Pa.
     lowest_pa: T,
@@ -61,7 +61,7 @@ impl<T: Real> PistonRange<T> {
         Self { stroke: [T::zero(), T::one()], lowest_pa: T::zero(), highest_pa: line_pa }
     }
 
-    /// Least and greatest stroke over that to the kiss point: 0 with the piston on its stop, 1 with the plates in contact.
+    /// Minimum and maximum stroke over that to the kiss point: 0 with the piston on its stop, 1 with the plates in contact.
     pub fn stroke(&self) -> [T; 2] {
         self.stroke
     }
@@ -69,12 +69,12 @@ impl<T: Real> PistonRange<T> {
     /// Lowest and highest cylinder pressure, Pa.
     #[inline]
     pub fn pressure_pa(&self, fill: &FillBudget<T>) -> [T; 2] {
-        let [least, greatest] = self.stroke;
+        let [minimum, maximum] = self.stroke;
         let (home, kiss) = (T::zero(), T::one());
-        let lower = if least > home { self.lowest_pa.at_least(fill.preload_pressure_pa[0]) } else { self.lowest_pa };
-        let upper = if greatest <= home {
+        let lower = if minimum > home { self.lowest_pa.at_least(fill.preload_pressure_pa[0]) } else { self.lowest_pa };
+        let upper = if maximum <= home {
             self.highest_pa
-        } else if greatest < kiss {
+        } else if maximum < kiss {
             fill.kiss_pressure_pa[1]
         } else {
             self.highest_pa.at_least(fill.kiss_pressure_pa[1])
@@ -95,11 +95,11 @@ impl<T: Real> PistonRange<T> {
         let (zero, one) = (T::zero(), T::one());
         let (before, f, p0) = (self.stroke[1], self.highest_pa, fill.preload_pressure_pa);
         let rate = if s > p0[0] {
-            fill.most_in(s - p0[0]) / fill.volume_m3[0]
+            fill.max_in(s - p0[0]) / fill.volume_m3[0]
         } else if before >= one && f > fill.kiss_pressure_pa[0] {
             zero
         } else {
-            -fill.least_out(p0[0] - s) / fill.volume_m3[1]
+            -fill.min_out(p0[0] - s) / fill.volume_m3[1]
         };
         // Rounded away from the truth, so that no flow is too small to count in single precision.
         let stroke = ((before + dt_s * rate) * (one + T::epsilon())).at_least(zero).at_most(one);
@@ -107,7 +107,7 @@ impl<T: Real> PistonRange<T> {
             s
         } else {
             let drop = f - s;
-            s + drop * (-dt_s * fill.least_out(drop) / (fill.capacity_m3_pa * drop)).exp()
+            s + drop * (-dt_s * fill.min_out(drop) / (fill.capacity_m3_pa * drop)).exp()
         };
         if stroke < one {
             highest = highest.at_most(fill.kiss_pressure_pa[1]);
@@ -127,9 +127,9 @@ impl<T: Real> PistonRange<T> {
         let target = s * (one - leak_fraction);
         let fallen = m.at_most(target);
         let net = if s > kissed {
-            fill.least_in(s - kissed) - leak * kissed
+            fill.min_in(s - kissed) - leak * kissed
         } else {
-            -fill.most_out(kissed - s) - leak * kissed
+            -fill.max_out(kissed - s) - leak * kissed
         };
         let stroke = if before >= one && (net >= zero || fallen >= kissed) {
             one
@@ -148,7 +148,7 @@ impl<T: Real> PistonRange<T> {
         if ceiling > m {
             // The net flow at a drop, less that of the leak, is concave in the drop and not below zero at the target: the
             // chord from there to the start of the step is below it.
-            let (drop, inflow) = (target - m, fill.least_in(s - m) - leak * m);
+            let (drop, inflow) = (target - m, fill.min_in(s - m) - leak * m);
             let fraction = (-dt_s * inflow.at_least(zero) / (fill.capacity_m3_pa * drop)).exp();
             lowest = (target - drop * fraction).at_most(ceiling);
         }

@@ -11,7 +11,7 @@ use car::{Car, ElementErrors, ErrorBudget, Sensors};
 use drivetrain::{Cylinder, Real};
 use geartrain::{Change, ElementKind, Gear, Gearbox};
 
-use crate::of_sensors::{SCALE_LEAST, engine_noise, speed_reading, std_dev_of};
+use crate::of_sensors::{SCALE_MIN, engine_noise, speed_reading, std_dev_of};
 
 /// Quantum of the speeds of engine, turbine and output where no sensor is described, rad/s: that of the built-in car's budget.
 const SPEED_QUANTUM_RAD_S: f64 = 0.7;
@@ -136,9 +136,9 @@ impl<T: Real> ShiftTables<T> {
 }
 
 /// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen\].
-const OUTPUT_LEAST_RAD_S: f64 = 15.0;
+const OUTPUT_MIN_RAD_S: f64 = 15.0;
 /// Largest speed, rad/s: a larger reading is none of a gearbox \[chosen\].
-const SPEED_MOST_RAD_S: f64 = 1500.0;
+const SPEED_MAX_RAD_S: f64 = 1500.0;
 
 impl ShiftTables<f64> {
     /// The tables of a car with these bounds of its errors.
@@ -202,7 +202,7 @@ fn has_dog(gearbox: &Gearbox, [from, to]: [usize; 2]) -> bool {
 
 /// A piston whose stroke is within these limits, each the edge of a uniform distribution.
 fn piston(cylinder: &Cylinder<f64>, fill: &FillBudget<f64>) -> Piston<f64> {
-    let fraction = |[least, most]: [f64; 2], value: f64| std_dev_of(0.5 * (most - least)) / value;
+    let fraction = |[minimum, maximum]: [f64; 2], value: f64| std_dev_of(0.5 * (maximum - minimum)) / value;
     let flow = |k: usize| fill.supply[k].flow(FILL_PA, fill.viscosity_m2_s[k]).min(cylinder.flow_max_m3_s);
     let volume = fraction(fill.volume_m3, cylinder.stroke_m3);
     Piston::new(*cylinder, Real::hypot(volume, fraction([flow(1), flow(0)], cylinder.flow(FILL_PA))))
@@ -248,7 +248,7 @@ pub fn gearbox_filter<'a>(
             engine_noise(sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
         ),
         limits: InputLimits {
-            speed_max_rad_s: SPEED_MOST_RAD_S,
+            speed_max_rad_s: SPEED_MAX_RAD_S,
             // Of any element; each has its own.
             command_max: budget.widest(|element| element.command_max),
             command_error: budget.widest(|element| element.command),
@@ -292,11 +292,11 @@ fn uncertainty(errors: &ErrorBudget) -> ShiftUncertainty<f64> {
         // What is low by a fraction is exceeded by more than that fraction.
         inertia_share: std_dev_of(errors.inertia / (1.0 - errors.inertia)),
         stiffness_fraction: std_dev_of(errors.stiffness),
-        wheel_scale: std_dev_of(errors.wheel_scale).max(SCALE_LEAST),
-        wheel_scale_walk: SCALE_LEAST / WHEEL_SCALE_S.sqrt(),
+        wheel_scale: std_dev_of(errors.wheel_scale).max(SCALE_MIN),
+        wheel_scale_walk: SCALE_MIN / WHEEL_SCALE_S.sqrt(),
         rate_rad_s: 0.1,
         rate_walk: 0.01,
         load_walk: 1500.0,
-        output_least_rad_s: OUTPUT_LEAST_RAD_S,
+        output_least_rad_s: OUTPUT_MIN_RAD_S,
     }
 }

@@ -4,7 +4,7 @@ use car::SpeedSensor;
 
 use crate::{EngineNoise, SpeedReading};
 
-/// Least standard deviation of a speed reading, rad/s \[chosen\].
+/// Minimum standard deviation of a speed reading, rad/s \[chosen\].
 const READING_RAD_S: f64 = 0.02;
 /// A quantum of the error budget over the standard deviation of one reading: five standard deviations of the difference of two.
 const QUANTUM: f64 = 5.0 * core::f64::consts::SQRT_2;
@@ -17,10 +17,10 @@ const ENGINE_CHANGE_N_M: f64 = 50.0;
 /// Time of a fast change of the engine's torque, s \[chosen\].
 const ENGINE_CHANGE_S: f64 = 0.05;
 /// Largest torque that accelerates the engine, N m: twice what an engine of this size gives \[chosen\].
-const ENGINE_MOST_N_M: f64 = 400.0;
+const ENGINE_MAX_N_M: f64 = 400.0;
 /// The scale is known no better than this \[chosen\]: scale and delay of the wheel trade with each other while the
 /// acceleration stands. A test of the combined study holds the errors after a launch against it.
-pub const SCALE_LEAST: f64 = 3e-4;
+pub const SCALE_MIN: f64 = 3e-4;
 
 /// Standard deviation of an error whose bound is the edge of a uniform distribution.
 pub fn std_dev_of(bound: f64) -> f64 {
@@ -52,6 +52,6 @@ pub fn engine_noise(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> EngineN
     EngineNoise {
         reading_rad_s: std_dev_rad_s(sensor, quantum_rad_s),
         acceleration_walk: ENGINE_CHANGE_N_M / ENGINE_KG_M2 / ENGINE_CHANGE_S.sqrt(),
-        acceleration_max_rad_s2: ENGINE_MOST_N_M / ENGINE_KG_M2,
+        acceleration_max_rad_s2: ENGINE_MAX_N_M / ENGINE_KG_M2,
     }
 }

@@ -23,7 +23,7 @@ use crate::{Budget, Reading};
 /// Longest time over which the lag is taken at its extreme, s; a longer sample is cut into pieces.
 const PIECE_S: f64 = 0.0101;
 /// Most pieces; beyond them each is longer, which makes the range wider and not wrong.
-const MOST_PIECES: usize = 8;
+const MAX_PIECES: usize = 8;
 /// Two readings more than this many usual periods apart have lost one between them: a command of between may be that of
 /// the lost one.
 const LOST: f64 = 1.5;
@@ -96,7 +96,7 @@ impl<T: Real> Periods<T> {
 /// What is known of the valve and the cylinder at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Limits<T> {
-    /// The lowest and the highest command that were in effect, and the least and greatest pressure that they end at, Pa.
+    /// The lowest and the highest command that were in effect, and the minimum and maximum pressure that they end at, Pa.
     commands: [T; 2],
     ends_pa: [T; 2],
     /// Lowest and highest settled pressure behind the hysteresis, Pa.
@@ -225,7 +225,7 @@ impl<T: Real> Limits<T> {
         if dt_s > T::zero() {
             let (mut pieces, mut length_s) = (1, dt_s);
             if dt_s > T::of(PIECE_S) {
-                pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+                pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MAX_PIECES);
                 length_s = dt_s / T::of(pieces as f64);
             }
             let mut at_s = start_s;
@@ -264,7 +264,7 @@ impl<T: Real> Limits<T> {
 }
 
 impl<T: Real> Budget<T> {
-    /// Least and greatest pressure that the commands in effect end at, Pa.
+    /// Minimum and maximum pressure that the commands in effect end at, Pa.
     #[inline]
     fn ends(&self, [lowest, highest]: [T; 2]) -> [T; 2] {
         let settled = |command: T, gain: T| gain * self.valve.settled_pressure(command);
@@ -290,8 +290,8 @@ impl<T: Real> Budget<T> {
     /// What the supply gives of settled pressures, Pa.
     #[inline]
     fn supplied(&self, [low, high]: [T; 2]) -> [T; 2] {
-        let [least, greatest] = self.line_pressure_pa;
-        [low.at_least(T::zero()).at_most(least), high.at_most(greatest)]
+        let [minimum, maximum] = self.line_pressure_pa;
+        [low.at_least(T::zero()).at_most(minimum), high.at_most(maximum)]
     }
 }
 

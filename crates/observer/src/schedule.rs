@@ -12,7 +12,7 @@ pub trait Mix<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Schedule<T, G> {
-    /// Least and greatest friction coefficient; of a constant gain, both the same.
+    /// Minimum and maximum friction coefficient; of a constant gain, both the same.
     pub friction: [T; 2],
     /// The gains there.
     pub ends: [G; 2],
@@ -37,9 +37,9 @@ impl<T: Real, G: Mix<T> + Copy> Schedule<T, G> {
     /// The gains at a friction coefficient.
     #[inline]
     pub fn at(&self, friction: T) -> G {
-        let [least, greatest] = self.friction;
-        if greatest > least {
-            let fraction = ((friction - least) / (greatest - least)).at_least(T::zero()).at_most(T::one());
+        let [minimum, maximum] = self.friction;
+        if maximum > minimum {
+            let fraction = ((friction - minimum) / (maximum - minimum)).at_least(T::zero()).at_most(T::one());
             self.ends[0].mixed(&self.ends[1], fraction)
         } else {
             self.ends[0]

@@ -56,7 +56,7 @@ pub struct ShaftErrors<T> {
     pub wheel_rad_s: T,
     /// Of the scale of the wheel speed, as a fraction.
     pub wheel_scale: T,
-    /// Greatest age of a reading, s.
+    /// Maximum age of a reading, s.
     pub age_s: T,
     /// Torque left in the offgoing clutch when it has let go and drained, N m.
     pub offgoing_n_m: T,
@@ -128,7 +128,7 @@ fn without<T: Real>(rows: [&AccelerationRow<T>; 2], this: Pick<T>, other: Pick<T
 
 type Pick<T> = fn(&AccelerationRow<T>) -> T;
 
-/// Least and greatest values over some time.
+/// Minimum and maximum values over some time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Span<T> {
     engine: [T; 2],
@@ -259,7 +259,7 @@ impl<T: Real> ShaftRange<T> {
         Some([spring[0] + damping[0], spring[1] + damping[1]])
     }
 
-    /// Least and greatest rate of the shafts' twist, rad/s at the wheels. Readings may be old: what they have not shown yet is taken
+    /// Minimum and maximum rate of the shafts' twist, rad/s at the wheels. Readings may be old: what they have not shown yet is taken
     /// to be as much again as they showed.
     fn twist_rates(&self, span: &Span<T>, reach_s: T, wheel_rad_s: T) -> [T; 2] {
         let (errors, line) = (&self.errors, &self.driveline);
@@ -274,12 +274,12 @@ impl<T: Real> ShaftRange<T> {
     fn seen(&self, [turbine, output]: [T; 2], dt_s: T, span: &Span<T>) -> Seen<T> {
         let errors = &self.errors;
         let rate = |change: T, error: T| [(change - error) / dt_s, (change + error) / dt_s];
-        let [least, most] = self.converter.turbine_range(span.engine, span.turbine);
+        let [minimum, maximum] = self.converter.turbine_range(span.engine, span.turbine);
         let fraction = errors.turbine_torque_share;
         Seen {
             turbine_rad_s2: rate(turbine, errors.turbine_rad_s),
             output_rad_s2: rate(output, errors.output_rad_s),
-            turbine_n_m: [least - fraction * least.abs(), most + fraction * most.abs()],
+            turbine_n_m: [minimum - fraction * minimum.abs(), maximum + fraction * maximum.abs()],
         }
     }
 }
@@ -401,8 +401,11 @@ mod tests {
         let twisting = Sample { wheel_rad_s: still.wheel_rad_s - 0.01, ..still };
         exact.step(&mut memory, Phase::TorquePhase, &twisting, [-1e6, 1e6]);
         let after = exact.step(&mut memory, Phase::TorquePhase, &twisting, [-1e6, 1e6]).unwrap();
-        let (most, damping) = (2.0 * DT_S * 13_000.0 * 0.01, 0.2);
-        assert!(after[0] >= before[0] - 1e-9 && after[1] <= before[1] + most + damping + 1e-9, "{before:?} {after:?}");
+        let (maximum, damping) = (2.0 * DT_S * 13_000.0 * 0.01, 0.2);
+        assert!(
+            after[0] >= before[0] - 1e-9 && after[1] <= before[1] + maximum + damping + 1e-9,
+            "{before:?} {after:?}"
+        );
     }
 
     #[test]

@@ -441,8 +441,8 @@ mod tests {
         let limits = limits::<T>();
         let of = |command: f64| limits.possible_command(T::of(command)).map(|command| command.to_f64_exact());
         assert_eq!([-0.003, -0.0099, 0.0].map(of), [Some(0.0); 3]);
-        let most = T::of(1.2).to_f64_exact();
-        assert_eq!([1.2, 1.209].map(of), [Some(most); 2]);
+        let maximum = T::of(1.2).to_f64_exact();
+        assert_eq!([1.2, 1.209].map(of), [Some(maximum); 2]);
         assert_eq!([-0.011, 1.211, f64::NAN, f64::NEG_INFINITY, f64::INFINITY].map(of), [None; 5]);
         assert_eq!(of(0.5), Some(0.5));
         let read = |value: f64, age_s: f64| limits.read_command(&Reading { value: T::of(value), age_s: T::of(age_s) });

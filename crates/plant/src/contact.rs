@@ -94,13 +94,13 @@ impl ContactProblem {
             *contact = guess;
         }
         // There are no more combinations than these.
-        let most = 3_usize.pow(u32::try_from(self.count).unwrap_or(0));
+        let maximum = 3_usize.pow(u32::try_from(self.count).unwrap_or(0));
         let mut changes = 0;
         loop {
             let (torques_n_m, slips_rad_s2) = self.balance(&contacts);
             let better = |at: usize| self.better(at, contacts[at], torques_n_m[at], slips_rad_s2[at]);
             match (0..self.count).find_map(|at| better(at).map(|contact| (at, contact))) {
-                Some((at, contact)) if changes < most => contacts[at] = contact,
+                Some((at, contact)) if changes < maximum => contacts[at] = contact,
                 _ => return ContactSolution { contacts, torques_n_m, slips_rad_s2, changes },
             }
             changes += 1;

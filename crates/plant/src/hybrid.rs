@@ -16,9 +16,9 @@ const MARGIN_SLACK: f64 = 1e-9;
 /// Accuracy to which the time of an event is located, s.
 const EVENT_TIME_S: f64 = 1e-12;
 /// Evaluations of an event function after which its zero is taken as found.
-const MOST_EVALUATIONS: usize = 100;
+const MAX_EVALUATIONS: usize = 100;
 /// Mode changes at one instant before the plant is declared inconsistent.
-const MOST_CHANGES: usize = 8;
+const MAX_CHANGES: usize = 8;
 
 /// Why a simulation could not go on.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -206,7 +206,7 @@ impl HybridIntegrator {
             // Repeat the step up to the event, so that its state has the accuracy of a step and not of the interpolant.
             let to_event = self.trial::<N, ROWS>(powertrain, &acting, &rates, theta * step_s);
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
-            if changes > MOST_CHANGES {
+            if changes > MAX_CHANGES {
                 return Err(PlantError::Chatter { time_s: self.time_s });
             }
             self.take(&to_event, self.time_s + theta * step_s, inputs, record);
@@ -367,14 +367,14 @@ pub(crate) fn root(f: impl Fn(f64) -> f64) -> f64 {
     let mut not_negative = (0.0, f(0.0).max(0.0));
     let mut negative = (1.0, f(1.0));
     let close = EVENT_TIME_S / LONGEST_STEP_S;
-    for evaluation in 0..MOST_EVALUATIONS {
+    for evaluation in 0..MAX_EVALUATIONS {
         let (width, value) = (negative.0 - not_negative.0, not_negative.1 - negative.1);
         if width <= close {
             break;
         }
         // Aiming a little beyond the zero brings the other end in, too. Bisection ends what converges badly.
         let aim = not_negative.0 + width * (not_negative.1 / value) + 0.5 * close;
-        let at = if evaluation < MOST_EVALUATIONS / 2 && aim < negative.0 { aim } else { not_negative.0 + 0.5 * width };
+        let at = if evaluation < MAX_EVALUATIONS / 2 && aim < negative.0 { aim } else { not_negative.0 + 0.5 * width };
         let here = f(at);
         if here < 0.0 {
             negative = (at, here);

@@ -62,8 +62,8 @@ fn a_nominal_fill_ends_gently_before_the_load_transfer_at_any_temperature() {
         // and leaves out the oil that presses the piston off its stop: a tenth for both.
         let clutch = stroke_vehicle().oncoming.clutch;
         let gentle_pa = clutch.kiss_pressure() + 2.0 * experiment.shift.fast_fill.stroke_over_kiss_pa;
-        let most_n_m = in_fill.iter().map(|s| s.torques.shift.oncoming_n_m).fold(0.0, f64::max);
-        assert!(most_n_m < 1.1 * clutch.torque_capacity(gentle_pa, 150.0), "{degc} degC: {most_n_m} N m");
+        let max_n_m = in_fill.iter().map(|s| s.torques.shift.oncoming_n_m).fold(0.0, f64::max);
+        assert!(max_n_m < 1.1 * clutch.torque_capacity(gentle_pa, 150.0), "{degc} degC: {max_n_m} N m");
         assert!(samples.last().unwrap().mode.oncoming == Contact::Stuck, "{degc} degC: no shift");
     }
 }
@@ -176,10 +176,10 @@ fn a_cylinder_without_stroke_and_capacity_has_the_pressure_of_the_valve() {
     for capacity_m3_pa in [4e-13, 4e-14] {
         let flow_m3_s = capacity_m3_pa * 0.9e6 / 0.05;
         let Cylinder { exhaust, viscosity_m2_s, .. } = smooth_vehicle().offgoing.cylinder;
-        let most_pa =
+        let max_pa =
             exhaust.laminar_pa_s2_m5 * viscosity_m2_s * flow_m3_s + exhaust.orifice_pa_s2_m6 * flow_m3_s * flow_m3_s;
         let found_pa = off_by(capacity_m3_pa);
-        assert!((0.8 * most_pa..most_pa).contains(&found_pa), "{found_pa} Pa of {most_pa} Pa");
+        assert!((0.8 * max_pa..max_pa).contains(&found_pa), "{found_pa} Pa of {max_pa} Pa");
     }
 }
 

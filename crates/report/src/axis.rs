@@ -43,7 +43,9 @@ impl Axis {
                 return Scale { low, high, step: nice_step((high - low) / ticks) };
             }
             (Self::Within(low, high), None) => (low, high),
-            (Self::Within(least, most), Some((low, high))) => (low.clamp(least, most), high.clamp(least, most)),
+            (Self::Within(minimum, maximum), Some((low, high))) => {
+                (low.clamp(minimum, maximum), high.clamp(minimum, maximum))
+            }
             (Self::All, None) => (0.0, 1.0),
             (Self::All, Some(extremes)) => extremes,
         };
@@ -92,9 +94,9 @@ fn short(value: f64) -> String {
 }
 
 /// The next larger number of the form 1, 2 or 5 times a power of ten.
-pub(crate) fn nice_step(least: f64) -> f64 {
-    let power = Real::powf(10.0, Real::log10(least).floor());
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|&step| step >= least * 0.999).unwrap_or(least)
+pub(crate) fn nice_step(minimum: f64) -> f64 {
+    let power = Real::powf(10.0, Real::log10(minimum).floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|&step| step >= minimum * 0.999).unwrap_or(minimum)
 }
 
 /// Decimals that tell multiples of a step apart.

@@ -89,11 +89,11 @@ fn scenarios(bench: &Bench, phase: Phase) -> Value {
 
 /// How sure the filter is.
 fn consistency(filter: &BenchConsistency) -> Value {
-    let (all, (scenario, least)) = (&filter.all, &filter.least);
+    let (all, (scenario, minimum)) = (&filter.all, &filter.minimum);
     context! {
         observer => &filter.observer,
         inside => coverage(all.inside_fraction()),
-        least => coverage(*least),
+        minimum => coverage(*minimum),
         scenario,
         nees => ratio(all.nees()),
         nis => all.nis().map(ratio),

@@ -115,10 +115,10 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &CarFile) -> Resul
 
 /// One shift in one phase, with every error.
 fn detail(shift: &ShiftSensitivity, phase: &PhaseOfShift, errors: &[ShiftErrorKind], car: &Car) -> Value {
-    let most = phase.std_dev_n_m().into_iter().fold(1e-9, f64::max);
+    let maximum = phase.std_dev_n_m().into_iter().fold(1e-9, f64::max);
     let cell = |error: &ShiftErrorKind| {
         let effect = phase.effects.iter().find(|effect| effect.error == *error).map_or(0.0, |e| e.torque_n_m[0]);
-        context! { text => number(effect, 1), shade => format!("{:.2}", (0.35 * effect / most).min(0.6)) }
+        context! { text => number(effect, 1), shade => format!("{:.2}", (0.35 * effect / maximum).min(0.6)) }
     };
     let [filter_pa, alone_pa] = phase.std_dev_pa().map(|pa| number(1e-3 * pa, 0));
     context! {

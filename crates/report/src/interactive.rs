@@ -10,8 +10,8 @@ use crate::svg_text::compact;
 
 /// Bytes of the figures of shifts in a page, and of the drawings among them. The rest of a page takes less than one megabyte, and a page
 /// stays below five.
-const MOST_BYTES: usize = 4_100_000;
-const MOST_DRAWING: usize = 300_000;
+const MAX_BYTES: usize = 4_100_000;
+const MAX_DRAWING: usize = 300_000;
 /// Points of a curve in a page.
 const POINTS: usize = 2000;
 /// Heights of an axis beyond which the values of a curve are cut: those of an observer that diverged.
@@ -99,10 +99,10 @@ struct Values {
 pub(crate) fn within_room(figures: impl Iterator<Item = Figure>) -> impl Iterator<Item = Value> {
     let (mut bytes, mut drawing) = (0, 0);
     figures.map_while(move |figure| {
-        let data = figure.markup(drawing < MOST_DRAWING);
+        let data = figure.markup(drawing < MAX_DRAWING);
         drawing += data.split("<noscript>").nth(1).map_or(0, str::len);
         bytes += data.len();
-        (bytes <= MOST_BYTES).then(|| Value::from_safe_string(data))
+        (bytes <= MAX_BYTES).then(|| Value::from_safe_string(data))
     })
 }
 
@@ -274,7 +274,7 @@ mod tests {
         let figures = |count: u32| (1..=count).map(|i| figure("a", wild(2_654_435_761 + 2 * i).collect()));
         let size = figures(1).map(|figure| figure.markup(false).len()).sum::<usize>();
         let all: Vec<String> = within_room(figures(1000)).map(|figure| figure.to_string()).collect();
-        assert!(all.len() < 1000 && all.iter().map(String::len).sum::<usize>() > MOST_BYTES - 10 * size);
+        assert!(all.len() < 1000 && all.iter().map(String::len).sum::<usize>() > MAX_BYTES - 10 * size);
         let drawn = all.iter().filter(|figure| figure.contains("<svg")).count();
         assert!(drawn > 0 && drawn < all.len() && all[0].contains("<svg"));
         assert_eq!(within_room(figures(3)).count(), 3);

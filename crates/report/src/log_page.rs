@@ -23,9 +23,9 @@ use crate::tables::{coverage, number};
 use crate::words::found;
 
 /// Shifts that are drawn.
-pub const MOST_DRAWN: usize = 400;
+pub const MAX_DRAWN: usize = 400;
 /// Rows of the table on the page; the files beside it have them all.
-const MOST_ROWS: usize = 1000;
+const MAX_ROWS: usize = 1000;
 /// Points of the curves of all drawn shifts together: a point takes about three bytes of the page.
 const POINTS: usize = 800_000;
 /// Curves in the figure of a shift, about.
@@ -56,7 +56,7 @@ impl LogPage<'_> {
     /// None in a released program; the tests render the template.
     pub fn html(&self) -> Result<String, PageError> {
         let drawn: Vec<&ShiftEstimate> =
-            self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MOST_DRAWN).collect();
+            self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MAX_DRAWN).collect();
         let points = POINTS / CURVES / drawn.len().max(1);
         let figures = within_room(drawn.iter().map(|shift| shift_figure(shift, self.vehicle, points)));
         let figures = drawn.iter().zip(figures).map(|(shift, figure)| {
@@ -70,9 +70,9 @@ impl LogPage<'_> {
         });
         let figures: Vec<Value> = figures.collect();
         let drawn = &drawn[..figures.len()];
-        let mut order: Vec<usize> = (0..self.shifts.len().min(MOST_ROWS)).collect();
+        let mut order: Vec<usize> = (0..self.shifts.len().min(MAX_ROWS)).collect();
         order.sort_by(|a, b| by_need(&self.shifts[*a], &self.shifts[*b]).then(a.cmp(b)));
-        let (titles, rows) = shift_rows(self.shifts, MOST_ROWS);
+        let (titles, rows) = shift_rows(self.shifts, MAX_ROWS);
         let is_drawn = |at: usize| drawn.iter().any(|shift| shift.number == self.shifts[at].number);
         let opened = order.iter().copied().find(|at| is_drawn(*at)).map(|at| self.shifts[at].number);
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
@@ -111,7 +111,7 @@ fn by_need(a: &ShiftEstimate, b: &ShiftEstimate) -> Ordering {
 }
 
 /// Titles of the table of shifts, and its first rows. Columns that no shift fills are left out.
-pub fn shift_rows(shifts: &[ShiftEstimate], most: usize) -> (Vec<String>, Vec<Vec<String>>) {
+pub fn shift_rows(shifts: &[ShiftEstimate], maximum: usize) -> (Vec<String>, Vec<Vec<String>>) {
     /// A title and its cell.
     type Column = (&'static str, fn(&ShiftEstimate) -> String);
     const COLUMNS: &[Column] = &[
@@ -127,7 +127,7 @@ pub fn shift_rows(shifts: &[ShiftEstimate], most: usize) -> (Vec<String>, Vec<Ve
         ("pressure MPa", |s| of(s, |e| Some(ranged(&e.pressure_pa, 1e-6, 3)))),
         ("clutch torque N m", |s| of(s, |e| Some(ranged(&e.torque_n_m, 1.0, 0)))),
         ("friction work kJ", |s| of(s, |e| Some(ranged(&e.friction_work_j, 1e-3, 1)))),
-        ("lowest shaft N m", |s| of(s, |e| Some(number(e.least_shaft_n_m?, 0)))),
+        ("lowest shaft N m", |s| of(s, |e| Some(number(e.min_shaft_n_m?, 0)))),
         ("flare rpm", |s| s.shift.quality.flare_rad_s.map_or(String::new(), |rad_s| number(rpm(rad_s), 0))),
         ("jerk m/s^3", |s| s.shift.quality.jerk_m_s3.map_or(String::new(), |jerk| number(jerk, 1))),
         ("pressure RMS error kPa", |s| of(s, |e| Some(number(1e-3 * e.pressure_error_pa?.rms, 1)))),
@@ -139,7 +139,7 @@ pub fn shift_rows(shifts: &[ShiftEstimate], most: usize) -> (Vec<String>, Vec<Ve
     let columns: Vec<&Column> = COLUMNS.iter().filter(is_filled).collect();
     let row = |shift: &ShiftEstimate| columns.iter().map(|(_, cell)| cell(shift)).collect();
     let titles = columns.iter().map(|(title, _)| (*title).to_owned()).collect();
-    (titles, shifts.iter().take(most).map(row).collect())
+    (titles, shifts.iter().take(maximum).map(row).collect())
 }
 
 /// A cell of an estimated shift; empty for others.
@@ -208,7 +208,7 @@ fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
     Figure {
         x_label: "time (s)",
         x_range: (first_s, last_s),
-        spans: spans.take(MOST_DRAWN).collect(),
+        spans: spans.take(MAX_DRAWN).collect(),
         panels: [
             panel("speed (rpm)", 150.0, speeds.collect()),
             Panel { band: Some(band), ..panel("clutch pressure (MPa)", 110.0, vec![pressure]) },
@@ -289,13 +289,13 @@ impl Samples<'_> {
     }
 
     /// The largest value up to a time; at least zero.
-    fn most(&self, until_s: f64, value: &dyn Fn(&LogSample) -> f64) -> f64 {
+    fn maximum(&self, until_s: f64, value: &dyn Fn(&LogSample) -> f64) -> f64 {
         let until = self.0.iter().filter(|sample| sample.time_s <= until_s);
         until.map(value).filter(|value| value.is_finite()).fold(0.0, f64::max)
     }
 
     fn pressure_panel(&self, until_s: f64) -> Panel {
-        let most = self.most(until_s, &|sample| {
+        let maximum = self.maximum(until_s, &|sample| {
             let measured = sample.pressure_pa.map_or(0.0, |reading| reading.value);
             mpa(sample.estimate.bounds.map_or(sample.estimate.pressure_pa, |b| b.pressure_pa[1]).max(measured))
         });
@@ -303,13 +303,13 @@ impl Samples<'_> {
         let series = self.beside_measured(measured, &|sample| mpa(sample.estimate.pressure_pa));
         Panel {
             band: self.band(&|sample| Some(sample.estimate.bounds?.pressure_pa.map(mpa))),
-            axis: Axis::Within(0.0, 1.1 * most.max(0.01)),
+            axis: Axis::Within(0.0, 1.1 * maximum.max(0.01)),
             ..panel("clutch pressure (MPa)", 150.0, series)
         }
     }
 
     fn torque_panel(&self, until_s: f64) -> Panel {
-        let most = self.most(until_s, &|sample| {
+        let maximum = self.maximum(until_s, &|sample| {
             let measured = sample.torque_n_m.map_or(0.0, |reading| reading.value);
             let estimate = &sample.estimate;
             estimate.bounds.map_or(estimate.clutch_torque_n_m, |b| b.clutch_torque_n_m[1]).max(measured)
@@ -318,7 +318,7 @@ impl Samples<'_> {
         let series = self.beside_measured(measured, &|sample| sample.estimate.clutch_torque_n_m);
         Panel {
             band: self.band(&|sample| Some(sample.estimate.bounds?.clutch_torque_n_m)),
-            axis: Axis::Within(-0.1 * most.max(1.0), 1.1 * most.max(1.0)),
+            axis: Axis::Within(-0.1 * maximum.max(1.0), 1.1 * maximum.max(1.0)),
             ..panel("clutch torque (N\u{a0}m)", 120.0, series)
         }
     }
@@ -388,14 +388,14 @@ pub(crate) fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> 
 
 /// A line at this height where a health holds. One sample of it is drawn until the next, and so wide that it is seen.
 fn held(healths: &[(f64, [bool; HEALTHS])], wanted: Health, height: f64) -> Vec<(f64, f64)> {
-    /// Least part of the axis: two or three pixels.
-    const LEAST: f64 = 1.0 / 300.0;
+    /// Minimum part of the axis: two or three pixels.
+    const MINIMUM: f64 = 1.0 / 300.0;
     let [first_s, last_s] = [healths.first(), healths.last()].map(|sample| sample.map_or(0.0, |(time_s, _)| *time_s));
     let mut until_s = f64::NEG_INFINITY;
     let point = |(at, (time_s, healths_then)): (usize, &(f64, [bool; HEALTHS]))| {
         if healths_then[wanted as usize] {
             let next_s = healths.get(at + 1).map_or(*time_s, |(next_s, _)| *next_s);
-            until_s = next_s.max(time_s + LEAST * (last_s - first_s));
+            until_s = next_s.max(time_s + MINIMUM * (last_s - first_s));
         }
         (*time_s, if *time_s <= until_s { height } else { f64::NAN })
     };

@@ -1,7 +1,7 @@
 //! Acceleration and jerk of the car through a shift.
 //!
 //! Both are derivatives of the parabola with the least squares of distances to the speed over 0.3 s around a time: that of
-//! [`drivetrain::jerk`], whose greatest jerk stands in the tables.
+//! [`drivetrain::jerk`], whose maximum jerk stands in the tables.
 
 use drivetrain::Real;
 use drivetrain::jerk::WINDOW_S;
@@ -12,7 +12,7 @@ use crate::panels::panel;
 /// Speeds that come faster are left out, s.
 const STEP_S: f64 = 0.01;
 /// Speeds that a parabola needs.
-const LEAST: usize = 7;
+const MINIMUM: usize = 7;
 /// Part of the window that they span at least.
 const WHOLE: f64 = 0.95;
 /// Times are sums of periods, and differ in their last digits, s.
@@ -46,7 +46,7 @@ fn derivatives(speeds: &[(f64, f64)], time_s: f64) -> Option<[f64; 2]> {
     let to = speeds.partition_point(|(at_s, _)| *at_s <= time_s + half_s + ROUNDING_S);
     let window = &speeds[from..to];
     let ((first_s, first), (last_s, _)) = (*window.first()?, *window.last()?);
-    if window.len() < LEAST || last_s - first_s < WHOLE * WINDOW_S {
+    if window.len() < MINIMUM || last_s - first_s < WHOLE * WINDOW_S {
         return None;
     }
     // Normal equations in times of about -1 to 1, solved by Cramer's rule.

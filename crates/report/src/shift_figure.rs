@@ -17,7 +17,7 @@ pub(crate) const INERTIA_PHASE: &str = "#ededed";
 /// How much is shown before the load transfer and after lock-up, over the time between them.
 const MARGIN: f64 = 0.55;
 /// Smallest range of pressures that an axis is made for, MPa.
-const LEAST_MPA: f64 = 0.01;
+const MIN_MPA: f64 = 0.01;
 
 /// Speeds, pressures, errors, torques and currents through the shift.
 pub fn shift_figure(comparison: &Comparison) -> Figure {
@@ -141,7 +141,7 @@ impl<'a> Curves<'a> {
     fn pressure(&self) -> Option<Panel> {
         let truth = self.signal("true", Stroke::TRUTH, signal::ONCOMING_PRESSURE, units::mpa);
         let (low, high) = self.until_lock_up(&truth)?;
-        let size = (high - low).max(LEAST_MPA);
+        let size = (high - low).max(MIN_MPA);
         Some(Panel {
             band: self.range(|bounds| Some(bounds.pressure_pa.map(units::mpa))),
             axis: Axis::Within(low - 0.2 * size, high + 0.3 * size),
@@ -157,11 +157,11 @@ impl<'a> Curves<'a> {
     fn pressure_error(&self) -> Option<Panel> {
         let truth = self.signal("true", Stroke::TRUTH, signal::ONCOMING_PRESSURE, units::mpa);
         let (low, high) = self.until_lock_up(&truth)?;
-        let most = 0.5 * (high - low).max(LEAST_MPA);
+        let maximum = 0.5 * (high - low).max(MIN_MPA);
         let errors = self.of_observers(|run, i| units::mpa(run.truth_pa[i] - run.estimates[i].pressure_pa));
         Some(Panel {
             band: self.certified_band(),
-            axis: Axis::Within(-most, most),
+            axis: Axis::Within(-maximum, maximum),
             ..panel("pressure error (MPa)", 165.0, errors)
         })
     }

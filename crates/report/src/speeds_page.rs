@@ -14,7 +14,7 @@ use trace::units::{km_h, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
 use crate::interactive::within_room;
-use crate::log_page::MOST_DRAWN;
+use crate::log_page::MAX_DRAWN;
 use crate::motion::motion_panels;
 use crate::page::{PageError, origin, render};
 use crate::palette::{RANGE, Weight};
@@ -75,7 +75,7 @@ impl SpeedsPage<'_> {
     /// None in a released program; the tests render the template.
     pub fn html(&self) -> Result<String, PageError> {
         let torques: Vec<Option<ShiftTorque>> = self.torques();
-        let drawn = || self.shifts.iter().zip(&torques).take(MOST_DRAWN);
+        let drawn = || self.shifts.iter().zip(&torques).take(MAX_DRAWN);
         let of_shifts = within_room(drawn().map(|(shift, torque)| self.shift_figure(shift, torque.as_ref())));
         let figures: Vec<Value> = drawn()
             .zip(of_shifts)
@@ -151,9 +151,9 @@ impl SpeedsPage<'_> {
         }
         let asked = self.shifts.iter().zip(torques).filter_map(|(shift, torque)| {
             let torque = torque.as_ref()?;
-            let ([least, length_s], error) = (torque.reduction?, torque.reduction_error_n_m?);
+            let ([minimum, length_s], error) = (torque.reduction?, torque.reduction_error_n_m?);
             Some(format!(
-                "{}-{} (to {least:.0} N m for {length_s:.2} s; the engine's torque was {error:.0} N m from it on average)",
+                "{}-{} (to {minimum:.0} N m for {length_s:.2} s; the engine's torque was {error:.0} N m from it on average)",
                 shift.from, shift.to
             ))
         });
@@ -166,9 +166,9 @@ impl SpeedsPage<'_> {
 
     /// What this log cannot tell.
     fn cannot(&self) -> Vec<String> {
-        let [least, greatest] = TURBINE_SIDE_INERTIA_KG_M2;
+        let [minimum, maximum] = TURBINE_SIDE_INERTIA_KG_M2;
         let converter = format!(
-            "Not the torque ratio of the converter: nothing measures the turbine's torque. It is taken as anything from 1 to a line from 2.2 at stall to 1 at speed ratio 0.9; the inertia of the turbine's side as {least:.2} to {greatest:.2} kg m². Both are in the ranges."
+            "Not the torque ratio of the converter: nothing measures the turbine's torque. It is taken as anything from 1 to a line from 2.2 at stall to 1 at speed ratio 0.9; the inertia of the turbine's side as {minimum:.2} to {maximum:.2} kg m². Both are in the ranges."
         );
         let mut said: Vec<&str> = Vec::new();
         if !self.has_command {
@@ -191,10 +191,10 @@ impl SpeedsPage<'_> {
 
     /// Spans without slip of at least half a second.
     fn no_slip(&self) -> Vec<[f64; 2]> {
-        const LEAST_S: f64 = 0.5;
-        let spans = self.moments.chunk_by(|a, b| a.no_slip == b.no_slip && b.time_s - a.time_s < LEAST_S);
+        const MIN_S: f64 = 0.5;
+        let spans = self.moments.chunk_by(|a, b| a.no_slip == b.no_slip && b.time_s - a.time_s < MIN_S);
         let ends = |span: &[Moment]| Some([span.first()?.time_s, span.last()?.time_s]).filter(|_| span[0].no_slip);
-        spans.filter_map(ends).filter(|[from_s, to_s]| to_s - from_s >= LEAST_S).collect()
+        spans.filter_map(ends).filter(|[from_s, to_s]| to_s - from_s >= MIN_S).collect()
     }
 
     fn no_slip_text(&self, [from_s, to_s]: [f64; 2]) -> String {
@@ -267,7 +267,7 @@ impl SpeedsPage<'_> {
         let span_s = |moments: &[Moment]| Some((moments.first()?.time_s, moments.last()?.time_s));
         let x_range = span_s(self.moments).unwrap_or((0.0, 1.0));
         let all = |series: &Readings, unit: fn(f64) -> f64| points(series, [x_range.0, x_range.1], POINTS, unit);
-        let spans = self.shifts.iter().take(MOST_DRAWN).map(|shift| Span {
+        let spans = self.shifts.iter().take(MAX_DRAWN).map(|shift| Span {
             label: String::new(),
             start: shift.start_s(),
             end: shift.gear_s.unwrap_or(shift.end_s()).max(shift.end_s()),
@@ -296,14 +296,14 @@ impl SpeedsPage<'_> {
         Figure { x_label: "time (s)", x_range, spans: spans.collect(), panels: with_values(panels).0 }
     }
 
-    fn gears(&self, span_s: [f64; 2], most: usize) -> Panel {
+    fn gears(&self, span_s: [f64; 2], maximum: usize) -> Panel {
         /// Forward gears of a car whose ratios are not given: larger numbers are codes for reverse and neutral.
-        const MOST_GEARS: usize = 10;
-        let highest = if self.ratios.is_empty() { MOST_GEARS } else { self.ratios.len() };
+        const MAX_GEARS: usize = 10;
+        let highest = if self.ratios.is_empty() { MAX_GEARS } else { self.ratios.len() };
         let highest = highest as f64;
         // Numbers beyond the forward gears stand for others.
         let gear = |series: &Readings| {
-            let points = points(series, span_s, most, |gear| gear);
+            let points = points(series, span_s, maximum, |gear| gear);
             points.into_iter().map(|(t, gear)| (t, if gear > highest { f64::NAN } else { gear })).collect()
         };
         panel(
@@ -316,12 +316,12 @@ impl SpeedsPage<'_> {
         )
     }
 
-    fn engine_torques(&self, span_s: [f64; 2], most: usize, height: f64) -> Panel {
+    fn engine_torques(&self, span_s: [f64; 2], maximum: usize, height: f64) -> Panel {
         let record = self.record;
-        let torque = points(&record.engine_torque, span_s, most, |n_m| n_m);
+        let torque = points(&record.engine_torque, span_s, maximum, |n_m| n_m);
         // Requests come in pieces; between them nothing is asked for.
         let mut asked: Vec<(f64, f64)> = Vec::new();
-        for (time_s, n_m) in points(&record.torque_request, span_s, most, |n_m| n_m) {
+        for (time_s, n_m) in points(&record.torque_request, span_s, maximum, |n_m| n_m) {
             if let Some((last_s, _)) = asked.last().filter(|(last_s, _)| time_s - last_s > 0.1).copied() {
                 asked.push((last_s + 1e-6, f64::NAN));
             }
@@ -329,9 +329,9 @@ impl SpeedsPage<'_> {
         }
         // Requests may begin or end far above what an engine gives.
         let torques = || torque.iter().map(|(_, n_m)| *n_m);
-        let (least, most) = (torques().fold(0.0, f64::min), torques().fold(10.0, f64::max));
+        let (minimum, maximum) = (torques().fold(0.0, f64::min), torques().fold(10.0, f64::max));
         Panel {
-            axis: Axis::Within(1.2 * least, 1.2 * most),
+            axis: Axis::Within(1.2 * minimum, 1.2 * maximum),
             ..panel(
                 "engine torque (N\u{a0}m)",
                 height,
@@ -466,9 +466,9 @@ fn series(label: &str, stroke: Stroke, points: Vec<(f64, f64)>) -> Series {
 }
 
 /// At most so many readings of a span, evenly.
-fn points(readings: &Readings, span_s: [f64; 2], most: usize, unit: fn(f64) -> f64) -> Vec<(f64, f64)> {
+fn points(readings: &Readings, span_s: [f64; 2], maximum: usize, unit: fn(f64) -> f64) -> Vec<(f64, f64)> {
     let count = readings.between(span_s).count();
-    let every = count.div_ceil(most).max(1);
+    let every = count.div_ceil(maximum).max(1);
     readings.between(span_s).step_by(every).map(|(time_s, value)| (time_s, unit(value))).collect()
 }
 

@@ -208,8 +208,8 @@ fn distributions(summary: &Summary, study: &Study) -> Figure {
 fn reach<'a>(errors: impl Iterator<Item = &'a Distribution>) -> f64 {
     let of_one = |d: &Distribution| d.quantile(DRAWN_FRACTION).min(10.0 * d.quantile(0.5));
     let reaches: Vec<f64> = errors.map(of_one).filter(|reach| reach.is_finite() && *reach > 0.0).collect();
-    let least = reaches.iter().copied().fold(f64::INFINITY, f64::min);
-    reaches.into_iter().filter(|&reach| reach <= 10.0 * least).reduce(f64::max).unwrap_or(NO_RUNS_REACH_PA)
+    let minimum = reaches.iter().copied().fold(f64::INFINITY, f64::min);
+    reaches.into_iter().filter(|&reach| reach <= 10.0 * minimum).reduce(f64::max).unwrap_or(NO_RUNS_REACH_PA)
 }
 
 /// Mean error of the first observer over the factors that move it most, and of the open loop over the same.

@@ -80,7 +80,7 @@ pub struct BenchSummary {
     pub shaft_median_rms_n_m: Option<f64>,
     /// The largest of these.
     pub shaft_worst_rms_n_m: Option<f64>,
-    /// Least coverage of the guaranteed range over the scenarios.
+    /// Minimum coverage of the guaranteed range over the scenarios.
     pub range_least_coverage: Option<f64>,
     /// The same of the expected range of the drive-shaft torque.
     pub shaft_range_least_coverage: Option<f64>,
@@ -104,7 +104,7 @@ pub struct BenchSummary {
 pub struct Bench {
     /// Every scenario.
     pub rows: Vec<BenchRow>,
-    /// Every observer, the one with the least error over the shift first.
+    /// Every observer, the one with the smallest error over the shift first.
     pub ranking: Vec<BenchSummary>,
     /// The first Kalman filter of the experiment against itself, if there is one.
     pub consistency: Option<BenchConsistency>,
@@ -117,16 +117,17 @@ pub struct BenchConsistency {
     pub observer: String,
     /// Over the scenarios that were completed, each with one draw of the sensors' noise.
     pub all: Consistency,
-    /// The scenario with the least fraction of samples in the filter's 95 % band, and this fraction.
-    pub least: (String, f64),
+    /// The scenario with the minimum fraction of samples in the filter's 95 % band, and this fraction.
+    #[serde(rename = "least")]
+    pub minimum: (String, f64),
 }
 
 impl BenchConsistency {
     fn of(observer: &str, scenarios: &[(String, Consistency)]) -> Option<Self> {
         let all = scenarios.iter().fold(Consistency::default(), |all, (_, one)| all.with(one));
         let fractions = scenarios.iter().map(|(name, one)| (name.clone(), one.inside_fraction()));
-        let least = fractions.filter(|(_, fraction)| fraction.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
-        Some(Self { observer: observer.to_owned(), all, least })
+        let minimum = fractions.filter(|(_, fraction)| fraction.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(Self { observer: observer.to_owned(), all, minimum })
     }
 }
 

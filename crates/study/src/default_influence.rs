@@ -44,7 +44,7 @@ pub struct Influence {
     pub changes: [ChangeOfEstimate; OBSERVERS.len()],
 }
 
-/// What each default with a stated uncertainty may do, the greatest change of the default observer's pressure first; none where the
+/// What each default with a stated uncertainty may do, the largest change of the default observer's pressure first; none where the
 /// simulated car makes no whole shift.
 ///
 /// # Errors
@@ -60,11 +60,11 @@ pub fn default_influences(vehicle: &VehicleFile) -> Result<Option<Vec<Influence>
         for limit in off.limits {
             let Ok(changed) = taken.at_limit(vehicle, off.change, limit) else { continue };
             limits.push(limit);
-            for ((kind, nominal), most) in OBSERVERS.iter().zip(&nominal).zip(&mut changes) {
+            for ((kind, nominal), maximum) in OBSERVERS.iter().zip(&nominal).zip(&mut changes) {
                 let (Ok(nominal), Ok(other)) = (nominal, estimates(&changed, *kind, &readings.trace)) else { continue };
                 let change = readings.change(nominal, &other);
-                most.pressure_pa = most.pressure_pa.max(change.pressure_pa);
-                most.torque_n_m = most.torque_n_m.max(change.torque_n_m);
+                maximum.pressure_pa = maximum.pressure_pa.max(change.pressure_pa);
+                maximum.torque_n_m = maximum.torque_n_m.max(change.torque_n_m);
             }
         }
         if !limits.is_empty() {

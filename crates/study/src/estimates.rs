@@ -10,14 +10,14 @@ const ALWAYS: [Number; 2] =
     [(signal::PRESSURE_ESTIMATE, |e| Some(e.pressure_pa)), (signal::TORQUE_ESTIMATE, |e| Some(e.clutch_torque_n_m))];
 const SHAFT: [Number; 1] = [(signal::SHAFT_ESTIMATE, |e| e.shaft_torque_n_m)];
 const RANGE: [Number; 4] = [
-    (signal::PRESSURE_LEAST, |e| Some(e.bounds?.pressure_pa[0])),
-    (signal::PRESSURE_GREATEST, |e| Some(e.bounds?.pressure_pa[1])),
-    (signal::TORQUE_LEAST, |e| Some(e.bounds?.clutch_torque_n_m[0])),
-    (signal::TORQUE_GREATEST, |e| Some(e.bounds?.clutch_torque_n_m[1])),
+    (signal::PRESSURE_MIN, |e| Some(e.bounds?.pressure_pa[0])),
+    (signal::PRESSURE_MAX, |e| Some(e.bounds?.pressure_pa[1])),
+    (signal::TORQUE_MIN, |e| Some(e.bounds?.clutch_torque_n_m[0])),
+    (signal::TORQUE_MAX, |e| Some(e.bounds?.clutch_torque_n_m[1])),
 ];
 const SHAFT_RANGE: [Number; 2] = [
-    (signal::SHAFT_LEAST, |e| Some(e.bounds?.shaft_torque_n_m?[0])),
-    (signal::SHAFT_GREATEST, |e| Some(e.bounds?.shaft_torque_n_m?[1])),
+    (signal::SHAFT_MIN, |e| Some(e.bounds?.shaft_torque_n_m?[0])),
+    (signal::SHAFT_MAX, |e| Some(e.bounds?.shaft_torque_n_m?[1])),
 ];
 
 /// Which columns estimates have.

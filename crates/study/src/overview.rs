@@ -5,7 +5,7 @@ use observer::Health;
 use crate::shift_estimates::LogSample;
 
 /// Intervals of time in an overview, at most.
-const MOST: usize = 600;
+const MAXIMUM: usize = 600;
 /// The first interval, s. It doubles when the drive has filled the most of them.
 const FIRST_S: f64 = 0.01;
 
@@ -89,7 +89,7 @@ impl Overview {
             self.first_s = sample.time_s;
         }
         let place = |interval_s: f64| (sample.time_s - self.first_s) / interval_s;
-        while place(self.interval_s) >= MOST as f64 {
+        while place(self.interval_s) >= MAXIMUM as f64 {
             self.interval_s *= 2.0;
             self.intervals =
                 self.intervals.chunks(2).map(|pair| pair[0].joined(pair.get(1).unwrap_or(&EMPTY))).collect();
@@ -147,7 +147,7 @@ mod tests {
             overview.push(&sample(1e9 + f64::from(i) * 0.01, if odd { 900.0 } else { 100.0 }, health));
         }
         let intervals: Vec<_> = overview.intervals().collect();
-        assert!((MOST / 2..=MOST).contains(&intervals.len()));
+        assert!((MAXIMUM / 2..=MAXIMUM).contains(&intervals.len()));
         let odd: Vec<_> = intervals.iter().filter(|(_, i)| i.healths[Health::SpeedsRejected as usize]).collect();
         assert_eq!(odd.len(), 1);
         let ([from_s, to_s], interval) = odd[0];

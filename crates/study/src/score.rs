@@ -149,7 +149,7 @@ pub struct RangeScore {
 }
 
 impl RangeScore {
-    /// The least fraction of samples inside of the two guaranteed ranges, of pressure and clutch torque.
+    /// The minimum fraction of samples inside of the two guaranteed ranges, of pressure and clutch torque.
     pub fn inside(&self) -> f64 {
         self.pressure_inside.min(self.torque_inside)
     }
@@ -205,7 +205,7 @@ pub struct ShiftQuality {
     pub lock_up_s: f64,
     /// Flare: how far the turbine rose above the speed of the gear before the shift, rad/s.
     pub flare_rad_s: f64,
-    /// Tie-up: the least drive-shaft torque from the request to lock-up, N m. Negative brakes the car.
+    /// Tie-up: the minimum drive-shaft torque from the request to lock-up, N m. Negative brakes the car.
     pub least_shaft_torque_n_m: f64,
     /// Jerk of the car, m/s^3, as [`drivetrain::jerk`] defines it.
     pub jerk_peak_m_s3: f64,

@@ -74,7 +74,7 @@ const AFTER_S: f64 = 0.9;
 /// What is held: a shift is known so long after it began, and no observer runs ahead of its log.
 const HELD_S: f64 = logs::shifts::LONGEST_S + logs::shifts::SETTLED_S + BEFORE_S + 1.0;
 /// No more samples are held, whatever their rate.
-const MOST_HELD: usize = 500_000;
+const MAX_HELD: usize = 500_000;
 
 /// The last seconds of a log.
 #[derive(Debug, Clone)]
@@ -101,7 +101,7 @@ impl RecentSamples {
         self.first = self.first.min(self.samples.len());
         self.samples.push(sample);
         let oldest_s = self.held.oldest_s(sample.time_s);
-        let is_old = |first: usize| self.samples[first].time_s < oldest_s || self.samples.len() - first > MOST_HELD;
+        let is_old = |first: usize| self.samples[first].time_s < oldest_s || self.samples.len() - first > MAX_HELD;
         while self.first < self.samples.len() && is_old(self.first) {
             self.first += 1;
         }
@@ -157,7 +157,7 @@ pub struct EstimatedShift {
     /// Mean clutch torque in the inertia phase, N m.
     pub torque_n_m: Ranged,
     /// Lowest drive-shaft torque of the shift, N m: its tie-up, or the hole in its torque; where the observer estimates it.
-    pub least_shaft_n_m: Option<f64>,
+    pub min_shaft_n_m: Option<f64>,
     /// Work of friction in the oncoming clutch, J, and what the range of its torque allows.
     pub friction_work_j: Ranged,
     /// Error of the pressure from the torque phase to lock-up, Pa, where it was measured.
@@ -186,8 +186,8 @@ pub struct ShiftEstimate {
 }
 
 /// At most so many of these samples: of those that lie together the one with the worst health.
-pub fn thinned(samples: &[LogSample], most: usize) -> Vec<LogSample> {
-    let together = samples.len().div_ceil(most.max(1)).max(1);
+pub fn thinned(samples: &[LogSample], maximum: usize) -> Vec<LogSample> {
+    let together = samples.len().div_ceil(maximum.max(1)).max(1);
     let mut kept = Vec::with_capacity(samples.len().div_ceil(together));
     let worst = |samples: &[LogSample]| samples.iter().max_by_key(|sample| sample.estimate.health).copied();
     kept.extend(samples.chunks(together).filter_map(worst));
@@ -272,7 +272,7 @@ pub const COLUMNS: &[Column] = &[
     ("oncoming_torque_mean_n_m", |s| estimated(s, |e| Some(e.torque_n_m.value))),
     ("oncoming_torque_mean_least_n_m", |s| estimated(s, |e| e.torque_n_m.end(0))),
     ("oncoming_torque_mean_greatest_n_m", |s| estimated(s, |e| e.torque_n_m.end(1))),
-    ("least_shaft_torque_n_m", |s| estimated(s, |e| e.least_shaft_n_m)),
+    ("least_shaft_torque_n_m", |s| estimated(s, |e| e.min_shaft_n_m)),
     ("friction_work_j", |s| estimated(s, |e| Some(e.friction_work_j.value))),
     ("friction_work_least_j", |s| estimated(s, |e| e.friction_work_j.end(0))),
     ("friction_work_greatest_j", |s| estimated(s, |e| e.friction_work_j.end(1))),
@@ -334,7 +334,7 @@ impl EstimatedShift {
             lock_up_s,
             pressure_pa: mean(in_inertia.clone().map(pressure))?,
             torque_n_m: mean(in_inertia.map(torque))?,
-            least_shaft_n_m: shaft.reduce(f64::min),
+            min_shaft_n_m: shaft.reduce(f64::min),
             friction_work_j: friction_work(samples, begin..end, reduced),
             pressure_error_pa: measured(|s| s.pressure_pa, pressure),
             torque_error_n_m: measured(|s| s.torque_n_m, torque),

@@ -23,7 +23,7 @@ const LARGE: [Size; 4] = [
     (5014.0, 715.0, 0.38, 2.85, 1.66, 5.7),
     (3017.0, 519.0, 0.44, 1.86, 1.36, 3.6),
 ];
-/// The first dozen of a Sobol sequence are near its corners: they would weigh the greatest errors too much.
+/// The first dozen of a Sobol sequence are near its corners: they would weigh the largest errors too much.
 const RUNS: u64 = 40;
 
 /// The study of all errors at once for one car, whose mass is up to 15 % off.

@@ -207,14 +207,14 @@ fn a_command_that_is_late_or_slow_leaves_a_range_of_use() {
     let late = |step: usize| Some(Reading { age_s: SAMPLE_S, ..logged(step.checked_sub(1)?)? });
     let slow = |step: usize| logged(step).filter(|_| step.is_multiple_of(2));
     // Mean widths over the last two seconds, MPa; by the budget any command may have been sent right after a reading.
-    for (name, rows, most_mpa) in
+    for (name, rows, max_mpa) in
         [("as sent", with(&logged), 0.25), ("late", with(&late), 0.9), ("slow", with(&slow), 0.6)]
     {
         let estimates = field.estimates(&filter, &rows);
         let ranges = || estimates.iter().map(|estimate| estimate.bounds.unwrap().pressure_pa);
         let outside = ranges().zip(&rows).filter(|([low, high], (.., truth))| !(low..=high).contains(&truth)).count();
         let mean_mpa = ranges().rev().take(200).map(|[low, high]| (high - low) / 1e6).sum::<f64>() / 200.0;
-        assert!(outside == 0 && mean_mpa < most_mpa, "{name}: {outside} outside, {mean_mpa} MPa wide");
+        assert!(outside == 0 && mean_mpa < max_mpa, "{name}: {outside} outside, {mean_mpa} MPa wide");
     }
 }
 

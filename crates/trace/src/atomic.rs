@@ -235,12 +235,12 @@ pub fn check_target(path: &Path) -> io::Result<Option<fs::Metadata>> {
 }
 
 /// Links that are followed: as many as Linux does.
-const MOST_LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// The path behind the links. A link to a missing file gives the path of that file.
 fn behind_links(path: &Path) -> io::Result<PathBuf> {
     let mut target = path.to_owned();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         match fs::symlink_metadata(&target) {
             Ok(there) if there.is_symlink() => {
                 let link = fs::read_link(&target)?;

@@ -106,7 +106,7 @@ fn column_hint(wanted: &str, present: &[String]) -> String {
         return format!("rename `{near}` to `time_s` or `time_ms` if it is in s or ms; {TIME_BY_MAP}");
     }
     let endings = endings_like(wanted);
-    const MOST: usize = 20;
+    const MAXIMUM: usize = 20;
     // What a name is about: without its unit, and without a word that many names have.
     let about = |name: &str| -> Vec<String> {
         let (name, _) = units::to_si(name);
@@ -123,9 +123,9 @@ fn column_hint(wanted: &str, present: &[String]) -> String {
         let near = TraceError::shown(near);
         return format!("`{near}` has a similar name; rename it, with its unit at the end{endings}");
     }
-    let names: Vec<String> = present.iter().take(MOST).map(|name| TraceError::shown(name)).collect();
+    let names: Vec<String> = present.iter().take(MAXIMUM).map(|name| TraceError::shown(name)).collect();
     match present.len() {
-        more if more > MOST => format!("the columns are {} and {} more", names.join(", "), more - MOST),
+        more if more > MAXIMUM => format!("the columns are {} and {} more", names.join(", "), more - MAXIMUM),
         _ => format!("the columns are {}", names.join(", ")),
     }
 }

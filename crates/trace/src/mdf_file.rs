@@ -9,7 +9,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use crate::{Cell, ColumnKind, Unit, signal};
 
 /// Different words that a column can have: a byte tells them apart.
-const MOST_WORDS: usize = 255;
+const MAX_WORDS: usize = 255;
 
 /// Places of links and counts that are set at the end, counted in the file's bytes.
 struct Places {
@@ -159,7 +159,7 @@ impl<W: Write + Seek> MdfWriter<W> {
                         words.push(word.to_owned());
                         words.len() - 1
                     });
-                    let number = u8::try_from(at).ok().filter(|_| words.len() <= MOST_WORDS);
+                    let number = u8::try_from(at).ok().filter(|_| words.len() <= MAX_WORDS);
                     set(&mut record, &[number.ok_or_else(|| io::Error::other("a column has more than 255 words"))?]);
                 }
                 _ => return Err(io::Error::other("a cell is not of the kind of its column")),

@@ -123,17 +123,17 @@ pub const TORQUE_ESTIMATE: &str = "oncoming_torque_estimate_n_m";
 /// Estimated drive-shaft torque, N m.
 pub const SHAFT_ESTIMATE: &str = "shaft_torque_estimate_n_m";
 /// Lower end of the guaranteed range of the pressure, Pa.
-pub const PRESSURE_LEAST: &str = "oncoming_pressure_least_pa";
+pub const PRESSURE_MIN: &str = "oncoming_pressure_least_pa";
 /// Upper end of the guaranteed range of the pressure, Pa.
-pub const PRESSURE_GREATEST: &str = "oncoming_pressure_greatest_pa";
+pub const PRESSURE_MAX: &str = "oncoming_pressure_greatest_pa";
 /// Lower end of the guaranteed range of the clutch torque, N m.
-pub const TORQUE_LEAST: &str = "oncoming_torque_least_n_m";
+pub const TORQUE_MIN: &str = "oncoming_torque_least_n_m";
 /// Upper end of the guaranteed range of the clutch torque, N m.
-pub const TORQUE_GREATEST: &str = "oncoming_torque_greatest_n_m";
+pub const TORQUE_MAX: &str = "oncoming_torque_greatest_n_m";
 /// Lower end of the expected range of the drive-shaft torque, N m.
-pub const SHAFT_LEAST: &str = "shaft_torque_least_n_m";
+pub const SHAFT_MIN: &str = "shaft_torque_least_n_m";
 /// Upper end of the expected range of the drive-shaft torque, N m.
-pub const SHAFT_GREATEST: &str = "shaft_torque_greatest_n_m";
+pub const SHAFT_MAX: &str = "shaft_torque_greatest_n_m";
 /// Phase according to the supervisor, a word.
 pub const PHASE: &str = "phase";
 /// Whether the input could be used, a word.

@@ -119,8 +119,8 @@ mod tests {
 
     impl Read for Slow {
         fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-            let most = bytes.len().min(1);
-            self.0.read(&mut bytes[..most])
+            let maximum = bytes.len().min(1);
+            self.0.read(&mut bytes[..maximum])
         }
     }
 

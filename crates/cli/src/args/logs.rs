@@ -185,7 +185,7 @@ pub(crate) struct Init {
     /// Ratio from gearbox output to wheels, 0.5 to 10; 1 for dual_clutch_7, whose ratios contain it
     #[arg(long, value_name = "RATIO", allow_negative_numbers = true, value_parser = within(0.5..=10.0))]
     pub(crate) final_ratio: f64,
-    /// Greatest engine torque, N m: 20 to 2000
+    /// Maximum engine torque, N m: 20 to 2000
     #[arg(long, value_name = "N_M", allow_negative_numbers = true, value_parser = within(20.0..=2000.0))]
     pub(crate) engine_torque_n_m: f64,
     /// Kind of the clutches' valves

@@ -147,7 +147,7 @@ fn failures(result: &Bench) -> Result<(), Failure> {
 
 /// How sure the filter is, and what single precision costs it.
 fn consistent(filter: &BenchConsistency) -> String {
-    let (all, (scenario, least)) = (&filter.all, &filter.least);
+    let (all, (scenario, minimum)) = (&filter.all, &filter.minimum);
     let [turbine, output, wheel] = all.nis();
     format!(
         "\n{}: the true pressure is in its own 95 % band at {} of the samples of the shifts, least in `{scenario}` with {}\n\
@@ -157,7 +157,7 @@ fn consistent(filter: &BenchConsistency) -> String {
          {} restarts",
         filter.observer,
         coverage(all.inside_fraction()),
-        coverage(*least),
+        coverage(*minimum),
         all.nees(),
         coverage(all.same_fraction()),
         1e-3 * all.largest_pa,

@@ -77,10 +77,10 @@ pub(super) fn describe_gearbox(car: &Car) -> Result<(), Failure> {
     output::line(&torques_asked(car))?;
     gearbox::shifts(&car.gearbox)?;
     if car.gearbox.has_ratios_alone() {
-        let [least, greatest] = TURBINE_SIDE_INERTIA_KG_M2;
+        let [minimum, maximum] = TURBINE_SIDE_INERTIA_KG_M2;
         output::line(&format!(
             "ratios alone: `wetclutch estimate` gives the torque of all clutches together, as the turbine feels it, with its standard deviation.\n\
-             Without `shift_mass` in the gearbox file, M11 is assumed, somewhere from {least} to {greatest} kg m2 for an engine of 190 N m, and makes most of that\n\
+             Without `shift_mass` in the gearbox file, M11 is assumed, somewhere from {minimum} to {maximum} kg m2 for an engine of 190 N m, and makes most of that\n\
              deviation in a shift. The torque of a clutch needs the holding torques (level = \"shares\"), its pressure plates and piston besides (`pack`)"
         ))?;
     }
@@ -91,7 +91,7 @@ pub(super) fn describe_gearbox(car: &Car) -> Result<(), Failure> {
 fn torques_asked(car: &Car) -> String {
     let mut asked: Vec<(String, Vec<&str>)> = Vec::new();
     for (at, gear) in car.gearbox.gears.iter().enumerate() {
-        let torque = format!("{:.0} N m", car.greatest_turbine_torque(at));
+        let torque = format!("{:.0} N m", car.max_turbine_torque(at));
         match asked.iter_mut().find(|(of, _)| *of == torque) {
             Some((_, gears)) => gears.push(&gear.name),
             None => asked.push((torque, vec![&gear.name])),

@@ -259,7 +259,7 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
         "  certificate{} for forward and backward slip, evaluated by {what} without the solver, for the gain in single precision:",
         if certificate.uses_open_loop { " of the best gain" } else { "" }
     ));
-    lines.extend(certificate.margins.iter().map(|margin| format!("    {}: {of} {:.1e}", margin.label, margin.least)));
+    lines.extend(certificate.margins.iter().map(|margin| format!("    {}: {of} {:.1e}", margin.label, margin.minimum)));
     lines.push(String::new());
     lines
 }

@@ -59,8 +59,8 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for (phase, found) in PHASES.into_iter().zip(&found.phases) {
         for (name, size) in named(found) {
-            let [half, most, nearly_all] = size.quantiles;
-            let numbers = [size.largest, half, most, nearly_all].map(|value| format!("{value:.1}"));
+            let [half, maximum, nearly_all] = size.quantiles;
+            let numbers = [size.largest, half, maximum, nearly_all].map(|value| format!("{value:.1}"));
             let mut cells = vec![phase_name(phase).to_owned(), name];
             cells.extend(numbers);
             cells.push(size.settled_after.to_string());

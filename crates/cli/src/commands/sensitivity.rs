@@ -111,7 +111,7 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     output::line(&format!("\nbounds, either way: {}\nhidden: {hidden} of {all} phases", bounds.join(", ")))?;
     // A car without converter has no designs.
     if car.converter.is_some() {
-        output::line(&format!("{BOUND_AND_DEVIATION}: `wetclutch design {}`.", shell_quoted(path)))?;
+        output::line(&format!("{BOUND_AND_STD_DEV}: `wetclutch design {}`.", shell_quoted(path)))?;
     }
     if let Some(folder) = &options.output {
         output::line(&format!("page: {}", folder.join("sensitivity.html").shown()))?;

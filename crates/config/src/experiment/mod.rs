@@ -18,7 +18,7 @@ use raw::{RawExperiment, RawFill, RawScenario, RawShift};
 pub use sensors::{read_sensors, sensors_of};
 
 /// Most samples of a drive whose signals are held in memory.
-const MOST_SAMPLES: f64 = 5e6;
+const MAX_SAMPLES: f64 = 5e6;
 
 /// An experiment file.
 #[derive(Debug, Clone, PartialEq)]
@@ -153,12 +153,12 @@ impl ExperimentFile {
     /// The signals do not fit into memory.
     pub fn check_size(&self) -> Result<(), ConfigError> {
         let (duration_s, sample_time_s) = (self.duration_s, self.sample_time_s);
-        if duration_s / sample_time_s <= MOST_SAMPLES {
+        if duration_s / sample_time_s <= MAX_SAMPLES {
             return Ok(());
         }
         let at = self.place(|raw| Some(raw.sample_time_s.span().start));
         let message =
-            format!("{duration_s} s with a sample time of {sample_time_s} s are more than {MOST_SAMPLES} samples");
+            format!("{duration_s} s with a sample time of {sample_time_s} s are more than {MAX_SAMPLES} samples");
         let hint = "use a longer sample time; `wetclutch simulate` has no such limit".to_owned();
         Err(Check::of(&self.source).meaning("sample_time_s", at, message, Some(hint)))
     }

@@ -68,9 +68,9 @@ impl Values {
     /// which is no whole number where the ends are.
     pub(super) fn trials(&self) -> Vec<f64> {
         const BETWEEN: f64 = 0.381_966;
-        const MOST: usize = 100;
+        const MAXIMUM: usize = 100;
         match self {
-            Self::List(values) if values.len() <= MOST => values.clone(),
+            Self::List(values) if values.len() <= MAXIMUM => values.clone(),
             Self::List(_) => self.ends().to_vec(),
             Self::Uniform(..) | Self::LogUniform(..) | Self::Normal(..) => {
                 let [low, high] = self.ends();

@@ -104,7 +104,7 @@ pub(super) fn contain_vehicle(
     contain_delay(check, "design.error_bounds.valve_delay_s", stated, &oncoming.valve)
 }
 
-/// Least and greatest of a factor on a value of the file.
+/// Minimum and maximum of a factor on a value of the file.
 fn factors(
     check: &Check<'_>,
     key: &str,
@@ -112,11 +112,12 @@ fn factors(
     allowed: RangeInclusive<f64>,
 ) -> Result<[f64; 2], ConfigError> {
     let key = format!("design.error_bounds.{key}");
-    let [least, greatest] = check.pair(&key, values, allowed)?;
-    if (least..=greatest).contains(&1.0) {
-        return Ok([least, greatest]);
+    let [minimum, maximum] = check.pair(&key, values, allowed)?;
+    if (minimum..=maximum).contains(&1.0) {
+        return Ok([minimum, maximum]);
     }
-    let message =
-        format!("{least} to {greatest} does not contain 1: the car of this file would be outside its own error budget");
+    let message = format!(
+        "{minimum} to {maximum} does not contain 1: the car of this file would be outside its own error budget"
+    );
     Err(check.meaning(&key, values.span().start, message, Some("an error of 10 % is [0.9, 1.1]".to_owned())))
 }

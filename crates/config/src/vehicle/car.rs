@@ -510,13 +510,13 @@ fn reaches(
         }
         ClutchValve::NormallyHigh { maps, zero_pressure_a } => {
             valves::settled_pressure_rises(check, table, valve, raw, *zero_pressure_a)?;
-            let most_pa = maps.settled_pressure(*zero_pressure_a);
-            if most_pa >= line_pressure_pa {
+            let max_pa = maps.settled_pressure(*zero_pressure_a);
+            if max_pa >= line_pressure_pa {
                 return Ok(());
             }
             let message = format!(
                 "is {zero_pressure_a} A: without current the pressure is {:.3} MPa, less than `hydraulics.line_pressure_pa`, {:.3} MPa",
-                1e-6 * most_pa,
+                1e-6 * max_pa,
                 1e-6 * line_pressure_pa
             );
             let hint = format!(

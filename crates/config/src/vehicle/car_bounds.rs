@@ -71,9 +71,9 @@ pub(super) fn of_element(
     let factor = |key: &str, values: &Option<Numbers>| {
         let found = range(key, values, 0.1..=10.0)?;
         match (found, values) {
-            (Some([least, greatest]), Some(values)) if !(least..=greatest).contains(&1.0) => {
+            (Some([minimum, maximum]), Some(values)) if !(minimum..=maximum).contains(&1.0) => {
                 let message = format!(
-                    "{least} to {greatest} does not contain 1: the car of this file would be outside its own error bounds"
+                    "{minimum} to {maximum} does not contain 1: the car of this file would be outside its own error bounds"
                 );
                 let hint = Some("an error of 10 % is [0.9, 1.1]".to_owned());
                 Err(check.meaning(format_args!("{table}.{key}"), values.span().start, message, hint))

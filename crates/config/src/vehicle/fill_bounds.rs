@@ -79,12 +79,12 @@ fn interval(
     allowed: RangeInclusive<f64>,
 ) -> Result<[f64; 2], ConfigError> {
     let Some(given) = given else { return Ok(default) };
-    let [least, greatest] = check.pair(key_of(key), given, allowed)?;
-    if (least..=greatest).contains(&value) {
-        return Ok([least, greatest]);
+    let [minimum, maximum] = check.pair(key_of(key), given, allowed)?;
+    if (minimum..=maximum).contains(&value) {
+        return Ok([minimum, maximum]);
     }
     let message = format!(
-        "{least} to {greatest} does not contain {value}: the car of this file would be outside its own error budget"
+        "{minimum} to {maximum} does not contain {value}: the car of this file would be outside its own error budget"
     );
     Err(check.meaning(key_of(key), given.span().start, message, None))
 }

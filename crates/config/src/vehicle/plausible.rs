@@ -226,12 +226,17 @@ impl Parts<'_> {
 impl Judged {
     /// What to say of it; nothing where it is usual.
     fn sentence(&self) -> Option<String> {
-        let Self { key, what, value, usual: [least, most], hint } = self;
-        if (*least..=*most).contains(value) {
+        let Self { key, what, value, usual: [minimum, maximum], hint } = self;
+        if (*minimum..=*maximum).contains(value) {
             return None;
         }
         let key = if key.contains('.') { format!("`{key}`") } else { key.clone() };
-        Some(format!("{key}: {what}: {}; usual are {} to {}\nhint: {hint}", short(*value), short(*least), short(*most)))
+        Some(format!(
+            "{key}: {what}: {}; usual are {} to {}\nhint: {hint}",
+            short(*value),
+            short(*minimum),
+            short(*maximum)
+        ))
     }
 }
 

@@ -7,13 +7,13 @@ use geartrain::Capacity;
 use super::CarFile;
 
 /// Line pressure that is not proposed, Pa: no supply of a passenger car gives it \[chosen\].
-const MOST_LINE_PRESSURE_PA: f64 = 3e6;
+const MAX_LINE_PRESSURE_PA: f64 = 3e6;
 
 impl CarFile {
     /// Says which closed elements slip at full throttle, with a hint; nothing where all of them hold.
     pub fn slipping_elements(&self) -> Option<String> {
         let slipping: Vec<Capacity> = self.capacities().into_iter().filter(|capacity| !capacity.holds()).collect();
-        let least = slipping.iter().map(Capacity::ratio).reduce(f64::min)?;
+        let minimum = slipping.iter().map(Capacity::ratio).reduce(f64::min)?;
         let mut said = format!("closed elements slip at full throttle, at {:.2} MPa: ", 1e-6 * self.line_pressure_pa);
         for (at, capacity) in slipping.iter().enumerate() {
             // Writing to a text cannot fail.
@@ -28,26 +28,26 @@ impl CarFile {
             );
         }
         let pressure_pa = slipping.iter().map(|capacity| self.holding_pressure(capacity)).fold(0.0, f64::max);
-        Some(format!("{said}\nhint: {}", self.how_to_hold(least, pressure_pa)))
+        Some(format!("{said}\nhint: {}", self.how_to_hold(minimum, pressure_pa)))
     }
 
-    /// What to change where elements hold the fraction `least` of what is asked of them, and all of it at this line pressure.
-    fn how_to_hold(&self, least: f64, pressure_pa: f64) -> String {
+    /// What to change where elements hold the fraction `minimum` of what is asked of them, and all of it at this line pressure.
+    fn how_to_hold(&self, minimum: f64, pressure_pa: f64) -> String {
         let map = "engine.torque.torque_n_m";
         let is_default = self.defaults_taken.iter().any(|taken| taken.key == map);
         let key = if is_default { "engine.max_torque_n_m" } else { map };
-        let most_n_m = self.engine.largest_torque();
-        let pressure = if pressure_pa <= MOST_LINE_PRESSURE_PA {
+        let max_n_m = self.engine.largest_torque();
+        let pressure = if pressure_pa <= MAX_LINE_PRESSURE_PA {
             format!("they hold with `hydraulics.line_pressure_pa = {:.2}e6`; or ", 1e-2 * (1e-4 * pressure_pa).ceil())
         } else {
             String::new()
         };
         format!(
-            "{pressure}with an engine of {:.0} N m in place of {most_n_m:.0} N m (`{key}`); or with {:.1} times the friction faces or \
+            "{pressure}with an engine of {:.0} N m in place of {max_n_m:.0} N m (`{key}`); or with {:.1} times the friction faces or \
              piston areas (`friction_faces`, `piston_area_m2` in `pack`) in the gearbox file; for a gearbox that comes with the program \
              `wetclutch init --gearbox` writes them sized for the engine",
-            (least * most_n_m).floor(),
-            (10.0 / least).ceil() / 10.0
+            (minimum * max_n_m).floor(),
+            (10.0 / minimum).ceil() / 10.0
         )
     }
 }
@@ -70,7 +70,7 @@ mod tests {
     #[test]
     fn a_converter_multiplies_the_torque_of_a_gear_in_which_the_car_starts() {
         let car = CarFile::eight_speed().unwrap();
-        let torque = |gear: &str| car.greatest_turbine_torque(car.gearbox.gear(gear).unwrap());
+        let torque = |gear: &str| car.max_turbine_torque(car.gearbox.gear(gear).unwrap());
         // At 177.8 rad/s the engine has 147.4 N m, 8.4 N m of drag, and the pump takes 4.3976e-3 N m s^2 times the square of it: 139.0 N m,
         // of which the turbine at rest has twice that.
         assert!((torque("1") - 278.0).abs() < 0.1, "{}", torque("1"));
@@ -78,7 +78,7 @@ mod tests {
         // With the turbine at 100 rad/s the engine turns at 203.3 rad/s. It has 150.7 N m, 9.6 N m of drag, and the torque ratio is 1.440.
         assert!((torque("2") - 203.2).abs() < 0.1, "{}", torque("2"));
         let without = Car { converter: None, ..car.car.clone() };
-        assert_eq!(without.greatest_turbine_torque(1), 190.0);
+        assert_eq!(without.max_turbine_torque(1), 190.0);
     }
 
     #[test]

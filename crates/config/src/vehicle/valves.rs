@@ -108,17 +108,17 @@ pub(super) fn settled_pressure_rises(
     table: &str,
     valve: &ClutchValve<f64>,
     raw: &Spanned<RawClutchValve>,
-    most_a: f64,
+    max_a: f64,
 ) -> Result<(), ConfigError> {
     let (Some(maps), Some(raw)) = (valve.maps(), &raw.get_ref().gain) else { return Ok(()) };
     let (currents, gains) = (maps.gain_pa_a.axis(), maps.gain_pa_a.values());
-    for (i, k) in currents.windows(2).zip(gains.windows(2)).filter(|(i, _)| i[0] < most_a) {
+    for (i, k) in currents.windows(2).zip(gains.windows(2)).filter(|(i, _)| i[0] < max_a) {
         let slope = (k[1] - k[0]) / (i[1] - i[0]);
-        let end = i[1].min(most_a);
+        let end = i[1].min(max_a);
         if k[0] + slope * (2.0 * i[0].max(0.0) - i[0]) >= 0.0 && k[0] + slope * (2.0 * end - i[0]) >= 0.0 {
             continue;
         }
-        // K(i) i is greatest where its slope is zero.
+        // K(i) i is largest where its slope is zero.
         let top = (0.5 * (i[0] - k[0] / slope)).clamp(i[0], end);
         let message = format!(
             "the steady-state pressure (gain times current) falls from {:.4} MPa at {top:.3} A to {:.4} MPa at {end:.3} A",
@@ -143,8 +143,8 @@ pub(super) fn clutch_can_engage(
     at: usize,
 ) -> Result<(), ConfigError> {
     let kiss_pa = oncoming.clutch.kiss_pressure();
-    let most_pa = oncoming.valve.settled_pressure(command_max);
-    if most_pa.min(pressure_max_pa) > kiss_pa {
+    let max_pa = oncoming.valve.settled_pressure(command_max);
+    if max_pa.min(pressure_max_pa) > kiss_pa {
         return Ok(());
     }
     let (unit, full) = match oncoming.valve.command_kind() {
@@ -154,7 +154,7 @@ pub(super) fn clutch_can_engage(
     let message = format!(
         "at {} {unit} the settled pressure is {:.4} MPa, `pressure_max_pa` is {:.4} MPa, and the kiss point is {:.4} MPa",
         command_max,
-        1e-6 * most_pa,
+        1e-6 * max_pa,
         1e-6 * pressure_max_pa,
         1e-6 * kiss_pa
     );

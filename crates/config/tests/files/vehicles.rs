@@ -20,8 +20,8 @@ fn chapter_parameters_of_table_2_1_are_those_of_the_built_in_vehicle() {
     let b = &v.oncoming.clutch;
     assert!((b.lever() * b.piston_area_m2 - 0.0039).abs() < 1e-12);
     assert_eq!(b.return_spring_n, 600.0);
-    let (least, greatest) = b.friction.range();
-    assert!(least >= 0.10 && greatest <= 0.16);
+    let (minimum, maximum) = b.friction.range();
+    assert!(minimum >= 0.10 && maximum <= 0.16);
     let drivetrain::ClutchValve::Proportional(maps) = v.oncoming.valve else { panic!() };
     assert_eq!(maps.time_constant_s.range(), (0.02, 0.20));
     assert_eq!(maps.delay_s.range(), (0.0, 0.03));

@@ -11,9 +11,9 @@ const RESPONSE_SAMPLES: usize = 5000;
 
 /// What each cause does to the pressure at the corner where all of them together do most.
 pub(super) fn contributions(system: &ErrorSystem, gains: &[DMatrix<f64>]) -> Vec<Contribution> {
-    let least = system.corners.iter().map(|corner| corner.friction).fold(f64::INFINITY, f64::min);
+    let minimum = system.corners.iter().map(|corner| corner.friction).fold(f64::INFINITY, f64::min);
     let at_corner = |corner: &Corner| -> Vec<Contribution> {
-        let gain = if corner.friction > least { gains.last() } else { gains.first() };
+        let gain = if corner.friction > minimum { gains.last() } else { gains.first() };
         let Some(gain) = gain else { return Vec::new() };
         let a = corner.error_dynamics(gain);
         let of_readings = (DMatrix::identity(a.nrows(), a.ncols()) - &a) * gain * &system.readings;

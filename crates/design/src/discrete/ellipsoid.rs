@@ -27,10 +27,10 @@
 
 use nalgebra::DMatrix;
 
-use super::search::{Search, SolverRecord, least_over};
+use super::search::{Search, SolverRecord, min_over};
 use super::system::{Corner, ErrorSystem};
 use super::{
-    DiscreteMargin, Found, Norm, RESERVE, WORTH_A_GAIN, block_of, least_eigenvalue, open_loop_bound, slowest, stacked,
+    DiscreteMargin, Found, Norm, RESERVE, WORTH_A_GAIN, block_of, min_eigenvalue, open_loop_bound, slowest, stacked,
 };
 use crate::iss::DesignError;
 use crate::lmi::{Block, Problem};
@@ -59,11 +59,11 @@ pub(crate) fn smallest_ellipsoid(
     let range = [0.1 * (1.0 - slowest(system)), 0.99];
     let mut tangent = Tangent::open_loop(system, ends);
     // At the open loop the tangent leaves out what is of second order in the gain, so that this cost is too low.
-    let mut least_cost = f64::INFINITY;
-    let mut lambda = least_over(range, WITHIN[0], |lambda| {
+    let mut min_cost = f64::INFINITY;
+    let mut lambda = min_over(range, WITHIN[0], |lambda| {
         let solution = search.solve(&design.program(lambda, &tangent, true));
         let cost = solution.map_or(f64::INFINITY, |x| design.cost(&x));
-        least_cost = least_cost.min(cost);
+        min_cost = min_cost.min(cost);
         cost
     });
     let mut bound = f64::INFINITY;
@@ -73,12 +73,12 @@ pub(crate) fn smallest_ellipsoid(
         while let Some((lower, next)) = design.next(&mut search, lambda, &tangent, bound, &round) {
             let settled = lower > bound * (1.0 - SETTLED);
             (bound, tangent) = (lower, next);
-            if settled || least_cost >= WORTH_A_GAIN * open_loop_bound(system) {
+            if settled || min_cost >= WORTH_A_GAIN * open_loop_bound(system) {
                 break;
             }
         }
         let within = if bound > last * (1.0 - SETTLED) { WITHIN[1] } else { WITHIN[0] };
-        lambda = least_over([lambda / 1.5, (1.5 * lambda).min(0.99)], within, |lambda| {
+        lambda = min_over([lambda / 1.5, (1.5 * lambda).min(0.99)], within, |lambda| {
             let (found, _) = design.evaluated(&mut search, lambda, tangent.gains.clone());
             search.keep(found)
         });
@@ -347,9 +347,10 @@ impl Design<'_> {
         let q = self.q(&x);
         let Some(inverse) = q.clone().try_inverse() else { return (None, None) };
         // An error that the gain does not let in has a multiplier of zero, up to the solver's tolerance.
-        let least = x[self.g_at()].abs() * checked * 0.5e-6 / self.causes() as f64;
-        let multipliers: Vec<Vec<f64>> =
-            (0..self.inequalities.len()).map(|i| self.a(&x, i).iter().map(|a| a.max(0.0) + least).collect()).collect();
+        let minimum = x[self.g_at()].abs() * checked * 0.5e-6 / self.causes() as f64;
+        let multipliers: Vec<Vec<f64>> = (0..self.inequalities.len())
+            .map(|i| self.a(&x, i).iter().map(|a| a.max(0.0) + minimum).collect())
+            .collect();
         let sum = multipliers.iter().map(|a| a.iter().sum::<f64>()).fold(0.0, f64::max);
         let g = sum / checked;
         let ys = given.gains.iter().map(|gain| &q * gain).collect();
@@ -357,10 +358,10 @@ impl Design<'_> {
         let margins: Vec<DiscreteMargin> = (self.inequalities.iter().zip(&multipliers))
             .map(|(inequality, a)| DiscreteMargin {
                 label: inequality.label.clone(),
-                least: least_eigenvalue(&self.matrix(inequality, &point, a)),
+                minimum: min_eigenvalue(&self.matrix(inequality, &point, a)),
             })
             .collect();
-        let holds = margins.iter().all(|margin| margin.least >= 0.0);
+        let holds = margins.iter().all(|margin| margin.minimum >= 0.0);
         let last = given.gains.iter().map(|gain| self.system.last_reading(gain)).fold(0.0, f64::max);
         let pressure = self.system.states() - 1;
         let bound = (g * inverse[(pressure, pressure)]).sqrt() + last;

@@ -15,7 +15,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::search::{Search, SolverRecord, least_over};
+use super::search::{Search, SolverRecord, min_over};
 use super::system::{Corner, ErrorSystem};
 use super::{DiscreteMargin, Found, Norm, block, slowest};
 use crate::iss::DesignError;
@@ -28,7 +28,7 @@ const WITHIN: f64 = 0.005;
 /// What an entry of `diag(l) A_i` must have above zero, for rounding.
 const ENTRY_RESERVE: f64 = 1e-6;
 
-/// The gain with the least ultimate bound on the width of the pressure, if one is certified.
+/// The gain with the minimum ultimate bound on the width of the pressure, if one is certified.
 pub(crate) fn narrowest_interval(
     system: &ErrorSystem,
     round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
@@ -36,7 +36,7 @@ pub(crate) fn narrowest_interval(
     let mut search = Search::default();
     // A gain makes an error decay faster than the valve alone, but may let that of the shaft torque decay slower.
     let range = [0.01 * (1.0 - slowest(system)), 1.0];
-    least_over(range, WITHIN, |left| {
+    min_over(range, WITHIN, |left| {
         let problem = program(system, 1.0 - left);
         let Some(x) = search.solve(&problem) else { return f64::INFINITY };
         search.keep(certified(system, &x, &round));
@@ -149,11 +149,11 @@ fn certified(system: &ErrorSystem, x: &[f64], round: &impl Fn(&DMatrix<f64>) -> 
     let gain = round(&DMatrix::from_fn(at.states, at.outputs, |i, j| y[(i, j)] / weights[i]));
     let matrices: Vec<DMatrix<f64>> = system.corners.iter().map(|corner| corner.error_dynamics(&gain)).collect();
     let margins: Vec<DiscreteMargin> = (system.corners.iter().zip(&matrices))
-        .map(|(corner, matrix)| DiscreteMargin { label: corner.label.clone(), least: matrix.min() })
+        .map(|(corner, matrix)| DiscreteMargin { label: corner.label.clone(), minimum: matrix.min() })
         .collect();
     let norm = Norm::Weighted(weights.clone());
     let contraction = matrices.iter().map(|matrix| norm.factor(matrix)).fold(0.0, f64::max);
-    if margins.iter().any(|margin| margin.least < 0.0) || contraction >= 1.0 || weights.iter().any(|w| *w <= 0.0) {
+    if margins.iter().any(|margin| margin.minimum < 0.0) || contraction >= 1.0 || weights.iter().any(|w| *w <= 0.0) {
         return None;
     }
     let bound_at = |(corner, matrix): (&Corner, &DMatrix<f64>)| {

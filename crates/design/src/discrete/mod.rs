@@ -134,8 +134,9 @@ pub struct Contribution {
 pub struct DiscreteMargin {
     /// Which.
     pub label: String,
-    /// Its least eigenvalue; of an interval gain, the least entry of the matrix that must have no negative one.
-    pub least: f64,
+    /// Its minimum eigenvalue; of an interval gain, the minimum entry of the matrix that must have no negative one.
+    #[serde(rename = "least")]
+    pub minimum: f64,
 }
 
 /// Certified gains of both phases.
@@ -255,9 +256,9 @@ fn best_gain(
 
 /// Clutch torque of 1 MPa at the middle of the friction's range, N m.
 fn torque_n_m_mpa(vehicle: &Vehicle) -> f64 {
-    let (least, greatest) = vehicle.settings.uncertainty.friction;
+    let (minimum, maximum) = vehicle.settings.uncertainty.friction;
     let clutch = &vehicle.oncoming.clutch;
-    1e6 * 0.5 * (least + greatest) * clutch.lever() * clutch.piston_area_m2
+    1e6 * 0.5 * (minimum + maximum) * clutch.lever() * clutch.piston_area_m2
 }
 
 /// Designs the gains of both phases for a sample time, with the smallest bounds on the clutch torque.
@@ -303,7 +304,7 @@ impl DiscreteDesign {
     fn schedule<G: Clone>(&self, at: impl Fn(usize) -> G) -> Schedule<f64, G> {
         let ends = [0, 1].map(|end| self.inertia_phase.end(end).friction);
         match ends {
-            [Some(least), Some(greatest)] => Schedule { friction: [least, greatest], ends: [at(0), at(1)] },
+            [Some(minimum), Some(maximum)] => Schedule { friction: [minimum, maximum], ends: [at(0), at(1)] },
             _ => Schedule::constant(at(0)),
         }
     }
@@ -325,7 +326,7 @@ fn without_a_gain(system: &ErrorSystem, method: GainMethod, bound: f64) -> Found
     let (states, outputs) = (system.states(), system.h.nrows());
     let forgets = |corner: &system::Corner| DiscreteMargin {
         label: corner.label.clone(),
-        least: 1.0 - corner.phi[(states - 1, states - 1)],
+        minimum: 1.0 - corner.phi[(states - 1, states - 1)],
     };
     let ends = if method == GainMethod::Scheduled { 2 } else { 1 };
     Found {
@@ -382,7 +383,7 @@ fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64>
     whole
 }
 
-fn least_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
+fn min_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
     -largest_eigenvalue(&-matrix)
 }
 

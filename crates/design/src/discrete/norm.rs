@@ -83,8 +83,8 @@ fn error_dynamics(corners: &[Corner], gains: &[DMatrix<f64>]) -> Vec<DMatrix<f64
     let [first, .., last] = gains else {
         return corners.iter().flat_map(|corner| gains.iter().map(|gain| corner.error_dynamics(gain))).collect();
     };
-    let least = corners.iter().map(|corner| corner.friction).fold(f64::INFINITY, f64::min);
-    let own = |corner: &Corner| if corner.friction > least { last } else { first };
+    let minimum = corners.iter().map(|corner| corner.friction).fold(f64::INFINITY, f64::min);
+    let own = |corner: &Corner| if corner.friction > minimum { last } else { first };
     let mut matrices: Vec<_> = corners.iter().map(|corner| corner.error_dynamics(own(corner))).collect();
     for (i, one) in corners.iter().enumerate() {
         for other in corners[i + 1..].iter().filter(|other| other.valve == one.valve) {

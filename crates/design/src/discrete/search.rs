@@ -74,9 +74,9 @@ impl Search {
     }
 }
 
-/// The parameter with the least value, by golden sections of its logarithm until the interval is shorter than `within`, for a
+/// The parameter with the minimum value, by golden sections of its logarithm until the interval is shorter than `within`, for a
 /// function with one minimum. It is infinite where there is no value.
-pub(crate) fn least_over([low, high]: [f64; 2], within: f64, mut at: impl FnMut(f64) -> f64) -> f64 {
+pub(crate) fn min_over([low, high]: [f64; 2], within: f64, mut at: impl FnMut(f64) -> f64) -> f64 {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut low, mut high) = (Real::ln(low), Real::ln(high));
     let mut inner = [high - golden * (high - low), low + golden * (high - low)];
@@ -101,8 +101,8 @@ mod tests {
     use crate::lmi::Block;
 
     #[test]
-    fn the_least_value_is_found_at_the_end_where_there_is_one() {
-        let found = least_over([1e-4, 1.0], 1e-3, |x| if x > 0.5 { f64::INFINITY } else { (x / 0.02).ln().powi(2) });
+    fn the_minimum_value_is_found_at_the_end_where_there_is_one() {
+        let found = min_over([1e-4, 1.0], 1e-3, |x| if x > 0.5 { f64::INFINITY } else { (x / 0.02).ln().powi(2) });
         assert!((found / 0.02).ln().abs() < 1e-3, "{found}");
     }
 

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::search::{Search, SolverRecord};
 use super::system::{Corner, ErrorSystem};
-use super::{DiscreteMargin, Found, Norm, block, least_eigenvalue, stacked};
+use super::{DiscreteMargin, Found, Norm, block, min_eigenvalue, stacked};
 use crate::iss::DesignError;
 use crate::lmi::{Block, Problem};
 
@@ -70,7 +70,7 @@ fn with_margin(
     let mut objective = vec![0.0; unknowns];
     objective[..states].fill(1.0);
     let mut search = Search::default();
-    let Some(x) = search.take((Problem { objective, blocks }).solve_least(states..unknowns)) else {
+    let Some(x) = search.take((Problem { objective, blocks }).solve_min_norm(states..unknowns)) else {
         let (_, record) = search.finish()?;
         debug_assert_eq!(record.failed, 0);
         return Err(DesignError::DecayUnreachable { decay_per_s: kappa2_per_s });
@@ -79,10 +79,10 @@ fn with_margin(
     let margins: Vec<DiscreteMargin> = (system.corners.iter())
         .map(|corner| DiscreteMargin {
             label: corner.label.clone(),
-            least: least_eigenvalue(&contraction(&gain, corner, rho)),
+            minimum: min_eigenvalue(&contraction(&gain, corner, rho)),
         })
         .collect();
-    if margins.iter().any(|margin| margin.least < 0.0) {
+    if margins.iter().any(|margin| margin.minimum < 0.0) {
         return Err(DesignError::NotCertified);
     }
     let length = |columns: &DMatrix<f64>| columns.column_iter().map(|column| column.norm()).sum::<f64>();

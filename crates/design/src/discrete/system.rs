@@ -178,13 +178,13 @@ fn friction_step(vehicle: &Vehicle, sample_time_s: f64) -> f64 {
     let (slips, coefficients) = (friction.axis(), friction.values());
     let slopes = slips.windows(2).zip(coefficients.windows(2)).map(|(x, y)| ((y[1] - y[0]) / (x[1] - x[0])).abs());
     let slope = slopes.fold(0.0, f64::max);
-    let (least, greatest) = vehicle.settings.uncertainty.friction;
-    if slope == 0.0 || greatest <= least {
+    let (minimum, maximum) = vehicle.settings.uncertainty.friction;
+    if slope == 0.0 || maximum <= minimum {
         return 0.0;
     }
     let moved_rad_s = bounds.slip_rad_s * sample_time_s / bounds.sampling_delay_s + bounds.slip_quantum_rad_s;
     // Without an age there is no rate: any change may come. `min` also drops what is not a number.
-    (slope * moved_rad_s / (greatest - least)).min(1.0)
+    (slope * moved_rad_s / (maximum - minimum)).min(1.0)
 }
 
 /// The columns of these causes, those of one direction made one: their errors may have any sign, so their sizes add up.

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use super::{ENGINE_RAD_S, input, over_a_sample};
 
 /// Slip below which the inertia phase is taken to be over, rad/s.
-const LEAST_SLIP_RAD_S: f64 = 20.0;
+const MIN_SLIP_RAD_S: f64 = 20.0;
 
 /// What disturbs a sample, as fractions of the bounds of the budget.
 #[derive(Debug, Clone)]
@@ -96,7 +96,7 @@ impl SampledCar<'_> {
             }
             pressure = phi * pressure + psi * valve.b2_pa_s + d.valve * psi * valve_pa_s;
             let estimate = observer.step_sample(&mut state, &input(t, measured[0], measured[1], command));
-            if estimate.phase != phase || measured[1].abs() < LEAST_SLIP_RAD_S {
+            if estimate.phase != phase || measured[1].abs() < MIN_SLIP_RAD_S {
                 break;
             }
             left *= factor.abs();

@@ -23,8 +23,8 @@ impl<T: Real> Play<T> {
     /// The output after the input has moved straight to `input_pa`. A valve gives no pressure below zero.
     #[inline]
     pub fn follow(&mut self, input_pa: T) -> T {
-        let (least, most) = (input_pa - self.half_width_pa, input_pa + self.half_width_pa);
-        self.output_pa = self.output_pa.at_least(least).at_most(most);
+        let (minimum, maximum) = (input_pa - self.half_width_pa, input_pa + self.half_width_pa);
+        self.output_pa = self.output_pa.at_least(minimum).at_most(maximum);
         self.output_pa.at_least(T::zero())
     }
 }

@@ -2,10 +2,10 @@
 //!
 //! Over a shift the turbine's balance gives the torque of its clutches, `U = T_t - M11 w_t' - M12 w_o'`, and the pressures by the valve
 //! models give the torque that they can carry. Both are compared with the pressures moved by -300 to 300 ms: where both clutches slip, `U` is
-//! the sum of what they can carry; where one holds, it carries the rest, up to what it can. The move with the least difference over the shifts
-//! of the log is the delay of its commands. An error of friction, valve gain or turbine torque moves upshifts and downshifts in opposite
-//! directions, a delay in the same one. So that a wrong scale or offset of the commands is not taken for a delay, each move is tried with other
-//! gains and offsets of the pressures, and it has to be better than all of them are without a move.
+//! the sum of what they can carry; where one holds, it carries the rest, up to what it can. The move with the minimum difference over the
+//! shifts of the log is the delay of its commands. An error of friction, valve gain or turbine torque moves upshifts and downshifts in
+//! opposite directions, a delay in the same one. So that a wrong scale or offset of the commands is not taken for a delay, each move is
+//! tried with other gains and offsets of the pressures, and it has to be better than all of them are without a move.
 
 use std::collections::VecDeque;
 
@@ -36,7 +36,7 @@ const ENOUGH_POINTS: u32 = 5;
 /// times this \[chosen\].
 const FRACTION: f64 = 0.15;
 const BESIDE_N_M: f64 = 5.0;
-const MOST: f64 = 3.0;
+const MAXIMUM: f64 = 3.0;
 /// Shifts up and shifts down that are needed to judge, each \[chosen\]: an error of friction, gain or torque moves them in opposite directions.
 const ENOUGH_SHIFTS: u32 = 2;
 /// Delay from which on it is reported, s \[chosen\]: above what errors of friction, valves and strokes within the default bounds look like, as far
@@ -103,7 +103,7 @@ pub(crate) struct CommandDelay<'c> {
     /// The last rows, at least about [`GRID_S`] apart.
     rows: VecDeque<Point>,
     waiting: VecDeque<Waiting>,
-    /// Greatest age that the commands of a row have had by themselves, s: so much of the delay the filter knows.
+    /// Maximum age that the commands of a row have had by themselves, s: so much of the delay the filter knows.
     age_s: f64,
     /// Shifts up and shifts down that were compared, and the sums of their mean differences.
     shifts: [u32; 2],
@@ -243,7 +243,7 @@ impl<'c> CommandDelay<'c> {
             let scale = (FRACTION * needed_n_m.abs().max(point.turbine_n_m.abs()) + BESIDE_N_M).recip();
             for (sums, forces) in sums.iter_mut().zip(&forces) {
                 for (sum, forces) in sums.iter_mut().zip(&forces[at - TO_ONE_SIDE..]) {
-                    *sum += (scale * balance.difference_n_m(*forces)).min(MOST);
+                    *sum += (scale * balance.difference_n_m(*forces)).min(MAXIMUM);
                 }
             }
         }
@@ -252,10 +252,10 @@ impl<'c> CommandDelay<'c> {
 
     /// The delay of the log, s, and whether it may be larger, if its shifts show one.
     fn delay(&self) -> Option<(f64, bool)> {
-        let least =
+        let minimum =
             |sums: &[f64; MOVES]| (0..MOVES).min_by(|a, b| sums[*a].total_cmp(&sums[*b])).unwrap_or(TO_ONE_SIDE);
         let best =
-            self.differences.iter().map(|sums| (sums, least(sums))).min_by(|(a, i), (b, j)| a[*i].total_cmp(&b[*j]));
+            self.differences.iter().map(|sums| (sums, minimum(sums))).min_by(|(a, i), (b, j)| a[*i].total_cmp(&b[*j]));
         let (sums, place) = best?;
         let unmoved = self.differences.iter().map(|sums| sums[TO_ONE_SIDE]).fold(f64::INFINITY, f64::min);
         let moved_s = moved_s(place) + GRID_S * between(sums, place);
@@ -307,13 +307,13 @@ impl Balance {
     }
 }
 
-/// Where the least of a parabola through the least sum and its neighbours is, in moves from it.
+/// Where the minimum of a parabola through the smallest sum and its neighbours is, in moves from it.
 fn between(sums: &[f64; MOVES], place: usize) -> f64 {
     if place == 0 || place + 1 == MOVES {
         return 0.0;
     }
-    let [before, least, after] = [sums[place - 1], sums[place], sums[place + 1]];
-    let bend = before - 2.0 * least + after;
+    let [before, minimum, after] = [sums[place - 1], sums[place], sums[place + 1]];
+    let bend = before - 2.0 * minimum + after;
     if bend > 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 }
 }
 

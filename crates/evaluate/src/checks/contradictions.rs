@@ -14,7 +14,7 @@ const STEADY_S: f64 = 1.0;
 /// The turbine fits the gear within this fraction \[chosen\]: readings that are 20 ms apart differ by 1 % while the car accelerates.
 const FITS: f64 = 0.02;
 /// Output speed below which an element may be left open, as in idle, rad/s.
-const OUTPUT_LEAST_RAD_S: f64 = 20.0;
+const OUTPUT_MIN_RAD_S: f64 = 20.0;
 /// Rows in a gear that are needed to judge \[chosen\]: a second at 100 Hz. More than half of them have to contradict.
 const ENOUGH: u64 = 100;
 
@@ -70,7 +70,7 @@ impl<'c> CommandCheck<'c> {
         let gear = gear.unwrap_or(usize::MAX);
         let ratio = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
         let in_gear = ratio * output;
-        let fits = output > OUTPUT_LEAST_RAD_S && (turbine - in_gear).abs() <= FITS * in_gear.abs();
+        let fits = output > OUTPUT_MIN_RAD_S && (turbine - in_gear).abs() <= FITS * in_gear.abs();
         if gear != self.gear || !fits {
             (self.gear, self.since_s) = (gear, time_s);
         }

@@ -13,8 +13,8 @@ use crate::checks::ratio_histogram::RatioHistogram;
 const STEADY_RAD_S: f64 = 10.0;
 const STEADY_S: f64 = 0.5;
 /// Torques that are compared, N m, and speed ratios up to which the pump's torque is well known \[chosen\].
-const LEAST_N_M: f64 = 20.0;
-const MOST_SPEED_RATIO: f64 = 0.9;
+const MIN_N_M: f64 = 20.0;
+const MAX_SPEED_RATIO: f64 = 0.9;
 /// Rows that are needed to judge, and their time, s \[chosen\].
 const ENOUGH: (u64, f64) = (200, 3.0);
 /// Difference beside the bounds of both: drag, auxiliaries, the time by which a signal comes late \[chosen\].
@@ -49,7 +49,7 @@ impl ConverterCheck {
         }
         let (Some(reported), true) = (self.reported_n_m, self.is_steady && !step.input.lock_up_applied) else { return };
         let pump = converter.torques(engine, turbine).pump_n_m;
-        if pump > LEAST_N_M && reported > LEAST_N_M && turbine <= MOST_SPEED_RATIO * engine {
+        if pump > MIN_N_M && reported > MIN_N_M && turbine <= MAX_SPEED_RATIO * engine {
             self.ratio.push(reported / pump);
             self.rows.0 += 1;
             self.rows.1 += step.input.dt_s.clamp(0.0, 1.0);
@@ -61,8 +61,8 @@ impl ConverterCheck {
         let (rows, time_s) = self.rows;
         let errors = ErrorBudget::of_logged_car(car);
         let ratio = self.ratio.middle();
-        let most = (1.0 + errors.converter) * (1.0 + errors.engine) + MORE;
-        if rows < ENOUGH.0 || time_s < ENOUGH.1 || (most.recip()..=most).contains(&ratio) {
+        let maximum = (1.0 + errors.converter) * (1.0 + errors.engine) + MORE;
+        if rows < ENOUGH.0 || time_s < ENOUGH.1 || (maximum.recip()..=maximum).contains(&ratio) {
             return None;
         }
         Some(format!(

@@ -8,7 +8,7 @@ use car::Car;
 use crate::LogStep;
 
 /// Speed ratio from which on the lock-up clutch may be closed or slip \[chosen\]: a slip-controlled one slips by some rad/s.
-const LEAST_SPEED_RATIO: f64 = 0.9;
+const MIN_SPEED_RATIO: f64 = 0.9;
 /// What the reported torque is above that of the pump, N m and as a fraction of it \[chosen\]: more than the engine's inertia takes, and than both may err by.
 const MORE_N_M: f64 = 25.0;
 const MORE_FRACTION: f64 = 0.4;
@@ -51,7 +51,7 @@ impl LockUpCheck {
             self.before = Some((engine, step.time_s));
         }
         let dt_s = step.input.dt_s.clamp(0.0, 1.0);
-        let is_driven = turbine > DRIVEN_RAD_S && turbine >= LEAST_SPEED_RATIO * engine;
+        let is_driven = turbine > DRIVEN_RAD_S && turbine >= MIN_SPEED_RATIO * engine;
         let pump_n_m = converter.torques(engine, turbine).pump_n_m.max(0.0);
         if let Some(reported_n_m) = self.reported_n_m
             && is_driven

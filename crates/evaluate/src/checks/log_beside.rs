@@ -18,9 +18,9 @@ const OLDEST_S: f64 = 0.25;
 /// The jerk of a shift is that of the speeds from so long before it to so long after it, s, as in `logs::shifts`.
 const AROUND_S: f64 = 0.45;
 /// Speeds that are kept at most: those of a shift of ten minutes at 100 Hz.
-const MOST_SPEEDS: usize = 60_000;
+const MAX_SPEEDS: usize = 60_000;
 /// Rows of an element's measured pressure from which on, and fraction of them outside of the range above which, the log is doubted.
-const LEAST_ROWS: u64 = 50;
+const MIN_ROWS: u64 = 50;
 const DOUBTED: f64 = 0.1;
 
 /// Measured pressures at the time of a row: a reading is older, and is carried on by what the models of the valves change since.
@@ -99,7 +99,7 @@ impl DoubtedPressures {
         let doubted = self.rows.iter().enumerate().filter_map(|(element, [all, outside])| {
             let fraction = *outside as f64 / *all as f64;
             let name = &car.gearbox.elements.get(element)?.name;
-            (*all >= LEAST_ROWS && fraction > DOUBTED).then(|| format!("{name} ({:.0} %)", 100.0 * fraction))
+            (*all >= MIN_ROWS && fraction > DOUBTED).then(|| format!("{name} ({:.0} %)", 100.0 * fraction))
         });
         let doubted: Vec<String> = doubted.collect();
         (!doubted.is_empty()).then(|| {
@@ -135,8 +135,7 @@ impl ShiftJerk {
             self.speeds.push_back((time_s, speed.value));
         }
         let keeps = |(time_s, _): &(f64, f64)| *time_s >= step.time_s - AROUND_S;
-        while self.speeds.len() > MOST_SPEEDS
-            || self.until_s.is_none() && self.speeds.front().is_some_and(|s| !keeps(s))
+        while self.speeds.len() > MAX_SPEEDS || self.until_s.is_none() && self.speeds.front().is_some_and(|s| !keeps(s))
         {
             self.speeds.pop_front();
         }

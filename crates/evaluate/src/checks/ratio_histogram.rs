@@ -45,11 +45,11 @@ impl<const FINE: u32> RatioHistogram<FINE> {
     /// Fraction of the ratios that are within this fraction of one.
     pub fn fraction_near(&self, ratio: f64, within: f64) -> f64 {
         let place = |ratio: f64| Real::ln(ratio) * Self::FINE + Self::ONE;
-        let [least, most] = [1.0 - within, 1.0 + within].map(|factor| place(ratio * factor));
+        let [minimum, maximum] = [1.0 - within, 1.0 + within].map(|factor| place(ratio * factor));
         let (mut all, mut near) = (0.0, 0.0);
         for (bin, count) in (0_u32..).zip(&self.counts) {
             all += f64::from(*count);
-            if (least..most).contains(&(f64::from(bin) + 0.5)) {
+            if (minimum..maximum).contains(&(f64::from(bin) + 0.5)) {
                 near += f64::from(*count);
             }
         }

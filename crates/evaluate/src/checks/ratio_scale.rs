@@ -9,7 +9,7 @@ const ENOUGH: u64 = 200;
 const ENOUGH_OF_GEAR: u64 = 50;
 /// Fraction of the rows of a gear whose ratio is near the middle one of it, and fraction of all rows in gears whose middle ratios are the same
 /// \[chosen\].
-const MOST: f64 = 0.6;
+const MAXIMUM: f64 = 0.6;
 /// Fraction by which two ratios are the same.
 const SAME: f64 = 0.02;
 /// Fraction by which the middle ratio is off before it is said \[chosen\]: gearbox files have ratios to three digits.
@@ -55,11 +55,11 @@ impl RatioScale {
         let is_alike = |(of_gear, rows): &&(RatioHistogram<300>, u64)| {
             *rows >= ENOUGH_OF_GEAR
                 && is_same(of_gear.middle(), factor, SAME)
-                && of_gear.fraction_near(factor, SAME) >= MOST
+                && of_gear.fraction_near(factor, SAME) >= MAXIMUM
         };
         let alike: Vec<u64> = self.gears.iter().filter(is_alike).map(|(_, rows)| *rows).collect();
         let rows = alike.iter().sum();
-        let is_common = rows >= ENOUGH && rows as f64 >= MOST * all as f64;
+        let is_common = rows >= ENOUGH && rows as f64 >= MAXIMUM * all as f64;
         (is_common && !is_same(factor, 1.0, OFF)).then_some(Factor { factor, rows, gears: alike.len() })
     }
 

@@ -15,7 +15,7 @@ const ENOUGH: u64 = 100;
 const TIMES: u64 = 4;
 /// Of all samples, the engine speed fits a gear in so many at least \[chosen\]: what turns with the output does so except in shifts, while
 /// an engine before a slipping converter only passes a gear.
-const MOST: f64 = 0.5;
+const MAXIMUM: f64 = 0.5;
 
 /// Samples for and against a swap.
 #[derive(Debug, Clone, Copy, Default)]
@@ -41,7 +41,7 @@ impl SwappedSpeeds {
     /// What the log shows, if it contradicts the channels, in a sentence.
     pub fn contradiction(&self) -> Option<String> {
         let Self { turbine_alone, engine_alone, engine: [all, engine] } = *self;
-        let is_in_gear = engine as f64 >= MOST * all as f64;
+        let is_in_gear = engine as f64 >= MAXIMUM * all as f64;
         (is_in_gear && engine_alone >= ENOUGH && engine_alone > TIMES * turbine_alone).then(|| {
             format!(
                 "engine_speed and turbine_speed may be swapped: in a gear the turbine turns with the output, but in {engine_alone} samples \

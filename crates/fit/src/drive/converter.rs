@@ -7,8 +7,8 @@
 //! ```
 //!
 //! `C` is a line between knots over the speed ratio and zero at 1; `J_e` is the inertia of engine and pump, `d` the time by which
-//! the torque signal is ahead of the torque. Least squares, robust by Huber's weights, `d` by search. The torque ratio of the converter is not
-//! in these equations: it would need a torque on the output side.
+//! the torque signal is ahead of the torque. Least squares, robust by Huber's weights, `d` by search. The torque ratio of the converter
+//! is not in these equations: it would need a torque on the output side.
 
 use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
@@ -23,7 +23,7 @@ const MOMENTS_AT_KNOT: f64 = 15.0;
 /// Above this speed ratio the capacity is too small to be seen; the torque is that of the engine.
 pub(crate) const COUPLED: f64 = 0.97;
 /// Moments that are fitted; of more, every second, third, ... one.
-const MOST: usize = 8_000;
+const MAXIMUM: usize = 8_000;
 /// Delays that are tried, s.
 const DELAYS: std::ops::RangeInclusive<i32> = -20..=40;
 const DELAY_STEP_S: f64 = 0.01;
@@ -78,7 +78,7 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     }
     let slips = |moment: &&Moment| !moment.no_slip && (0.5 * KNOTS[0]..COUPLED).contains(&moment.speed_ratio());
     let slipping: Vec<Moment> = moments.iter().filter(slips).copied().collect();
-    let every = slipping.len().div_ceil(MOST).max(1);
+    let every = slipping.len().div_ceil(MAXIMUM).max(1);
     let some: Vec<Moment> = slipping.iter().step_by(every).copied().collect();
     let knots = knots_with_data(&some);
     if knots.len() < 2 {
@@ -123,14 +123,14 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
 fn drives_no_engine(knots: &[Knot]) -> Result<(), String> {
     let is_negative = |knot: &Knot| knot.capacity_n_m_s2 + 2.0 * knot.sd_n_m_s2 < 0.0;
     let sum: f64 = knots.iter().map(|knot| knot.capacity_n_m_s2).sum();
-    let least = knots.iter().min_by(|one, other| one.capacity_n_m_s2.total_cmp(&other.capacity_n_m_s2));
-    match least.filter(|_| sum < 0.0 || knots.iter().any(is_negative)) {
+    let minimum = knots.iter().min_by(|one, other| one.capacity_n_m_s2.total_cmp(&other.capacity_n_m_s2));
+    match minimum.filter(|_| sum < 0.0 || knots.iter().any(is_negative)) {
         None => Ok(()),
-        Some(least) => Err(format!(
+        Some(minimum) => Err(format!(
             "engine_torque does not fit the speeds: by it the converter would drive the engine (capacity {:.2}e-3 N m s² at speed ratio {}); \
              check unit and scale of engine_torque, and whether its friction is taken off once (engine_friction_torque)",
-            1e3 * least.capacity_n_m_s2,
-            least.speed_ratio
+            1e3 * minimum.capacity_n_m_s2,
+            minimum.speed_ratio
         )),
     }
 }
@@ -169,8 +169,8 @@ impl ConverterFit {
     }
 }
 
-/// How far lines between knots lie from a curve through them, at each knot: of a curve with the second derivative `c`, the lines with the least
-/// squares of distances pass its points at a spacing `h` by `c h^2 / 12`.
+/// How far lines between knots lie from a curve through them, at each knot: of a curve with the second derivative `c`, the lines with the
+/// least squares of distances pass its points at a spacing `h` by `c h^2 / 12`.
 fn bends(knots: &[f64], capacities: &[f64]) -> Vec<f64> {
     let at = |i: usize| knots.get(i).map_or((1.0, 0.0), |ratio| (*ratio, capacities[i]));
     let bend = |i: usize| {

@@ -7,7 +7,7 @@ use crate::Series;
 /// Readings that are closer together are left out, s: the page shows no more.
 const CLOSEST_S: f64 = 0.008;
 /// Readings of a signal that are kept: five hours at 100 Hz in 30 MB.
-const MOST: usize = 1_800_000;
+const MAXIMUM: usize = 1_800_000;
 /// Time between two moments, s.
 const STEP_S: f64 = 0.02;
 /// A moment needs readings this close around it, s.
@@ -88,7 +88,7 @@ impl DriveRecord {
             Role::TargetGear => &mut self.target_gear,
             _ => return,
         };
-        if series.len() == MOST {
+        if series.len() == MAXIMUM {
             self.is_cut = true;
         } else if series.time_s.last().is_none_or(|last_s| time_s - last_s >= CLOSEST_S) {
             series.push(time_s, value);

@@ -23,7 +23,7 @@ const COUPLING: f64 = 0.9;
 const BEFORE_S: f64 = 0.6;
 const AFTER_S: f64 = 0.9;
 
-/// Torques at one time, N m: least, middle and greatest.
+/// Torques at one time, N m: minimum, middle and maximum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurbineTorque {
     /// Time, s.
@@ -41,9 +41,9 @@ pub struct ShiftTorque {
     pub window_s: [f64; 2],
     /// The torques, where they are known.
     pub torques: Vec<TurbineTorque>,
-    /// Mean of the clutches' torque in the inertia phase, N m: least, middle, greatest.
+    /// Mean of the clutches' torque in the inertia phase, N m: minimum, middle, maximum.
     pub mean_n_m: Option<[f64; 3]>,
-    /// Friction work of the clutch that controls the inertia phase, J: least, middle, greatest.
+    /// Friction work of the clutch that controls the inertia phase, J: minimum, middle, maximum.
     pub work_j: Option<[f64; 3]>,
     /// Lowest engine torque that the gearbox asked for, N m at the flywheel, and for how long it asked, s.
     pub reduction: Option<[f64; 2]>,
@@ -53,11 +53,11 @@ pub struct ShiftTorque {
     pub no_slip_fraction: f64,
 }
 
-/// Least, middle and greatest of some values.
+/// Minimum, middle and maximum of some values.
 fn three(values: impl IntoIterator<Item = f64>) -> [f64; 3] {
-    let (least, greatest) =
+    let (minimum, maximum) =
         values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    [least, 0.5 * (least + greatest), greatest]
+    [minimum, 0.5 * (minimum + maximum), maximum]
 }
 
 impl ConverterFit {
@@ -65,9 +65,9 @@ impl ConverterFit {
     pub fn torques(&self, record: &DriveRecord, moment: &Moment) -> Option<TurbineTorque> {
         let turbine_n_m = match self.by_converter(moment) {
             Some([pump_n_m, sd_n_m]) => {
-                let most = 1.0 + (STALL_RATIO_MAX - 1.0) * (1.0 - moment.speed_ratio() / COUPLING).max(0.0);
+                let maximum = 1.0 + (STALL_RATIO_MAX - 1.0) * (1.0 - moment.speed_ratio() / COUPLING).max(0.0);
                 let pumps = [pump_n_m - 2.0 * sd_n_m, pump_n_m + 2.0 * sd_n_m];
-                three(pumps.into_iter().flat_map(|pump_n_m| [pump_n_m, most * pump_n_m]))
+                three(pumps.into_iter().flat_map(|pump_n_m| [pump_n_m, maximum * pump_n_m]))
             }
             None if moment.no_slip || moment.speed_ratio() > super::converter::COUPLED => {
                 let by_engine = self.by_engine(record, moment);
@@ -138,8 +138,8 @@ impl ShiftTorque {
         let asked: Vec<(f64, f64)> = record.torque_request.between(self.window_s).collect();
         let (Some(first), Some(last)) = (asked.first(), asked.last()) else { return };
         let net = |(time_s, asked): (f64, f64)| asked - record.friction_torque.at(time_s);
-        let least = asked.iter().map(|point| net(*point)).fold(f64::INFINITY, f64::min);
-        self.reduction = Some([least, last.0 - first.0]);
+        let minimum = asked.iter().map(|point| net(*point)).fold(f64::INFINITY, f64::min);
+        self.reduction = Some([minimum, last.0 - first.0]);
         let count = asked.len() as f64;
         let error = |point: &(f64, f64)| (record.engine_torque.at(point.0) - net(*point)).abs();
         self.reduction_error_n_m = Some(asked.iter().map(error).sum::<f64>() / count);

@@ -25,8 +25,8 @@ const OVERRUN_FRACTION: f64 = 0.3;
 /// Standard deviation of a backlash of which nothing is known but that it is anywhere between 0 and 0.1 rad at the wheels \[chosen\]. The
 /// fit itself has none: a mean would pull.
 const BEFORE_RAD: f64 = 0.1 / 3.464;
-/// Greatest backlash that the error budget of a file may have, rad.
-pub(crate) const MOST_RAD: f64 = 0.2;
+/// Maximum backlash that the error budget of a file may have, rad.
+pub(crate) const MAX_RAD: f64 = 0.2;
 
 /// Which drive tells it.
 const BACKLASH_TOLD_BY: &str = "press and release the accelerator in a gear on a straight road, each for 2 s, with the speed of the driven wheels logged";
@@ -116,8 +116,8 @@ pub(crate) fn fit_backlash<'a>(
     let found =
         found.ok_or_else(|| format!("the speeds of output and wheels do not fit together; {BACKLASH_TOLD_BY}"))?;
     let (rad, sd_rad) = (found.value[3], found.sd[3]);
-    if rad > MOST_RAD {
-        return Err(format!("it would be {rad:.2} rad at the wheels, and more than {MOST_RAD} rad is none of a car"));
+    if rad > MAX_RAD {
+        return Err(format!("it would be {rad:.2} rad at the wheels, and more than {MAX_RAD} rad is none of a car"));
     }
     let torques = stretches.iter().copied().flatten().map(|cell| cell.wheels_n_m);
     let (count, sum) =

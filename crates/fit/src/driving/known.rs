@@ -6,8 +6,8 @@ use crate::Verdict;
 use crate::fitted_file::SIDES;
 
 /// Errors of scale, and delays, s, that are nothing to correct \[chosen\].
-pub(crate) const LEAST_SCALE: f64 = 1e-3;
-pub(crate) const LEAST_DELAY_S: f64 = 1e-3;
+pub(crate) const MIN_SCALE: f64 = 1e-3;
+pub(crate) const MIN_DELAY_S: f64 = 1e-3;
 
 /// A value with its standard deviation as it is stated, and before.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,8 +32,8 @@ impl Known {
     }
 
     /// Whether it is told, and more than this and its interval away from zero.
-    pub(crate) fn is_off_by(&self, least: f64) -> bool {
-        self.verdict() != Verdict::NotTold && self.value.abs() > (SIDES * self.sd).max(least)
+    pub(crate) fn is_off_by(&self, minimum: f64) -> bool {
+        self.verdict() != Verdict::NotTold && self.value.abs() > (SIDES * self.sd).max(minimum)
     }
 }
 
@@ -45,7 +45,7 @@ pub(crate) fn said_of_delay(role: &str, against: &str, late_s: &Known, told_by: 
         return format!("{found}: its delay is not told by these logs; {told_by}");
     }
     match late_ms {
-        _ if !late_s.is_off_by(LEAST_DELAY_S) => format!("{found}: they belong together"),
+        _ if !late_s.is_off_by(MIN_DELAY_S) => format!("{found}: they belong together"),
         late_ms if late_ms > 0.0 => {
             format!("{found}: add {:.4} to `delay_s` of its channel in the channel map", late_s.value)
         }

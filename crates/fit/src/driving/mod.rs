@@ -29,7 +29,7 @@ pub use backlash::BacklashFit;
 pub(crate) use backlash::fit_backlash;
 pub(crate) use car::DrivenCar;
 pub use known::Known;
-pub(crate) use known::{LEAST_DELAY_S, said_of_delay};
+pub(crate) use known::{MIN_DELAY_S, said_of_delay};
 pub(crate) use model::{Balance, DrivingModel, DrivingWeights, Evaluated};
 pub(crate) use recorder::{DrivingRecorder, RowState, turns_by};
 pub use skew::SkewFit;
@@ -53,7 +53,7 @@ const MISFIT: f64 = 3.0;
 /// Bounds of rolling resistance and air drag \[chosen\].
 pub(crate) const ROLLING: f64 = 0.5;
 pub(crate) const AIR: f64 = 0.3;
-/// Least standard deviations of rolling resistance, as a mean grade over the weight, and of air drag, as a fraction \[chosen: a mean
+/// Minimum standard deviations of rolling resistance, as a mean grade over the weight, and of air drag, as a fraction \[chosen: a mean
 /// wind\].
 pub(crate) const MEAN_GRADE_RAD: f64 = 0.005;
 pub(crate) const WIND: f64 = 0.1;
@@ -101,7 +101,7 @@ pub(crate) fn misfit(name: &str, scale: f64) -> Option<String> {
     })
 }
 
-/// Least standard deviation of the logarithm of the rolling resistance of a car: a mean grade acts like it.
+/// Minimum standard deviation of the logarithm of the rolling resistance of a car: a mean grade acts like it.
 pub(crate) fn rolling_floor(road: &drivetrain::RoadLoad<f64>) -> f64 {
     let weight_n_m = road.mass_kg * drivetrain::road::GRAVITY_M_S2 * road.wheel_radius_m;
     MEAN_GRADE_RAD * weight_n_m / road.rolling_moment_n_m.max(f64::MIN_POSITIVE)

@@ -15,8 +15,8 @@ use crate::weights::{ChannelWeights, FACTOR, HUBER};
 /// grade is left\].
 const GRADE_RAD: f64 = 0.03;
 const GRADE_M: f64 = 100.0;
-/// Least noise of a mean speed, rad/s: a reading has a quantum.
-const READING_LEAST_RAD_S: f64 = 0.01;
+/// Minimum noise of a mean speed, rad/s: a reading has a quantum.
+const READING_MIN_RAD_S: f64 = 0.01;
 /// Time over which the error of a torque lasts, s \[chosen, as in the filter\].
 const TORQUE_S: f64 = 3.0;
 /// Error of the reported engine torque beside its scale, N m and as a fraction \[chosen\].
@@ -145,7 +145,7 @@ impl<'a> DrivingModel<'a> {
         // Over a step noise averages out.
         let longer = (FINE_S / STEP_S).sqrt();
         let noise_n_m = [longer * at_input_n_m, longer * Real::hypot(reported_n_m, of_steps(|half| half.pump_n_m))];
-        let reading_rad_s = reading_rad_s.map(|noise| (longer * noise).max(READING_LEAST_RAD_S));
+        let reading_rad_s = reading_rad_s.map(|noise| (longer * noise).max(READING_MIN_RAD_S));
         Self { driving, car, uses, reading_rad_s, noise_n_m }
     }
 
@@ -248,8 +248,8 @@ impl<'a> DrivingModel<'a> {
     /// What passes of grade and error of a torque in a time at an output speed.
     fn passing(&self, output_rad_s: f64, time_s: f64, lasting: f64) -> Passing {
         let way_m = output_rad_s.abs() / self.car.driveline.final_ratio * self.car.road.wheel_radius_m * time_s;
-        let Passing { grade: most, .. } = Passing::ALL;
-        Passing { grade: (way_m / GRADE_M).min(most), torque: (time_s / (lasting * TORQUE_S)).min(most) }
+        let Passing { grade: maximum, .. } = Passing::ALL;
+        Passing { grade: (way_m / GRADE_M).min(maximum), torque: (time_s / (lasting * TORQUE_S)).min(maximum) }
     }
 
     /// The balance of the car.

@@ -11,11 +11,11 @@ const SETTLES_S: f64 = 0.5;
 /// Longest time without a reading of a speed, s.
 const GAP_S: f64 = 0.1;
 /// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
-const OUTPUT_LEAST_RAD_S: f64 = 15.0;
+const OUTPUT_MIN_RAD_S: f64 = 15.0;
 /// The engine pulls where the turbine turns slower than this fraction of its speed, and until it turns faster than the second one \[chosen\] ...
 const PULLS: [f64; 2] = [0.97, 0.99];
 /// ... and it is not idling, rad/s \[chosen: with a foot on the brake it idles, cold too\].
-const ENGINE_LEAST_RAD_S: f64 = 120.0;
+const ENGINE_MIN_RAD_S: f64 = 120.0;
 /// Without a converter it pulls with this torque, and until it has less than the second one, N m \[chosen\].
 const PULLS_N_M: [f64; 2] = [15.0, 5.0];
 /// Fraction and speed, rad/s, by which the turbine may be off the ratio of the gear.
@@ -25,7 +25,7 @@ const RATIO_RAD_S: f64 = 2.0;
 /// already.
 const FOOT_S: f64 = 0.5;
 /// Time of driving that is kept, s: two hours.
-const MOST_S: f64 = 7200.0;
+const MAX_S: f64 = 7200.0;
 /// Of readings before a stretch what a late signal needs, s.
 const BEFORE_S: f64 = 0.5;
 
@@ -118,7 +118,7 @@ impl DrivingRecorder {
     }
 
     /// Whether the engine pulls the car in a gear.
-    fn pulls(&self, gear: usize, time_s: f64, slower: f64, least_n_m: f64) -> bool {
+    fn pulls(&self, gear: usize, time_s: f64, slower: f64, min_n_m: f64) -> bool {
         let StretchReadings { engine, turbine, output, reported } = &self.readings;
         let newest = |series: &Series| {
             let last_s = series.time_s.last().filter(|last_s| (time_s - **last_s).abs() <= GAP_S);
@@ -128,10 +128,10 @@ impl DrivingRecorder {
         let gear = self.car.gears.get(gear).filter(|gear| gear.is_known());
         let is_in_gear = gear.is_some_and(|gear| turns_by(gear.ratio, turbine, output));
         let is_driven = match &self.car.converter {
-            Some(_) => newest(engine).is_some_and(|engine| engine > ENGINE_LEAST_RAD_S && turbine < slower * engine),
-            None => newest(reported).is_some_and(|torque| torque > least_n_m),
+            Some(_) => newest(engine).is_some_and(|engine| engine > ENGINE_MIN_RAD_S && turbine < slower * engine),
+            None => newest(reported).is_some_and(|torque| torque > min_n_m),
         };
-        is_in_gear && is_driven && output > OUTPUT_LEAST_RAD_S
+        is_in_gear && is_driven && output > OUTPUT_MIN_RAD_S
     }
 
     fn close(&mut self) {
@@ -145,7 +145,7 @@ impl DrivingRecorder {
             span = [span[0].max(*first_s), span[1].min(*last_s)];
         }
         span[1] -= FOOT_S;
-        if self.found.time_s() >= MOST_S {
+        if self.found.time_s() >= MAX_S {
             self.found.is_cut = true;
             return;
         }

@@ -9,7 +9,7 @@
 //!
 //! Means over tenths of a second, with the rate between the means before and after; robust least squares ([`Told`]).
 
-use super::known::{Known, LEAST_DELAY_S, LEAST_SCALE, said_of_delay};
+use super::known::{Known, MIN_DELAY_S, MIN_SCALE, said_of_delay};
 use super::lines::{Line, Told};
 use super::recorder::{Dated, turns_by};
 use super::twist::{DELAY_S, SCALE};
@@ -29,10 +29,10 @@ const GAP_S: f64 = 0.1;
 const SLOWEST_RAD_S: f64 = 15.0;
 /// Cells that are kept: two hours.
 const CELLS: usize = 72_000;
-/// Least time of driving, s, and fewest stretches: their scatter is part of the intervals.
+/// Minimum time of driving, s, and fewest stretches: their scatter is part of the intervals.
 const TIME_S: f64 = 20.0;
 const GROUPS: usize = 4;
-/// Least standard deviations that are stated, as in the one-shift fit: of scale and delay, s.
+/// Minimum standard deviations that are stated, as in the one-shift fit: of scale and delay, s.
 const FLOORS: [f64; 2] = [1e-4, 0.3e-3];
 
 /// Means of the turbine speed and of what a channel says that it is, rad/s.
@@ -52,7 +52,7 @@ pub struct SkewFit {
 impl SkewFit {
     /// By how much the readings are late, s, where it is told and not small.
     pub(crate) fn told_late_s(&self) -> Option<f64> {
-        self.late_s.is_off_by(LEAST_DELAY_S).then_some(self.late_s.value)
+        self.late_s.is_off_by(MIN_DELAY_S).then_some(self.late_s.value)
     }
 
     /// What a fit says of the channel with this role.
@@ -63,7 +63,7 @@ impl SkewFit {
         };
         let mut text =
             said_of_delay(role, "the turbine speed", &found.late_s, "speeds that change in a gear would tell it");
-        if found.scale.is_off_by(LEAST_SCALE) {
+        if found.scale.is_off_by(MIN_SCALE) {
             text += &format!(
                 ". It has to be multiplied with {:.4} +- {:.4} to be that of the gear by the turbine speed: `scale` of one of both channels, or a ratio, is wrong",
                 1.0 + found.scale.value,

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! with the error `e` of the scale of the wheel speed, the delay `d` between both readings, the stiffness `K` of the shafts, the backlash `b` and the
-//! torque `T` of the converter at the wheels, less what accelerates the gearbox. Least squares over the changes from one time of rest to the next, whose
-//! errors are independent as far as those of the speeds are; robust by Huber's weights.
+//! torque `T` of the converter at the wheels, less what accelerates the gearbox. Least squares over the changes from one time of rest to
+//! the next, whose errors are independent as far as those of the speeds are; robust by Huber's weights.
 
 use super::DrivenCar;
 use super::lines::{Line, Told};
@@ -164,8 +164,8 @@ pub(crate) fn rests(cells: &[Cell]) -> Vec<usize> {
 }
 
 /// The points of rest from which changes are taken: of those in a row every so many, and both ends.
-fn points(cells: &[Cell], apart: usize, least_rad_s: f64) -> Vec<usize> {
-    let rests: Vec<usize> = rests(cells).into_iter().filter(|at| cells[*at].wheel_rad_s > least_rad_s).collect();
+fn points(cells: &[Cell], apart: usize, min_rad_s: f64) -> Vec<usize> {
+    let rests: Vec<usize> = rests(cells).into_iter().filter(|at| cells[*at].wheel_rad_s > min_rad_s).collect();
     let mut first = 0;
     let mut points = Vec::new();
     for (i, at) in rests.iter().enumerate() {
@@ -185,14 +185,14 @@ fn points(cells: &[Cell], apart: usize, least_rad_s: f64) -> Vec<usize> {
 pub(crate) fn changes(
     stretches: &[&Vec<Cell>],
     apart: usize,
-    least_rad_s: f64,
+    min_rad_s: f64,
     torque: &InputTorque,
 ) -> (Vec<Line<UNKNOWNS>>, usize) {
     let mut all = Vec::new();
     let (mut group, mut reversals) = (0, 0);
     for cells in stretches {
         group += 1;
-        for pair in points(cells, apart, least_rad_s).windows(2) {
+        for pair in points(cells, apart, min_rad_s).windows(2) {
             let [from, to] = [&cells[pair[0]], &cells[pair[1]]];
             let span_s = CELL_S * (pair[1] - pair[0]) as f64;
             let between = &cells[pair[0] + 1..pair[1]];

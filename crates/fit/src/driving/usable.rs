@@ -3,9 +3,9 @@
 use super::DrivenCar;
 use super::stretch::{Driving, STEP_S, means};
 
-/// Least time of driving, s.
+/// Minimum time of driving, s.
 const TIME_S: f64 = 10.0;
-/// Least change of a reported engine torque, N m: one that changes less is frozen, or says nothing.
+/// Minimum change of a reported engine torque, N m: one that changes less is frozen, or says nothing.
 const CHANGE_N_M: f64 = 3.0;
 /// Rise of the torque that converter and engine take per reported torque, between which the signal is an engine torque at the flywheel
 /// \[chosen: twice what is held possible\].

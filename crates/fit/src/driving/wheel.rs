@@ -5,7 +5,7 @@
 
 use drivetrain::Real;
 
-use super::known::{Known, LEAST_SCALE, said_of_delay};
+use super::known::{Known, MIN_SCALE, said_of_delay};
 use super::twist::{Cell, DELAY_S, InputTorque, SCALE, changes, told};
 use super::{DrivenCar, Driving};
 use crate::Verdict;
@@ -13,12 +13,12 @@ use crate::fitted_file::SIDES;
 
 /// Cells of a change: 0.5 s.
 const APART: usize = 5;
-/// Least time of driving, s, and fewest stretches: their scatter is part of the intervals.
+/// Minimum time of driving, s, and fewest stretches: their scatter is part of the intervals.
 const TIME_S: f64 = 20.0;
 const GROUPS: usize = 4;
 /// Speed of the gearbox output below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
-const OUTPUT_LEAST_RAD_S: f64 = 15.0;
-/// Least standard deviations that are stated, as in the one-shift fit: of scale, delay, s, and stiffness.
+const OUTPUT_MIN_RAD_S: f64 = 15.0;
+/// Minimum standard deviations that are stated, as in the one-shift fit: of scale, delay, s, and stiffness.
 const FLOORS: [f64; 3] = [1e-4, 0.3e-3, 0.015];
 
 /// Which drive tells it.
@@ -70,7 +70,7 @@ impl WheelFit {
         if self.scale.verdict() == Verdict::NotTold {
             return format!("{found}: its scale is not told by these logs; {WHEEL_TOLD_BY}");
         }
-        if value.abs() <= half.max(LEAST_SCALE) {
+        if value.abs() <= half.max(MIN_SCALE) {
             return format!("{found}: its scale and the final ratio fit together");
         }
         format!(
@@ -113,8 +113,8 @@ pub(crate) fn fit_wheel(
         return Err("the torque of a car without converter is not computed for it".to_owned());
     }
     let stretches: Vec<&Vec<Cell>> = driving.twists.iter().collect();
-    let least_rad_s = OUTPUT_LEAST_RAD_S / car.driveline.final_ratio;
-    let (changes, _) = changes(&stretches, APART, least_rad_s, torque);
+    let min_rad_s = OUTPUT_MIN_RAD_S / car.driveline.final_ratio;
+    let (changes, _) = changes(&stretches, APART, min_rad_s, torque);
     let mut groups: Vec<usize> = changes.iter().map(|change| change.group).collect();
     groups.dedup();
     let time_s = changes.iter().fold(0.0, |sum, change| sum + change.span_s);

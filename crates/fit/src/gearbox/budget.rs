@@ -85,17 +85,17 @@ impl GearboxFit {
         all.iter().try_for_each(|(key, range)| text.put(&table, key, &list(range), BUDGET_COMMENT))
     }
 
-    /// Least and greatest delay of a valve, s: that of the fitted file over its commands, with what the fit leaves open of it and no more than
-    /// was known before; the 95 % interval of their middle stays.
+    /// Minimum and maximum delay of a valve, s: that of the fitted file over its commands, with what the fit leaves open of it and no more
+    /// than was known before; the 95 % interval of their middle stays.
     fn delay_s(&self, known: &ShiftClutch, place: usize, given: [f64; 2]) -> [f64; 2] {
         let quantity = Quantity::Delay(place);
         let (late_s, sd_s) = (DELAY_UNIT_S * self.unknown(quantity), DELAY_UNIT_S * self.sd(quantity));
         let of_file = known.valve.delay_range().map(|delay_s| (delay_s + late_s).max(0.0));
         let middle = 0.5 * (of_file[0] + of_file[1]);
-        let [least, greatest] = delays(of_file, BUDGET_SIDES * sd_s);
+        let [minimum, maximum] = delays(of_file, BUDGET_SIDES * sd_s);
         let known = delays([given[0].min(middle - SIDES * sd_s), given[1].max(middle + SIDES * sd_s)], 0.0);
         // The file is within its own bounds.
-        [least.max(known[0]).min(of_file[0]), greatest.min(known[1]).max(of_file[1])]
+        [minimum.max(known[0]).min(of_file[0]), maximum.min(known[1]).max(of_file[1])]
     }
 
     /// Ranges of friction and valve gain where only their product is told, beside the file that has the product as friction: what the product
@@ -105,8 +105,8 @@ impl GearboxFit {
         let torque = Quantity::Torque(place);
         let value = Real::exp(self.unknown(torque));
         let product = factors(self.sd(torque), value, [friction[0] * gain[0], friction[1] * gain[1]]);
-        let both = |least: [f64; 2], greatest: [f64; 2]| {
-            [least[0].max(least[1]).min(1.0), greatest[0].min(greatest[1]).max(1.0)]
+        let both = |minimum: [f64; 2], maximum: [f64; 2]| {
+            [minimum[0].max(minimum[1]).min(1.0), maximum[0].min(maximum[1]).max(1.0)]
         };
         [
             both([product[0] / gain[1], friction[0] / value], [product[1] / gain[0], friction[1] / value]),

@@ -192,12 +192,12 @@ impl ClutchModel {
 
 /// The readings at which a piston has surely ended its stroke: above any kiss point that is held possible, and for so long that the pressure is that of
 /// the valve again.
-fn filled_part(readings: &Series, kiss_most_pa: f64, cylinder: &Cylinder<f64>) -> Series {
+fn filled_part(readings: &Series, kiss_max_pa: f64, cylinder: &Cylinder<f64>) -> Series {
     let (by_volume, _) = cylinder.volume_rate_slopes(cylinder.stroke_m3, cylinder.kiss_pa + FILL_DROP_PA);
     let forgotten_s = -LAGS / by_volume;
     let (mut filled, mut since_s) = (Series::default(), None);
     for (time_s, pressure_pa) in readings.time_s.iter().zip(&readings.value) {
-        if *pressure_pa < kiss_most_pa {
+        if *pressure_pa < kiss_max_pa {
             since_s = None;
         } else if time_s - *since_s.get_or_insert(*time_s) >= forgotten_s {
             filled.push(*time_s, *pressure_pa);

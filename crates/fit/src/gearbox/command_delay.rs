@@ -1,8 +1,8 @@
 //! Commands that a logger has stored much too late or too early.
 //!
 //! The delay of each valve is fitted near that of the file. Where all commands are late by a tenth of a second, as of another bus than the speeds or of a
-//! time stamp of the whole message, the fit would end in a wrong minimum. So a common delay is looked for first: that with which shifts have the least cost after one
-//! step of the fit from the values of the file.
+//! time stamp of the whole message, the fit would end in a wrong minimum. So a common delay is looked for first: that with which shifts
+//! have the minimum cost after one step of the fit from the values of the file.
 
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
@@ -17,9 +17,9 @@ const PART: f64 = 0.25;
 const PARTS: i32 = 3;
 /// Shifts that are looked at: more do not make a coarse search better.
 const SHIFTS: usize = 16;
-/// Least delay that is said, s \[chosen: with a valve anywhere within 0 to 30 ms, the fit finds it by itself\].
-const LEAST_S: f64 = 0.04;
-/// Least cost with another delay over that without, above which it is not said \[chosen; in drawn cars with 100 ms it is 0.01\].
+/// Minimum delay that is said, s \[chosen: with a valve anywhere within 0 to 30 ms, the fit finds it by itself\].
+const MIN_S: f64 = 0.04;
+/// Minimum cost with another delay over that without, above which it is not said \[chosen; in drawn cars with 100 ms it is 0.01\].
 const LESS: f64 = 1.0 / 3.0;
 
 /// The common delay of all commands, s, where it is so large that the fit would not find it.
@@ -35,13 +35,13 @@ pub(crate) fn common_delay_s(problem: &Problem<'_>, models: &[ShiftModel]) -> Op
         all.map(|late_s| (late_s, cost(late_s))).min_by(|one, other| one.1.total_cmp(&other.1))
     };
     let (coarse_s, _) = near(0.0, STEP_S, STEPS)?;
-    let (late_s, least) = near(coarse_s, PART * STEP_S, PARTS)?;
-    if late_s.abs() < LEAST_S || least >= LESS * cost(0.0) {
+    let (late_s, minimum) = near(coarse_s, PART * STEP_S, PARTS)?;
+    if late_s.abs() < MIN_S || minimum >= LESS * cost(0.0) {
         return None;
     }
-    // The parabola through the least one and its neighbours.
+    // The parabola through the minimum and its neighbours.
     let [before, after] = [-1.0, 1.0].map(|side| cost(late_s + side * PART * STEP_S));
-    let bend = before + after - 2.0 * least;
+    let bend = before + after - 2.0 * minimum;
     let beside = if bend > 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };
     Some(late_s + beside * PART * STEP_S)
 }

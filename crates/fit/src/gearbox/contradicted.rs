@@ -9,9 +9,9 @@ use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 
 /// RMS difference from the pressures by the vehicle file above which a measured pressure contradicts them: a fraction of these \[chosen: several times
-/// what gain, lag and hysteresis make together\], and least, Pa.
+/// what gain, lag and hysteresis make together\], and minimum, Pa.
 const FRACTION: f64 = 0.5;
-const LEAST_PA: f64 = 30e3;
+const MIN_PA: f64 = 30e3;
 
 /// Places of the elements whose measured pressures, over all shifts, cannot be those of their commands.
 pub(super) fn contradicted(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<usize> {
@@ -29,7 +29,7 @@ pub(super) fn contradicted(car: &Car, tables: &ShiftTables<f64>, shifts: &[Shift
     }
     let contradicts = |[rows, differences, pressures]: &[f64; 3]| {
         let [difference, pressure] = [differences, pressures].map(|sum| (sum / rows).sqrt());
-        difference > FRACTION * pressure + LEAST_PA
+        difference > FRACTION * pressure + MIN_PA
     };
     sums.iter().enumerate().filter(|(_, sums)| contradicts(sums)).map(|(place, _)| place).collect()
 }

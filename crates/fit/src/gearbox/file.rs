@@ -261,8 +261,8 @@ fn written(mut text: Written, car: &CarFile, path: &Path, head: &str) -> Result<
 
 /// What a fitted factor says of itself.
 fn factor_comment(factor: f64, sd: f64, verdict: Verdict) -> String {
-    let [least, most] = [-SIDES * sd, SIDES * sd].map(|half| factor * Real::exp(half));
-    format!("x {factor:.3}, 95 % {least:.3} to {most:.3}, {}", verdict.name())
+    let [minimum, maximum] = [-SIDES * sd, SIDES * sd].map(|half| factor * Real::exp(half));
+    format!("x {factor:.3}, 95 % {minimum:.3} to {maximum:.3}, {}", verdict.name())
 }
 
 /// The text of a vehicle file on its way to another: values that it has are replaced, others are added.

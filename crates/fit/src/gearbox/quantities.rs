@@ -96,7 +96,7 @@ pub struct Quantities {
     /// Elements whose pressure is measured in a shift.
     pub measured: Vec<bool>,
     pub(crate) has_converter: bool,
-    /// Least standard deviation of the logarithm of the rolling resistance: a mean grade acts like it.
+    /// Minimum standard deviation of the logarithm of the rolling resistance: a mean grade acts like it.
     rolling_floor: f64,
 }
 
@@ -177,7 +177,7 @@ impl Quantities {
         })
     }
 
-    /// Least standard deviation of the unknown that is stated \[chosen, as of the one-shift fit\]: what the model leaves out does not
+    /// Minimum standard deviation of the unknown that is stated \[chosen, as of the one-shift fit\]: what the model leaves out does not
     /// shrink with more shifts.
     pub(crate) fn floor(&self, quantity: Quantity) -> f64 {
         if quantity == Quantity::Rolling { self.rolling_floor } else { quantity.floor_of_car() }

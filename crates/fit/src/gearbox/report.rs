@@ -5,7 +5,7 @@ use drivetrain::{Real, ShiftKind};
 use super::command_delay::said_of_commands;
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
-use crate::driving::{Balance, DRAG_UNIT_N_M, LEAST_DELAY_S, said_of_delay};
+use crate::driving::{Balance, DRAG_UNIT_N_M, MIN_DELAY_S, said_of_delay};
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::report::{MEAN_GRADE, cautions, fill_row, offset_row, said_of_offset};
@@ -195,7 +195,7 @@ impl GearboxFit {
         let mut lines = self.channels.statements();
         let engine = self.engine_late_s();
         lines.extend(engine.map(|late_s| said_of_delay("engine_speed", "the turbine speed", &late_s, TOLD_BY)));
-        let is_off = engine.is_some_and(|late_s| late_s.is_off_by(LEAST_DELAY_S));
+        let is_off = engine.is_some_and(|late_s| late_s.is_off_by(MIN_DELAY_S));
         if is_off || self.channels.late_s() != [0.0; 2] {
             lines.push(
                 "the fit has counted with these delays of output and engine speed in the shifts; `estimate` needs them in the channel map".to_owned(),

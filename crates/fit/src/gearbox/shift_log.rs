@@ -17,7 +17,7 @@ const SHORTEST_S: f64 = 0.06;
 /// Longest time between two readings, s.
 const GAP_S: f64 = 0.06;
 /// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
-const OUTPUT_LEAST_RAD_S: f64 = 15.0;
+const OUTPUT_MIN_RAD_S: f64 = 15.0;
 
 /// A measured shift between two gears.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,8 +54,8 @@ impl ShiftLog {
         let direction = (on - off).signum();
         let slips = |time_s: f64, turbine: f64| {
             let output = self.output.at(time_s);
-            let least = |ratio: f64| SLIPS_RAD_S * (1.0 + ratio * ratio).sqrt();
-            direction * (turbine - off * output) > least(off) && direction * (on * output - turbine) > least(on)
+            let minimum = |ratio: f64| SLIPS_RAD_S * (1.0 + ratio * ratio).sqrt();
+            direction * (turbine - off * output) > minimum(off) && direction * (on * output - turbine) > minimum(on)
         };
         // The longest run; single readings off it are outliers.
         let (mut best, mut run): (Option<[usize; 2]>, Option<[usize; 2]>) = (None, None);
@@ -82,7 +82,7 @@ impl ShiftLog {
         if !(lasts(&self.turbine) && lasts(&self.output)) {
             return Err("readings of the turbine or output speed are missing while both clutches slip");
         }
-        if self.output.between(span).any(|(_, speed)| speed < OUTPUT_LEAST_RAD_S) {
+        if self.output.between(span).any(|(_, speed)| speed < OUTPUT_MIN_RAD_S) {
             return Err("the car is too slow: readings of toothed wheels are too old");
         }
         let is_commanded = |commands: &Series| commands.time_s.first().is_some_and(|first_s| *first_s < span[0]);

@@ -14,7 +14,7 @@ use crate::least_squares::{Equations, Iterations, Minimum, Objective, minimised}
 use crate::weights::{ChannelWeights, FACTOR};
 
 /// Steps after each of which the weights follow the residuals, and all of them.
-const ITERATIONS: Iterations = Iterations { reweighted: 5, most: 20, decrease: 0.1 };
+const ITERATIONS: Iterations = Iterations { reweighted: 5, maximum: 20, decrease: 0.1 };
 /// Turns in which the own unknowns of a shift are found with Huber's weights.
 const OWN_TURNS: u32 = 4;
 /// Standard deviations of what was known before beyond which nothing is held possible.

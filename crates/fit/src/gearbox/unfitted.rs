@@ -47,8 +47,8 @@ impl Unfitted {
             if let Some(fill) = clutch.standard_fill_budget(car.oil_temperature_degc) {
                 all.push(Self { place, error: Error::Stroke(fill_sd(&clutch.cylinder, &fill)) });
             }
-            let most_pa = budget.element(element).map_or(clutch.hysteresis_pa, |errors| errors.valve_hysteresis_pa);
-            let std_dev_pa = std_dev_of_width(clutch.hysteresis_pa, most_pa);
+            let max_pa = budget.element(element).map_or(clutch.hysteresis_pa, |errors| errors.valve_hysteresis_pa);
+            let std_dev_pa = std_dev_of_width(clutch.hysteresis_pa, max_pa);
             if std_dev_pa > 0.0 {
                 all.push(Self { place, error: Error::Hysteresis(std_dev_pa) });
             }
@@ -78,8 +78,8 @@ impl Unfitted {
         if let (Error::Hysteresis(more_pa), Some(kiss), true) =
             (self.error, problem.quantities.place(Quantity::Kiss(self.place)), is_seen)
         {
-            let least = more_pa / KISS_UNIT_PA;
-            covariance[(kiss, kiss)] += (least * least - moved[kiss] * moved[kiss]).max(0.0);
+            let minimum = more_pa / KISS_UNIT_PA;
+            covariance[(kiss, kiss)] += (minimum * minimum - moved[kiss] * moved[kiss]).max(0.0);
         }
     }
 
@@ -91,11 +91,11 @@ impl Unfitted {
     }
 }
 
-/// Standard deviation from the width of the file of one that is anywhere between none and the greatest, Pa.
-fn std_dev_of_width(file_pa: f64, most_pa: f64) -> f64 {
-    if most_pa <= 0.0 {
+/// Standard deviation from the width of the file of one that is anywhere between none and the maximum, Pa.
+fn std_dev_of_width(file_pa: f64, max_pa: f64) -> f64 {
+    if max_pa <= 0.0 {
         return 0.0;
     }
-    let square = (Real::powi((most_pa - file_pa).max(0.0), 3) + Real::powi(file_pa, 3)) / (3.0 * most_pa.max(file_pa));
+    let square = (Real::powi((max_pa - file_pa).max(0.0), 3) + Real::powi(file_pa, 3)) / (3.0 * max_pa.max(file_pa));
     square.sqrt()
 }

@@ -30,10 +30,10 @@ pub struct HeldOut {
 /// Shifts that would err as much as the bounds say, which count beside those that were held out \[chosen\]: a few shifts that agree by luck are no reason to
 /// trust the valves.
 const SHIFTS_BEFORE: f64 = 3.0;
-/// Least scale \[chosen: friction is another by some 4 % with hot and cold oil and with wear, which no log of one drive shows; the bounds of a car in series
-/// are three times that\]. The greatest is the same the other way.
-const LEAST_SCALE: f64 = 1.0 / 3.0;
-const MOST_SCALE: f64 = 3.0;
+/// Minimum scale \[chosen: friction is another by some 4 % with hot and cold oil and with wear, which no log of one drive shows; the
+/// bounds of a car in series are three times that\]. The maximum is the same the other way.
+const MIN_SCALE: f64 = 1.0 / 3.0;
+const MAX_SCALE: f64 = 3.0;
 
 impl HeldOut {
     /// Interval of the scale of the valve errors that holds it in 95 %: of a mean of as many squares as there are shifts, those before included.
@@ -41,7 +41,7 @@ impl HeldOut {
         let count = self.shifts as f64 + SHIFTS_BEFORE;
         // The logarithm of the root of a mean of n squares has a standard deviation of 1/sqrt(2 n).
         let half = 1.96 / (2.0 * count).sqrt();
-        [-half, half].map(|side| (self.valve_error_scale * Real::exp(side)).clamp(LEAST_SCALE, MOST_SCALE))
+        [-half, half].map(|side| (self.valve_error_scale * Real::exp(side)).clamp(MIN_SCALE, MAX_SCALE))
     }
 
     /// What the scale of the valve errors says of itself in a file.
@@ -55,7 +55,7 @@ impl HeldOut {
 
 /// Scale of the one-step errors of the turbine speed, rad/s, above which the model is that of another car or log \[chosen\]: between two rows of a
 /// shift the turbine itself changes by as much.
-const MOST_ONE_STEP_RAD_S: f64 = 4.0;
+const MAX_ONE_STEP_RAD_S: f64 = 4.0;
 
 impl GearboxFit {
     /// Why the fitted file is not to be used in place of the given one, if so.
@@ -65,7 +65,7 @@ impl GearboxFit {
         }
         let [one_step, _] = self.scale_and_gain;
         // An error that is not a number counts against the fit.
-        if !matches!(one_step.partial_cmp(&MOST_ONE_STEP_RAD_S), Some(Ordering::Less | Ordering::Equal)) {
+        if !matches!(one_step.partial_cmp(&MAX_ONE_STEP_RAD_S), Some(Ordering::Less | Ordering::Equal)) {
             return Some(format!(
                 "the turbine does not turn as any car within the error bounds would, with a one-step error of {one_step:.1} rad/s: the commands of two \
                  elements may be exchanged, or be other signals (`wetclutch estimate` names those that contradict the gear), or the gearbox is another"
@@ -141,7 +141,7 @@ fn expected_variance(quantities: &Quantities, shift: &Linearised) -> f64 {
 fn valve_error_scale(compared: &[Compared]) -> f64 {
     let ratios = compared.iter().map(|one| one.fitted / one.expected).filter(|ratio| ratio.is_finite());
     let (sum, count) = ratios.fold((SHIFTS_BEFORE, SHIFTS_BEFORE), |(sum, count), ratio| (sum + ratio, count + 1.0));
-    (sum / count).sqrt().clamp(LEAST_SCALE, MOST_SCALE)
+    (sum / count).sqrt().clamp(MIN_SCALE, MAX_SCALE)
 }
 
 #[cfg(test)]
@@ -159,7 +159,7 @@ mod tests {
         // Six shifts without an error, beside three that err as much as is expected.
         assert!((scale(&shifts(0.0, 6)) - (3.0_f64 / 9.0).sqrt()).abs() < 1e-12);
         assert!((scale(&shifts(4.0, 60)) - (243.0_f64 / 63.0).sqrt()).abs() < 1e-12);
-        assert_eq!((scale(&shifts(0.0, 1000)), scale(&shifts(1e9, 3))), (LEAST_SCALE, MOST_SCALE));
+        assert_eq!((scale(&shifts(0.0, 1000)), scale(&shifts(1e9, 3))), (MIN_SCALE, MAX_SCALE));
         // A shift in which no clutch carries anything says nothing.
         let nothing = Compared { given: 1.0, fitted: 1.0, expected: 0.0 };
         assert_eq!(scale(&[nothing]), 1.0);

@@ -35,9 +35,9 @@ impl Draw {
     }
 
     /// Between two numbers.
-    pub(crate) fn between(&mut self, least: f64, greatest: f64) -> f64 {
+    pub(crate) fn between(&mut self, minimum: f64, maximum: f64) -> f64 {
         let fraction: f64 = StandardUniform.sample(&mut self.0);
-        least + fraction * (greatest - least)
+        minimum + fraction * (maximum - minimum)
     }
 
     fn factor(&mut self, fraction: f64) -> f64 {
@@ -129,8 +129,8 @@ impl TestCar {
     pub(crate) fn of(file: VehicleFile, seed: u64) -> Self {
         let mut draw = Draw::new(seed);
         let mut truth = Vec::new();
-        let mut factor = |draw: &mut Draw, parameter: Parameter, least: f64, greatest: f64| {
-            let factor = draw.between(least, greatest);
+        let mut factor = |draw: &mut Draw, parameter: Parameter, minimum: f64, maximum: f64| {
+            let factor = draw.between(minimum, maximum);
             truth.push((parameter, factor.ln()));
             factor
         };
@@ -228,7 +228,7 @@ impl TestCar {
     /// Gives the maps of the oncoming clutch courses that no factor on those of the file has: friction that changes with the root of the
     /// slip by up to a quarter, lag with up to the power 0.3 of the pressure, gain by up to 10 % for twice the current.
     pub(crate) fn with_other_maps(mut self) -> Self {
-        let [friction, lag, gain] = [0.25, 0.3, 0.1].map(|most| self.draw.between(-most, most));
+        let [friction, lag, gain] = [0.25, 0.3, 0.1].map(|maximum| self.draw.between(-maximum, maximum));
         let (_, [_, pressure_pa, _], [_, current_a, _]) = self.points();
         let clutch = &mut self.car.oncoming.clutch;
         let fine = |table: &Table1<f64>, more: &[f64]| {

@@ -85,8 +85,8 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
         // More is known of the common factor of all torques.
         let place = with.quantities.place(Quantity::ReportedScale).unwrap();
         let anchor = with.quantities.sd_before(place).hypot(with.sd_beside_scale(Quantity::ReportedScale));
-        let most = with_half_of(anchor, without.torque_scale_sd());
-        assert!(with.torque_scale_sd() < most && with.is_converged, "{} {most}", with.torque_scale_sd());
+        let maximum = with_half_of(anchor, without.torque_scale_sd());
+        assert!(with.torque_scale_sd() < maximum && with.is_converged, "{} {maximum}", with.torque_scale_sd());
         assert!(without.report().iter().all(|row| row.name != "mass") && without.unknown(Quantity::Mass) == 0.0);
         let file = with.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
         let factor = with.unknown(Quantity::Mass).exp();

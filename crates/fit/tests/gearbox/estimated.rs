@@ -59,7 +59,8 @@ fn summed(drive: &ScoredDrive) -> Estimated {
         sum.square_of_valves += (clutch.torque_n_m[2] - clutch.torque_n_m[0]).powi(2);
         sum.width_n_m += torque[1] - torque[0];
         sum.width_pa += pressure[1] - pressure[0];
-        let is_outside = |[least, most]: [f64; 2], value: f64, room: f64| value < least - room || value > most + room;
+        let is_outside =
+            |[minimum, maximum]: [f64; 2], value: f64, room: f64| value < minimum - room || value > maximum + room;
         sum.outside[0] += f64::from(u8::from(is_outside(pressure, clutch.pressure_pa[0], 1.0)));
         sum.outside[1] += f64::from(u8::from(is_outside(torque, clutch.torque_n_m[0], DRAG_N_M)));
     }

@@ -98,8 +98,8 @@ fn kiss_points_and_lags_have_what_an_unknown_hysteresis_may_do() {
         for (place, _) in fit.quantities.elements.iter().enumerate() {
             let kiss = Quantity::Kiss(place);
             // The bound of 10 kPa as a uniform distribution, in units of 10 kPa.
-            let least = 3.0_f64.sqrt().recip().min(fit.quantities.sd_before(fit.quantities.place(kiss).unwrap()));
-            assert!(fit.sd(kiss) > 0.999 * least && certain.sd(kiss) < fit.sd(kiss), "{seed} {place}");
+            let minimum = 3.0_f64.sqrt().recip().min(fit.quantities.sd_before(fit.quantities.place(kiss).unwrap()));
+            assert!(fit.sd(kiss) > 0.999 * minimum && certain.sd(kiss) < fit.sd(kiss), "{seed} {place}");
         }
     }
 }

@@ -12,7 +12,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::parser::parse_message_type;
 
-/// Group: period of its clock, s; channels: name, and the size of their least step.
+/// Group: period of its clock, s; channels: name, and the size of their smallest step.
 const GROUPS: [(f64, &[(&str, f64)]); 4] = [
     (0.005, &[("N_Turb", 0.25), ("N_Out", 0.25)]),
     (0.010, &[("I_E", 1.0), ("I_C", 1.0), ("N_Eng", 0.25)]),
@@ -33,7 +33,7 @@ fn times(first_s: f64, period_s: f64) -> Vec<f64> {
     (0..).map(|row| first_s + period_s * f64::from(row)).take_while(|time_s| *time_s < LENGTH_S).collect()
 }
 
-/// Slow waves with the noise of the last digit, in least steps.
+/// Slow waves with the noise of the last digit, in smallest steps.
 fn values(times: &[f64], channel: usize, step: f64) -> Vec<i16> {
     let raw = |(row, time_s): (usize, &f64)| {
         let wave = (0.05 * time_s + channel as f64).sin() + 0.3 * (0.31 * time_s).sin();

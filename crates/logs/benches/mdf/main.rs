@@ -1,8 +1,9 @@
 //! Reading of MDF 4 and of Parquet, beside asammdf and pyarrow and beside the decompression of the blocks alone.
 //!
 //! `cargo bench -p logs --bench mdf -- LOG` reads all channels of a log; without a file, of an hour with nine channels that it writes as
-//! MDF with transposed and deflated blocks, and as Parquet. Every time is the least of several in one process, with the file in the memory
-//! of the system: of the processor on one thread, and by the clock on all processors. A rival is measured where `python3`, or the Python of
+//! MDF with transposed and deflated blocks, and as Parquet. Every time is the minimum of several in one process, with the file in the
+//! memory of the system: of the processor on one thread, and by the clock on all processors. A rival is measured where `python3`, or the
+//! Python of
 //! `WETCLUTCH_PYTHON`, has it; what it decodes must have the same sums. `-- LOG --only columns` (or `arrays`, `merged`) reads once, for a
 //! profiler.
 
@@ -133,12 +134,12 @@ fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// The result of a job and its least time of the processor, s.
+/// The result of a job and its minimum time of the processor, s.
 fn fastest<T>(job: impl FnMut() -> T) -> (T, f64) {
     fastest_by(used_s, job)
 }
 
-/// The result of a job and its least time by a clock, s.
+/// The result of a job and its minimum time by a clock, s.
 fn fastest_by<T>(clock: fn(Instant) -> f64, mut job: impl FnMut() -> T) -> (T, f64) {
     let start = Instant::now();
     let mut timed = || {

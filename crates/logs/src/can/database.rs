@@ -260,7 +260,7 @@ fn in_force(signals: &[Signal], signal: &Signal, data: &[u8], depth: u32) -> boo
         && by
             .bits
             .of(data)
-            .is_some_and(|raw| multiplexed.values.iter().any(|(least, most)| (*least..=*most).contains(&raw)))
+            .is_some_and(|raw| multiplexed.values.iter().any(|(minimum, maximum)| (*minimum..=*maximum).contains(&raw)))
         && in_force(signals, by, data, depth + 1)
 }
 

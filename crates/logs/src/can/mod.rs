@@ -161,14 +161,14 @@ impl<'a> Decoder<'a> {
     }
 
     pub(crate) fn decode(&mut self, frame: &Frame, batch: &mut Vec<Sample>) {
-        const MOST: usize = 4096;
+        const MAXIMUM: usize = 4096;
         self.frames += 1;
         if !self.database.decode(frame, &self.wanted, batch) {
             self.unknown_frames += 1;
             let known = self.unknown.len();
             if let Some(count) = self.unknown.get_mut(&(frame.extended, frame.id)) {
                 *count += 1;
-            } else if known < MOST {
+            } else if known < MAXIMUM {
                 self.unknown.insert((frame.extended, frame.id), 1);
             }
         } else if self.on_two_buses.is_none() {
@@ -189,9 +189,9 @@ impl<'a> Decoder<'a> {
         if self.unknown_frames == 0 {
             return notes;
         }
-        let mut most: Vec<_> = self.unknown.iter().collect();
-        most.sort_by_key(|(id, count)| (std::cmp::Reverse(**count), **id));
-        let ids = most.iter().take(SHOWN).map(|(key, _)| shown(**key));
+        let mut maximum: Vec<_> = self.unknown.iter().collect();
+        maximum.sort_by_key(|(id, count)| (std::cmp::Reverse(**count), **id));
+        let ids = maximum.iter().take(SHOWN).map(|(key, _)| shown(**key));
         notes.push(format!(
             "{} of {} frames, of {} identifiers, are not in the DBC: {}{}",
             self.unknown_frames,

@@ -144,10 +144,10 @@ impl Lines {
 
     /// The number of an interface: in the order in which they come, from zero.
     fn bus(&mut self, interface: &str) -> u32 {
-        const MOST: usize = 256;
+        const MAXIMUM: usize = 256;
         let known = self.interfaces.iter().position(|known| known == interface);
         let at = known.unwrap_or_else(|| {
-            if self.interfaces.len() < MOST {
+            if self.interfaces.len() < MAXIMUM {
                 self.interfaces.push(interface.to_owned());
             }
             self.interfaces.len() - 1

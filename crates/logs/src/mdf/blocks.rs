@@ -14,11 +14,11 @@ use crate::ahead::{Crew, Job};
 use crate::columns::Memory;
 
 /// Deflate makes at most so many bytes of one.
-const MOST_FROM_A_BYTE: u64 = 1032;
+const MAX_FROM_A_BYTE: u64 = 1032;
 /// Bytes that the blocks of a file that are unpacked ahead have at most, with what they are unpacked from.
-const MOST_AHEAD: u64 = 32 << 20;
+const MAX_AHEAD: u64 = 32 << 20;
 /// Memory that is kept for later blocks: so many at most.
-const MOST_SPARE: usize = 8;
+const MAX_SPARE: usize = 8;
 
 /// The blocks of a file.
 pub(super) struct Blocks {
@@ -60,9 +60,9 @@ impl Packed {
 
     /// Bytes that its unpacking takes; an error if they cannot be as it says.
     fn memory(self) -> Result<u64, String> {
-        let most = LARGEST_BLOCK.min(self.packed_bytes.saturating_mul(MOST_FROM_A_BYTE));
-        if self.bytes > most {
-            return Err(format!("it says that it unpacks to {} bytes, expected at most {most}", self.bytes));
+        let maximum = LARGEST_BLOCK.min(self.packed_bytes.saturating_mul(MAX_FROM_A_BYTE));
+        if self.bytes > maximum {
+            return Err(format!("it says that it unpacks to {} bytes, expected at most {maximum}", self.bytes));
         }
         Ok(self.bytes + self.packed_bytes.min(LARGEST_BLOCK))
     }
@@ -72,7 +72,7 @@ impl Ahead {
     /// Lets the crew unpack a block; none if too much is unpacked ahead already, or it cannot be unpacked.
     pub(super) fn order(blocks: &Arc<Blocks>, crew: &Crew, block: Packed) -> Option<Self> {
         let bytes = block.memory().ok()?;
-        let with_it = |ahead: u64| Some(ahead + bytes).filter(|ahead| *ahead <= MOST_AHEAD);
+        let with_it = |ahead: u64| Some(ahead + bytes).filter(|ahead| *ahead <= MAX_AHEAD);
         blocks.ahead.fetch_update(Ordering::Relaxed, Ordering::Relaxed, with_it).ok()?;
         let own = Arc::clone(blocks);
         let unpack = move || {
@@ -144,8 +144,8 @@ impl Blocks {
     /// Keeps memory for another block.
     fn keep(&self, memory: Memory) {
         let mut spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner);
-        if !memory.unpacked.is_empty() && memory.unpacked.len() as u64 <= MOST_AHEAD / MOST_SPARE as u64 {
-            if spare.len() == MOST_SPARE {
+        if !memory.unpacked.is_empty() && memory.unpacked.len() as u64 <= MAX_AHEAD / MAX_SPARE as u64 {
+            if spare.len() == MAX_SPARE {
                 spare.remove(0);
             }
             spare.push(memory);

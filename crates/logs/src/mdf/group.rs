@@ -208,9 +208,9 @@ impl Stream for Group<'_> {
         }
     }
 
-    fn most_records(&self) -> usize {
+    fn max_records(&self) -> usize {
         match &self.decoder {
-            Decoding::Own { parts, .. } => parts.first().map_or(0, |part| part.records.most()),
+            Decoding::Own { parts, .. } => parts.first().map_or(0, |part| part.records.maximum()),
             // What the library unpacks is not known before.
             Decoding::Library(_) => {
                 usize::try_from(self.declared).unwrap_or(usize::MAX).min(ON_TRUST / size_of::<f64>())

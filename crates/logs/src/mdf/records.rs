@@ -167,7 +167,7 @@ impl<'a> Records<'a> {
     }
 
     /// How many records there are at most, as far as the file says it.
-    pub(super) fn most(&self) -> usize {
+    pub(super) fn maximum(&self) -> usize {
         let bytes = self.blocks.iter().fold(0_u64, |bytes, block| bytes.saturating_add(block.original_size));
         usize::try_from(self.count.min(bytes / self.size as u64)).unwrap_or(usize::MAX)
     }

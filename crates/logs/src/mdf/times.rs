@@ -68,10 +68,10 @@ impl Times {
 
 /// Where the group is that a group names for its time. `falcon_mdf` 0.7 does not give it.
 fn remote_master(file: &Mf4File, group: &ChannelGroup) -> Option<u64> {
-    const MOST_LINKS: u64 = 100;
+    const MAX_LINKS: u64 = 100;
     let number = |bytes: &[u8], at: usize| Some(u64::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
     let head = file.read_raw(group.block_offset(), HEAD).ok()?;
-    let links = number(&head, LINK_COUNT).filter(|links| *links <= MOST_LINKS)?;
+    let links = number(&head, LINK_COUNT).filter(|links| *links <= MAX_LINKS)?;
     let flags_at = HEAD + 8 * usize::try_from(links).ok()? + FLAGS;
     let block = file.read_raw(group.block_offset(), flags_at + 2).ok()?;
     let flags = u16::from_le_bytes(*block.get(flags_at..)?.first_chunk()?);

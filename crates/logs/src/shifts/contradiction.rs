@@ -11,7 +11,7 @@ const FITS: f64 = 0.05;
 /// Points of a gear that are needed to judge \[chosen\]; more than half of them have to contradict.
 const ENOUGH: usize = 100;
 /// Points of a gear that are kept.
-const MOST: usize = 20_000;
+const MAXIMUM: usize = 20_000;
 
 /// The ratios that were seen in each gear of the signal.
 #[derive(Debug, Default)]
@@ -53,7 +53,7 @@ impl SeenRatios {
             if self.ratios.len() <= place {
                 self.ratios.resize(place + 1, Vec::new());
             }
-            if self.ratios[place].len() < MOST {
+            if self.ratios[place].len() < MAXIMUM {
                 self.ratios[place].push(ratio);
             }
         }

@@ -189,13 +189,13 @@ pub const LONGEST_S: f64 = COMMAND_S + ratio::LONGEST_S;
 
 /// Whether a car can have this value. A speed in a wrong unit can pass.
 fn is_of_a_car(role: Role, value: f64) -> bool {
-    let most = match role.quantity() {
+    let maximum = match role.quantity() {
         Some(Quantity::Rotation) => 1e5,
         Some(Quantity::Velocity | Quantity::Acceleration) => 1e3,
         Some(Quantity::Torque) => 1e6,
         _ => return true,
     };
-    value.abs() <= most
+    value.abs() <= maximum
 }
 
 /// Finds the shifts of a drive.
@@ -420,10 +420,13 @@ impl ShiftFinder {
 
     /// A forward gear; none for neutral, reverse and what stands for no gear.
     fn gear_number(&self, value: f64) -> Option<u32> {
-        const MOST: f64 = 12.0;
-        let most =
-            if self.ratios.is_empty() { MOST } else { f64::from(u32::try_from(self.ratios.len()).unwrap_or(u32::MAX)) };
-        (value.fract() == 0.0 && (1.0..=most).contains(&value)).then_some(value as u32)
+        const MAXIMUM: f64 = 12.0;
+        let maximum = if self.ratios.is_empty() {
+            MAXIMUM
+        } else {
+            f64::from(u32::try_from(self.ratios.len()).unwrap_or(u32::MAX))
+        };
+        (value.fract() == 0.0 && (1.0..=maximum).contains(&value)).then_some(value as u32)
     }
 
     fn gear_changed(&mut self, change: Change) {

@@ -11,7 +11,7 @@ use crate::Role;
 
 /// The load is that of so long before the shift, s.
 const LOAD_S: f64 = 0.3;
-/// Slip of the converter that tells who drives: fraction of the turbine speed, and least size, rad/s.
+/// Slip of the converter that tells who drives: fraction of the turbine speed, and minimum size, rad/s.
 const SLIP: f64 = 0.02;
 const SLIP_RAD_S: f64 = 3.0;
 /// Engine torque that tells who drives, N m.
@@ -98,7 +98,7 @@ fn flare(shift: &Shift, ratios: &[f64], points: &RatioWatch) -> Option<f64> {
     };
     let ratio = ratios.get(usize::try_from(gear).ok()?.checked_sub(1)?)?;
     let above = points.between(from_s, to_s).map(|point| (point.ratio - ratio) * point.output_rad_s);
-    above.reduce(f64::max).map(|most| most.max(0.0))
+    above.reduce(f64::max).map(|maximum| maximum.max(0.0))
 }
 
 /// The jerk of a shift, by the definition of [`drivetrain::jerk`].

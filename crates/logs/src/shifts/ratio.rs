@@ -26,13 +26,13 @@ const HOLE_S: f64 = 0.3;
 /// Points of which the middle one is taken.
 const MEDIAN: usize = 5;
 
-/// The middle one of ratios, of which each is a number. Least and greatest take no branches, which noise makes hard to predict.
+/// The middle one of ratios, of which each is a number. Minimum and maximum take no branches, which noise makes hard to predict.
 fn middle([a, b, c, d, e]: [f64; MEDIAN]) -> f64 {
-    let least = |a: f64, b: f64| if a < b { a } else { b };
-    let most = |a: f64, b: f64| if a > b { a } else { b };
-    // Of the greatest of two and two, the less, and of the least the greater: neither can be left out. The other two can.
-    let (low, high) = (most(least(a, b), least(c, d)), least(most(a, b), most(c, d)));
-    most(least(low, high), least(e, most(low, high)))
+    let minimum = |a: f64, b: f64| if a < b { a } else { b };
+    let maximum = |a: f64, b: f64| if a > b { a } else { b };
+    // Of the maximum of two and two, the less, and of the minimum the greater: neither can be left out. The other two can.
+    let (low, high) = (maximum(minimum(a, b), minimum(c, d)), minimum(maximum(a, b), maximum(c, d)));
+    maximum(minimum(low, high), minimum(e, maximum(low, high)))
 }
 
 /// Ratio of turbine and output at one time.
@@ -68,7 +68,7 @@ pub(super) struct RatioChange {
 
 /// Watches the ratio.
 pub(super) struct RatioWatch {
-    /// Logarithms of the ratios, and the least and greatest ratio that is in each gear.
+    /// Logarithms of the ratios, and the minimum and maximum ratio that is in each gear.
     gears: Vec<(f64, [f64; 2])>,
     turbine: Track,
     /// Output readings for which the turbine speed is still to come.

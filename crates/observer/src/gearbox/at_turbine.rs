@@ -10,7 +10,7 @@
 
 use drivetrain::Real;
 
-use super::turbine::{Found, LEAST_N_M};
+use super::turbine::{Found, MIN_N_M};
 use super::{GearCommand, GearboxFilter, GearboxState, OUTPUT, ShiftPhase, TURBINE, square};
 
 /// Torque of all clutches together, at the turbine.
@@ -42,7 +42,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let [(turbine_rate, turbine_variance), (output_rate, output_variance)] =
             [self.rate(state, TURBINE)?, self.rate(state, OUTPUT)?];
         let torque_n_m = input.turbine_n_m - m11 * turbine_rate - m12 * output_rate;
-        let variance = square(input.fraction * input.turbine_n_m.abs().at_least(T::of(LEAST_N_M)))
+        let variance = square(input.fraction * input.turbine_n_m.abs().at_least(T::of(MIN_N_M)))
             + input.noise
             + square(m11) * (turbine_variance + square(self.uncertainty.inertia_share * turbine_rate))
             + square(m12) * (output_variance + square(self.uncertainty.inertia_share * output_rate));

@@ -14,8 +14,8 @@ use crate::{ChannelHealth, LOST_S, PressureRange, Reading};
 /// pressure are thousands of this.
 const RESTS_PA: f64 = 1.0;
 
-/// Least factor on the lag of a valve \[chosen\]: the bounds of the standard budget end at half the lag.
-const LAG_LEAST: f64 = 0.1;
+/// Minimum factor on the lag of a valve \[chosen\]: the bounds of the standard budget end at half the lag.
+const LAG_MIN: f64 = 0.1;
 
 /// What is known of the errors of an element's pressure and kiss point, in their standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,7 +154,7 @@ impl<T: Real> ElementState<T> {
     pub(super) fn take_timing(&mut self, element: &FrictionElement<T>, timing: &ValveTiming<T>) {
         let ([lag, delay], u) = (timing.mean, &element.uncertainty);
         self.timing = *timing;
-        self.lag = (T::one() + u.valve_lag_fraction * lag).at_least(T::of(LAG_LEAST));
+        self.lag = (T::one() + u.valve_lag_fraction * lag).at_least(T::of(LAG_MIN));
         self.delay_s = (element.valve.delay_s + u.valve_delay_s * delay).at_least(T::zero());
     }
 
@@ -373,7 +373,7 @@ impl<T: Real> ElementState<T> {
         Some(capacity_min_n_m(&element.clutch, element.budget.as_ref()?, self.range.as_ref()?))
     }
 
-    /// Guaranteed ranges of pressure and torque at the element, with its least and greatest slip if they are known.
+    /// Guaranteed ranges of pressure and torque at the element, with its minimum and maximum slip if they are known.
     pub(super) fn ranges(&self, element: &FrictionElement<T>, slip_rad_s: Option<[T; 2]>) -> Option<([T; 2], [T; 2])> {
         let (range, budget) = (self.range.as_ref()?, element.budget.as_ref()?);
         Some(pressure_and_torque(&element.clutch, budget, range, slip_rad_s))
@@ -400,12 +400,12 @@ fn pressing_of_pistons<T: Real>(
     let unseen = square(moving_pa) * (T::one() - square(part)).at_least(T::zero());
     let variance = wrong.variance_pa([kiss_pa, seen_pa]) + unseen;
     let kissed_pa = clutch.kiss_pressure();
-    let ([mean_pa, slope], most_pa) =
+    let ([mean_pa, slope], max_pa) =
         pistons.pressed(|pressure_pa| positive_part(pressure_pa - kissed_pa + error_pa, variance));
     let per_fill_pa = square(spread.fill_pa) / spread.all_pa;
     let by_fill_pa = per_fill_pa * wrong.pressure;
     Pressing {
-        pressed_pa: (mean_pa + by_fill_pa).at_least(T::zero()).at_most(most_pa),
+        pressed_pa: (mean_pa + by_fill_pa).at_least(T::zero()).at_most(max_pa),
         slope,
         error_pa,
         kiss_pa,

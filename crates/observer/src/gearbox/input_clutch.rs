@@ -10,7 +10,7 @@
 
 use drivetrain::Real;
 
-use super::turbine::{InputSide, LEAST_N_M, TurbineTorque, by_maps};
+use super::turbine::{InputSide, MIN_N_M, TurbineTorque, by_maps};
 use super::{GearboxFilter, GearboxState, OUTPUT, ShiftInput, TURBINE, square};
 
 /// Torque of the clutch between engine and gearbox.
@@ -25,7 +25,7 @@ pub struct InputClutch<T> {
 impl<T: Real> TurbineTorque<T> {
     /// Variance of the reported engine torque, (N m)^2.
     fn reported_variance(&self, reported_n_m: T) -> T {
-        square(self.engine_share * reported_n_m.abs().at_least(T::of(LEAST_N_M)))
+        square(self.engine_share * reported_n_m.abs().at_least(T::of(MIN_N_M)))
     }
 
     /// The lock-up clutch's torque while it is applied; none without engine speed and torque.

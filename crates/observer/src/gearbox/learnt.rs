@@ -70,13 +70,13 @@ pub(super) const STATES_ACTING: usize = 6;
 const LIKELY: f64 = 22.0;
 const GATE: f64 = 46.0;
 /// Refused shifts in a row after which all is forgotten \[chosen\]: the car is another, as after a repair.
-const REFUSED_MOST: u8 = 8;
+const REFUSED_MAX: u8 = 8;
 /// Variance by which each quantity is another in the next shift, in that of the budget \[chosen\]: 9 % of its standard deviation in 30
 /// shifts. What is well known stays open to what comes, also in single precision.
 const PER_SHIFT: f64 = 2.5e-4;
-/// Least variance of the scale of the wheel speed, in that of the budget \[chosen\]: the filter's own changes by a tenth of its standard
+/// Minimum variance of the scale of the wheel speed, in that of the budget \[chosen\]: the filter's own changes by a tenth of its standard
 /// deviation with what the car does, as the timing of the readings shows as a scale.
-const WHEEL_LEAST: f64 = 0.01;
+const WHEEL_MIN: f64 = 0.01;
 /// Bound of a quantity in its standard deviations: the edge of a uniform distribution, and of the sum of two.
 pub(super) const EDGE: f64 = 1.732;
 const EDGE_OF_TWO: f64 = 2.449;
@@ -89,14 +89,14 @@ const COMMON: f64 = 0.33;
 /// Logarithm of the odds of what is learnt against the budget \[chosen\]: at most, and with the other sign what is forgotten;
 /// at most by one shift, which may be a bad one itself. A hundred to one, and ten to one: a car that is the one learnt loses what
 /// is learnt once in ten thousand shifts at most (Wald); another car is found in two shifts of a new drive.
-const ODDS_MOST: f64 = 4.6;
+const ODDS_MAX: f64 = 4.6;
 const ODDS_OF_SHIFT: f64 = 2.3;
 /// The same of the inertia of two pairs of gears \[chosen\]: half of the variance is that of the turbine, of the oil in it and of
 /// the input shaft, which are in all of them. Without it an inertia that is wrong in all pairs alike would be taken for an error
 /// of the stiffness, of which there is one.
 const COMMON_INERTIA: f64 = 0.5;
 /// Variance above which a covariance was not made here, in that of the budget.
-const VARIANCE_MOST: f64 = 2.0;
+const VARIANCE_MAX: f64 = 2.0;
 /// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the
 /// oil, and with the engine its reported torque; inertia, shafts and tyres with nothing but a repair and wear. Torque factor and kiss point have the gain in
 /// common, and fade together: else their correlation could not last.
@@ -242,7 +242,7 @@ impl<T: Real> Learnt<T> {
                 *value = unlearnt(correlations, k, j);
             }
         }
-        Self { mean: [T::zero(); LEARNT], covariance, shifts: 0, refused: 0, odds: T::of(ODDS_MOST), oil_degc: None }
+        Self { mean: [T::zero(); LEARNT], covariance, shifts: 0, refused: 0, odds: T::of(ODDS_MAX), oil_degc: None }
     }
 
     /// Mean and covariance of torque factor and kiss point of an element.
@@ -299,7 +299,7 @@ impl<T: Real> Learnt<T> {
         if mean.is_finite() && variance.is_finite() {
             let edge = T::of(EDGE);
             self.mean[WHEEL_AT] = mean.max(-edge).min(edge);
-            self.covariance[WHEEL_AT][WHEEL_AT] = variance.max(T::of(WHEEL_LEAST)).min(T::one());
+            self.covariance[WHEEL_AT][WHEEL_AT] = variance.max(T::of(WHEEL_MIN)).min(T::one());
         }
     }
 
@@ -401,10 +401,10 @@ impl<T: Real> Learnt<T> {
         if !by_budget.is_possible() {
             return false;
         }
-        let (most, of_shift) = (T::of(ODDS_MOST), T::of(ODDS_OF_SHIFT));
+        let (maximum, of_shift) = (T::of(ODDS_MAX), T::of(ODDS_OF_SHIFT));
         self.odds = self.odds + (by_car.likelihood - by_budget.likelihood).max(-of_shift).min(of_shift);
-        self.odds = self.odds.min(most);
-        if self.odds < -most {
+        self.odds = self.odds.min(maximum);
+        if self.odds < -maximum {
             (*self, by_car) = (Self::nothing(correlations), by_budget);
         }
         if !by_car.is_possible() {
@@ -451,7 +451,7 @@ impl<T: Real> Learnt<T> {
         } else {
             self.refused = self.refused.saturating_add(1);
         }
-        if self.refused >= REFUSED_MOST {
+        if self.refused >= REFUSED_MAX {
             *self = Self::nothing(correlations);
         }
     }
@@ -487,12 +487,12 @@ impl<T: Real> Learnt<T> {
 
     /// Whether all are numbers within their bounds, and the covariance is one.
     fn is_sound(&self) -> bool {
-        let within = |value: T, most: f64| value.abs() <= T::of(most);
+        let within = |value: T, maximum: f64| value.abs() <= T::of(maximum);
         let means = self.mean.iter().enumerate().all(|(k, &mean)| within(mean, edge(k)));
         let symmetric = (0..LEARNT).all(|i| (0..i).all(|j| self.covariance[i][j] == self.covariance[j][i]));
-        let variances = (0..LEARNT).all(|i| within(self.covariance[i][i], VARIANCE_MOST));
+        let variances = (0..LEARNT).all(|i| within(self.covariance[i][i], VARIANCE_MAX));
         let oil = self.oil_degc.is_none_or(is_oil);
-        means && symmetric && variances && oil && within(self.odds, ODDS_MOST) && is_positive(self.covariance)
+        means && symmetric && variances && oil && within(self.odds, ODDS_MAX) && is_positive(self.covariance)
     }
 
     /// What was read from a file, or `None` if it cannot be what a filter has learnt: not numbers, outside the bounds, or no
@@ -523,8 +523,8 @@ fn timing_places(at: usize) -> Option<[usize; 2]> {
 
 /// Whether oil can have this temperature, degC.
 fn is_oil<T: Real>(degc: T) -> bool {
-    let [least, greatest] = OIL_DEGC.map(T::of);
-    least <= degc && degc <= greatest
+    let [minimum, maximum] = OIL_DEGC.map(T::of);
+    minimum <= degc && degc <= maximum
 }
 
 /// Bound of a quantity in its standard deviations.

@@ -107,7 +107,7 @@ const LASTING: [usize; STATES_ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS
 
 /// Longest time that is predicted at once, s; a longer one is cut.
 const PIECE_S: f64 = 0.0125;
-const MOST_PIECES: usize = 32;
+const MAX_PIECES: usize = 32;
 /// Time without a reading of turbine or output speed in a shift after which it teaches nothing, s \[chosen\].
 const GAP_S: f64 = 0.025;
 /// How old the first readings may be, s.
@@ -466,7 +466,7 @@ fn pieces<T: Real>(dt_s: T) -> (usize, T) {
     if dt_s <= T::of(PIECE_S) {
         return (1, dt_s);
     }
-    let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+    let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MAX_PIECES);
     (pieces, dt_s / T::of(pieces as f64))
 }
 

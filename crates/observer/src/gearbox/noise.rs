@@ -16,7 +16,7 @@ use drivetrain::Real;
 use super::{GearboxFilter, GearboxState, OUTPUT, Reading, ShiftInput, TURBINE, square};
 
 /// Differences in the mean at most: it follows a change of the noise within some seconds \[chosen\].
-const MOST: u16 = 400;
+const MAXIMUM: u16 = 400;
 /// Fewest differences from which the noise is taken: two standard deviations are then less than the value itself.
 const FEWEST: u16 = 16;
 /// Largest difference that is noise, in its standard deviations: an outlier counts as this.
@@ -55,15 +55,15 @@ impl<T: Real> ReadingNoise<T> {
     fn take(&mut self, slip: T, gear: usize, variance: T) {
         let before = self.before.replace((slip, gear));
         let Some((before, _)) = before.filter(|&(_, of)| of == gear) else { return };
-        let most = square(T::of(OUTLIER)) * self.mean.at_least(T::one());
+        let maximum = square(T::of(OUTLIER)) * self.mean.at_least(T::one());
         let ratio = square(slip - before) / (T::of(2.0) * variance);
         if !ratio.is_finite() {
             self.before = None;
             return;
         }
-        self.count = MOST.min(self.count + 1);
+        self.count = MAXIMUM.min(self.count + 1);
         let count = T::of(f64::from(self.count));
-        self.mean = self.mean + (ratio.at_most(most) - self.mean) / count;
+        self.mean = self.mean + (ratio.at_most(maximum) - self.mean) / count;
         if self.count >= FEWEST {
             let lower = self.mean * (T::one() - T::of(2.0) * (T::of(3.0) / count).sqrt());
             self.factor = lower.at_least(T::one()).sqrt();

@@ -30,7 +30,7 @@ const AWAY: [[f64; 2]; POINTS] = [
 const PARTS: [f64; 4] = [0.303, 0.633, 1.039, 1.712];
 /// Step of the pistons, s \[chosen\]: about the lag of a filled cylinder with warm oil.
 const STEP_S: f64 = 2.5e-3;
-const MOST_STEPS: usize = 128;
+const MAX_STEPS: usize = 128;
 /// Change of the pressure over a step of the filter below which a piston that is not on its stroke rests, Pa.
 const RESTS_PA: f64 = 1.0;
 
@@ -138,7 +138,7 @@ impl<T: Real> Pistons<T> {
 
     /// Carries the pistons over `dt_s`, in which the pressure of the valve goes from one to another value. Whether they rest then.
     fn advance(&mut self, piston: &Piston<T>, [from_pa, to_pa]: [T; 2], error_pa: T, dt_s: T) -> bool {
-        let steps = (dt_s / T::of(STEP_S)).ceil().whole().clamp(1, MOST_STEPS);
+        let steps = (dt_s / T::of(STEP_S)).ceil().whole().clamp(1, MAX_STEPS);
         let step_s = dt_s / T::of(steps as f64);
         let rise_pa = (to_pa - from_pa) / T::of(steps as f64);
         let mut rest = true;
@@ -181,13 +181,13 @@ impl<T: Real> Pistons<T> {
     /// What presses the plates if they touch: the mean of `pressed`, which gives it and its derivative from the pressure
     /// in the cylinder, and the largest.
     pub(super) fn pressed(&self, pressed: impl Fn(T) -> (T, T)) -> ([T; 2], T) {
-        let (mut sum, mut most) = ([T::zero(); 2], T::zero());
+        let (mut sum, mut maximum) = ([T::zero(); 2], T::zero());
         for point in self.points.iter().filter(|point| point.touches) {
             let (value, slope) = pressed(point.pressure_pa);
             sum = [sum[0] + value, sum[1] + slope];
-            most = most.at_least(value);
+            maximum = maximum.at_least(value);
         }
-        (sum.map(|sum| sum / T::of(POINTS as f64)), most)
+        (sum.map(|sum| sum / T::of(POINTS as f64)), maximum)
     }
 }
 
@@ -276,17 +276,17 @@ mod tests {
 
     /// By how much the fraction of nine pistons differs at most from that of all errors, on one side of any line through both.
     fn largest_error_of_a_fraction(all: &[[f64; 2]]) -> f64 {
-        let mut most = 0.0_f64;
+        let mut maximum = 0.0_f64;
         for degrees in 0..180 {
             let (b, a) = f64::from(degrees).to_radians().sin_cos();
             let below = |of: &[[f64; 2]], line: f64| {
                 of.iter().filter(|[late, more]| a * late + b * more < line).count() as f64 / of.len() as f64
             };
             for line in AWAY.iter().flat_map(|[late, more]| [-1e-9, 1e-9].map(|side| a * late + b * more + side)) {
-                most = most.max((below(&AWAY, line) - below(all, line)).abs());
+                maximum = maximum.max((below(&AWAY, line) - below(all, line)).abs());
             }
         }
-        most
+        maximum
     }
 
     /// Of pistons with other errors of the same standard deviations so many touch as nine can tell.

@@ -8,7 +8,7 @@ use super::{
 use drivetrain::Real;
 
 /// Largest torque over the largest speed that is one of an engine, N m s \[chosen\]: far above all.
-const MOST_TORQUE_S: f64 = 10.0;
+const MAX_TORQUE_S: f64 = 10.0;
 
 impl<T: Real> GearboxFilter<'_, T> {
     /// Lets the valve models go on and takes the commands. The health of each element's command.
@@ -60,7 +60,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             *age_s = *age_s + dt_s;
         }
         // A torque without sense is none.
-        let torque_max = T::of(MOST_TORQUE_S) * self.limits.speed_max_rad_s;
+        let torque_max = T::of(MAX_TORQUE_S) * self.limits.speed_max_rad_s;
         let usable = |reading: &Reading<T>| {
             reading.value.abs() <= torque_max && reading.age_s >= T::zero() && reading.age_s <= lost
         };
@@ -222,13 +222,13 @@ impl<T: Real> GearboxFilter<'_, T> {
 }
 
 impl<T: Real> SpeedReading<T> {
-    /// How old the middle of a reading of this speed is by the lag, for speeds from the least one on, and by how much it may be
+    /// How old the middle of a reading of this speed is by the lag, for speeds from the minimum on, and by how much it may be
     /// older or newer, s. The last tooth has passed up to a pitch ago, and the lag has half a pitch in it; a wheel that now turns
-    /// at half the reading takes two pitches' time for that one. Below the least speed all teeth have taken longer.
-    fn lag_and_late(&self, speed_rad_s: T, least_rad_s: T) -> [T; 2] {
+    /// at half the reading takes two pitches' time for that one. Below the minimum speed all teeth have taken longer.
+    fn lag_and_late(&self, speed_rad_s: T, min_rad_s: T) -> [T; 2] {
         let zero = T::zero();
         let spent = |angle_rad: T, speed: T| if angle_rad > zero { angle_rad / speed } else { zero };
-        let lag_s = spent(self.lag_rad, speed_rad_s.max(least_rad_s));
+        let lag_s = spent(self.lag_rad, speed_rad_s.max(min_rad_s));
         let longer_s = spent(self.lag_rad, speed_rad_s) - lag_s;
         [lag_s, longer_s + spent(T::of(1.5) * self.pitch_rad, speed_rad_s)]
     }

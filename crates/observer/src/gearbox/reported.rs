@@ -14,13 +14,13 @@
 
 use drivetrain::Real;
 
-use super::turbine::{InputSide, LEAST_N_M, TurbineTorque};
+use super::turbine::{InputSide, MIN_N_M, TurbineTorque};
 use super::{GearboxFilter, Learnt, Running, square};
 
 /// Torques that are compared, in the torque below which an error is no fraction of it: 20 N m; and speed ratios up to which the pump's
 /// torque is well known \[chosen\].
 const FROM: f64 = 2.0;
-const MOST_SPEED_RATIO: f64 = 0.9;
+const MAX_SPEED_RATIO: f64 = 0.9;
 /// Time that a comparison needs, s: a reported torque may be late by tenths of it. After the other one what is older counts half: the
 /// speeds at which a car drives are others by then, and so are the errors of the maps \[chosen\].
 const ENOUGH_S: f64 = 1.0;
@@ -76,9 +76,9 @@ impl<T: Real> TurbineTorque<T> {
         let converter = self.converter.as_ref().filter(|_| !side.lock_up_applied)?;
         let ([engine, ..], reported, turbine) = (side.engine?, side.reported_n_m?, side.turbine[0]);
         let pump = converter.torques(engine, turbine).pump_n_m;
-        let least = T::of(FROM * LEAST_N_M);
-        let is_known = turbine <= T::of(MOST_SPEED_RATIO) * engine;
-        (is_known && pump >= least && reported >= least).then_some([engine, reported, pump])
+        let minimum = T::of(FROM * MIN_N_M);
+        let is_known = turbine <= T::of(MAX_SPEED_RATIO) * engine;
+        (is_known && pump >= minimum && reported >= minimum).then_some([engine, reported, pump])
     }
 }
 

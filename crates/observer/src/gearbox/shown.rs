@@ -18,7 +18,7 @@ use super::powertrain::dot;
 /// A matrix of the acting quantities.
 pub(super) type Matrix<T> = [[T; ACTING]; ACTING];
 
-/// Part of a variance above which nothing was seen in this direction, and the least that is left of one \[chosen\]: far from
+/// Part of a variance above which nothing was seen in this direction, and the minimum that is left of one \[chosen\]: far from
 /// all that a shift shows, near to what single precision resolves.
 const LEFT: (f64, f64) = (1e-4, 0.99);
 /// Sweeps of rotations by which the directions are found: they converge quadratically.

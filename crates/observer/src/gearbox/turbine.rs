@@ -14,7 +14,7 @@ use drivetrain::{Converter, Real};
 use super::square;
 
 /// The torque below which an error is no longer a fraction of it, N m.
-pub(super) const LEAST_N_M: f64 = 10.0;
+pub(super) const MIN_N_M: f64 = 10.0;
 
 /// What is known of the torque at the gearbox input.
 #[derive(Debug, Clone, Copy, PartialEq)]

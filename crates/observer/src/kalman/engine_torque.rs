@@ -50,8 +50,8 @@ impl<T: Real> KalmanFilter<T> {
                 if last.since_s > lost { ChannelHealth::Lost } else { ChannelHealth::Absent }
             });
         };
-        let most = T::of(IMPOSSIBLE) * self.engine.1.acceleration_max_rad_s2 * self.reported.engine_kg_m2;
-        if !(reading.value.abs() <= most && reading.age_s >= zero && reading.age_s <= lost) {
+        let maximum = T::of(IMPOSSIBLE) * self.engine.1.acceleration_max_rad_s2 * self.reported.engine_kg_m2;
+        if !(reading.value.abs() <= maximum && reading.age_s >= zero && reading.age_s <= lost) {
             return ChannelHealth::Refused;
         }
         let new = LastTorque { torque_n_m: reading.value, since_s: zero, rate_n_m_s: zero };

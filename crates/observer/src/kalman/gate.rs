@@ -43,8 +43,8 @@ impl Gate {
     /// Judges an innovation with this variance, by the chi-square distribution of its square over its variance.
     #[inline]
     pub(crate) fn judge<T: Real>(&mut self, innovation: T, variance: T) -> Verdict {
-        let most = T::of(f64::from(self.std_devs));
-        let (square, limit) = (innovation * innovation, most * most * variance);
+        let maximum = T::of(f64::from(self.std_devs));
+        let (square, limit) = (innovation * innovation, maximum * maximum * variance);
         let (far, near) = (square > limit, square <= T::of(0.25) * limit);
         let believed = self.believed > 0;
         self.believed = if near && self.ended_by_agreement { 0 } else { self.believed.saturating_sub(1) };

@@ -94,13 +94,13 @@ impl<T: Real> KalmanFilter<T> {
         let by_valve = hypot(u.valve_gain * pressure_pa, u.valve_fraction * (pressure_pa - offgoing.settled_pa));
         let per_pa = clutch.static_friction * clutch.lever() * clutch.piston_area_m2;
         let std_dev = hypot(u.friction * capacity, per_pa * by_valve) + self.offgoing.open_n_m;
-        let most = capacity + std_dev;
-        if torque.abs() <= most {
+        let maximum = capacity + std_dev;
+        if torque.abs() <= maximum {
             return;
         }
         let mut measured = running.covariance.with_state::<OFFGOING>(T::one());
         measured.variance = measured.with[OFFGOING].at_least(T::zero()) + std_dev * std_dev;
-        let beyond = if torque > T::zero() { most - torque } else { -most - torque };
+        let beyond = if torque > T::zero() { maximum - torque } else { -maximum - torque };
         running.correct(&measured, beyond, &[T::one(); CONSIDERED], SPEEDS);
     }
 }

@@ -50,14 +50,14 @@ pub struct Uncertainty<T> {
     pub load_in_gear_n_m: T,
     /// Of the scale of the wheel speed.
     pub wheel_scale: T,
-    /// Least and greatest delay of the wheel speed against the earlier one of turbine and output, s.
+    /// Minimum and maximum delay of the wheel speed against the earlier one of turbine and output, s.
     pub wheel_delay_s: [T; 2],
     /// Largest delay of output and turbine against each other, s.
     pub skew_s: T,
     /// How well a scale can be known at best: the standard deviation stays above it.
-    pub scale_least: T,
+    pub scale_min: T,
     /// The same of a delay, s.
-    pub delay_least_s: T,
+    pub delay_min_s: T,
     /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
     pub output_least_rad_s: T,
 }
@@ -96,8 +96,8 @@ impl<T: Real> Uncertainty<T> {
             wheel_scale: to(self.wheel_scale),
             wheel_delay_s: self.wheel_delay_s.map(to),
             skew_s: to(self.skew_s),
-            scale_least: to(self.scale_least),
-            delay_least_s: to(self.delay_least_s),
+            scale_min: to(self.scale_min),
+            delay_min_s: to(self.delay_min_s),
             output_least_rad_s: to(self.output_least_rad_s),
         }
     }

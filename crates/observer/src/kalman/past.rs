@@ -9,8 +9,8 @@ pub(super) const SPEEDS: usize = 3;
 /// Time after which the speeds are remembered again, s: no multiple of a usual sample time, so that rounding does not decide.
 /// Most readings are less than twice that old.
 const EVERY_S: f64 = 0.0087;
-/// Least time over which an acceleration is taken, s.
-const LEAST_SPAN_S: f64 = 0.0047;
+/// Minimum time over which an acceleration is taken, s.
+const MIN_SPAN_S: f64 = 0.0047;
 
 /// The speeds at two earlier times. The covariance has those of the newer one; those of the older one err alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,7 +113,7 @@ impl<T: Real> Past<T> {
         let fraction = if self.age_s > zero { age_s / self.age_s } else { zero };
         let reached = match kept {
             false => zero,
-            true if self.age_s < T::of(LEAST_SPAN_S) => fraction.at_most(one),
+            true if self.age_s < T::of(MIN_SPAN_S) => fraction.at_most(one),
             true => fraction,
         };
         OnLine { fractions: [one - reached, reached], beyond: fraction - reached }
@@ -122,12 +122,12 @@ impl<T: Real> Past<T> {
     /// Accelerations of the speed `k`, rad/s^2: now, and over the time before.
     #[inline]
     pub(super) fn accelerations(&self, k: usize, now: T) -> [T; 2] {
-        let least_s = T::of(LEAST_SPAN_S);
+        let min_s = T::of(MIN_SPAN_S);
         let (mut change, mut span_s) = (now - self.speeds[k], self.age_s);
-        if span_s < least_s {
+        if span_s < min_s {
             (change, span_s) = (change + self.changes[k], span_s + self.span_s);
         }
-        [change / span_s.at_least(least_s), self.changes[k] / self.span_s.at_least(least_s)]
+        [change / span_s.at_least(min_s), self.changes[k] / self.span_s.at_least(min_s)]
     }
 }
 

@@ -79,15 +79,15 @@ impl<T: Real> KalmanFilter<T> {
     #[inline]
     fn acting_phase(&self, running: &mut Running<T>, phase: Phase, slip: T, dt_s: T) -> Phase {
         let forward = running.direction * slip;
-        let least = self.supervisor.lock_slip_rad_s;
-        running.turned_s = if forward < -least { running.turned_s + dt_s } else { T::zero() };
+        let minimum = self.supervisor.lock_slip_rad_s;
+        running.turned_s = if forward < -minimum { running.turned_s + dt_s } else { T::zero() };
         if self.supervisor.is_held_longer(running.turned_s, T::zero())
-            || phase == Phase::BeforeShift && forward < -least
+            || phase == Phase::BeforeShift && forward < -minimum
         {
             running.direction = -running.direction;
             running.turned_s = T::zero();
         }
-        let slips = running.direction * slip > least;
+        let slips = running.direction * slip > minimum;
         if phase == Phase::InertiaPhase && !slips { Phase::AfterShift } else { phase }
     }
 }

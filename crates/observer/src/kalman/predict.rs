@@ -114,8 +114,9 @@ impl<T: Real> KalmanFilter<T> {
         std_devs[GAIN] = u.valve_gain;
         std_devs[SCALE] = u.wheel_scale;
         // A uniform distribution between its limits, about zero.
-        let [least, most] = u.wheel_delay_s;
-        std_devs[DELAY] = ((most * most * most - least * least * least) / (T::of(3.0) * (most - least))).sqrt();
+        let [minimum, maximum] = u.wheel_delay_s;
+        std_devs[DELAY] =
+            ((maximum * maximum * maximum - minimum * minimum * minimum) / (T::of(3.0) * (maximum - minimum))).sqrt();
         std_devs[SKEW] = u.skew_s / T::of(3.0).sqrt();
         let mut covariance = Covariance::of(std_devs);
         // An error of the turbine torque is one of the shaft torque in balance with it.

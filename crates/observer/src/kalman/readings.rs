@@ -126,31 +126,31 @@ impl<T: Real> KalmanFilter<T> {
         }
         // What is known as well as it can be is corrected slowly: the errors of many readings are alike, and the model would
         // claim more than is true.
-        for (state, least) in self.known_at_best() {
-            if running.covariance.at(state, state) <= least * least {
+        for (state, minimum) in self.known_at_best() {
+            if running.covariance.at(state, state) <= minimum * minimum {
                 fractions[state - FRACTION] = (since_s / T::of(SLOWLY_S)).at_most(T::one());
             }
         }
         running.correct(measured, innovation, &fractions, next);
     }
 
-    /// How well scale and delays can be known at best: their least standard deviations.
+    /// How well scale and delays can be known at best: their minimum standard deviations.
     #[inline]
     fn known_at_best(&self) -> [(usize, T); 3] {
         let u = &self.uncertainty;
-        [(SCALE, u.scale_least), (DELAY, u.delay_least_s), (SKEW, u.delay_least_s)]
+        [(SCALE, u.scale_min), (DELAY, u.delay_min_s), (SKEW, u.delay_min_s)]
     }
 
-    /// Keeps delays within their budget, and what is known of them and of the scale above the least.
+    /// Keeps delays within their budget, and what is known of them and of the scale above the minimum.
     #[inline]
     pub(super) fn limit_learnt(&self, running: &mut Running<T>) {
-        for (state, least) in self.known_at_best() {
-            running.covariance.hold_above(state, least * least);
+        for (state, minimum) in self.known_at_best() {
+            running.covariance.hold_above(state, minimum * minimum);
         }
         let u = &self.uncertainty;
-        let [least, most] = u.wheel_delay_s;
+        let [minimum, maximum] = u.wheel_delay_s;
         let x = &mut running.mean;
-        x[DELAY] = x[DELAY].at_least(least).at_most(most);
+        x[DELAY] = x[DELAY].at_least(minimum).at_most(maximum);
         x[SKEW] = x[SKEW].at_least(-u.skew_s).at_most(u.skew_s);
     }
 }

@@ -53,12 +53,12 @@ struct Outcome {
 }
 
 fn outcome<T: Real>(budget: &Budget<f64>, rows: &[Row], truth_pa: &[f64]) -> Outcome {
-    let (budget, most) = (budget.cast::<T>(), T::of(COMMAND_MAX_A));
-    let mut range = PressureRange::unknown(&budget, most);
+    let (budget, maximum) = (budget.cast::<T>(), T::of(COMMAND_MAX_A));
+    let mut range = PressureRange::unknown(&budget, maximum);
     let mut outcome = Outcome::default();
     for row in rows {
         let command = row.command_a.map(|command| Reading { value: T::of(command), age_s: T::of(row.age_s) });
-        range.step(&budget, T::of(row.dt_s), command, most);
+        range.step(&budget, T::of(row.dt_s), command, maximum);
         let Some(step) = row.step else { continue };
         let [low, high] = range.pressure_pa(&budget).map(Real::to_f64_exact);
         let beyond = (low - truth_pa[step]).max(truth_pa[step] - high);
@@ -113,11 +113,11 @@ fn mixed(seed: u64) -> f64 {
     [1.0, 0.3, 0.1][(seed % 3) as usize]
 }
 
-fn assert_holds<P: Cylinder>(sampling: Sampling, most_width_pa: f64) {
+fn assert_holds<P: Cylinder>(sampling: Sampling, max_width_pa: f64) {
     for (broken, sum) in runs::<P>(0..500, mixed, sampling, |_| ()) {
         let mean_width = sum.width_pa / sum.samples as f64;
         assert_eq!((broken, sum.outside), (0, 0), "{sum:?}");
-        assert!(sum.samples > 30_000 && mean_width < most_width_pa, "{sum:?}, mean width {mean_width}");
+        assert!(sum.samples > 30_000 && mean_width < max_width_pa, "{sum:?}, mean width {mean_width}");
     }
 }
 

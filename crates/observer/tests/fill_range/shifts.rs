@@ -140,7 +140,7 @@ fn sent(random: &mut Random, car: &Car, start: Start, tick: usize) -> Vec<f64> {
         sent_a.extend(std::iter::repeat_n(command, tick));
     };
     while sent_a.len() < STEPS {
-        let ticks = |random: &mut Random, most_s: f64| random.count(1, (most_s / (tick as f64 * STEP_S)) as usize);
+        let ticks = |random: &mut Random, max_s: f64| random.count(1, (max_s / (tick as f64 * STEP_S)) as usize);
         match random.count(0, 5) {
             0 => {
                 pressure_pa = 0.06e6 + random.within([0.05e6, 0.25e6]);

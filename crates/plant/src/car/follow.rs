@@ -13,7 +13,7 @@ const AHEAD_S: f64 = 0.6;
 const PER_S: f64 = 1.0;
 const PER_S2: f64 = 0.15;
 /// Most that the integral adds, m/s^2.
-const INTEGRAL_MOST_M_S2: f64 = 0.6;
+const INTEGRAL_MAX_M_S2: f64 = 0.6;
 /// How fast pedals move, 1/s \[chosen\].
 const PEDAL_PER_S: f64 = 3.0;
 /// Speed below which a car that is to stand is held, m/s, and the brake that holds it.
@@ -84,8 +84,8 @@ impl<'d> Follower<'d> {
             self.integral_m = 0.0;
             (0.0, if state.vehicle_m_s < 5.0 * STANDING_M_S { HOLDING_BRAKE } else { self.brake })
         } else {
-            let most = INTEGRAL_MOST_M_S2 / PER_S2;
-            self.integral_m = (self.integral_m + error * period_s).clamp(-most, most);
+            let maximum = INTEGRAL_MAX_M_S2 / PER_S2;
+            self.integral_m = (self.integral_m + error * period_s).clamp(-maximum, maximum);
             let m_s2 = (ahead - wanted) / AHEAD_S + PER_S * error + PER_S2 * self.integral_m;
             pedals(model, state, gear, m_s2, grade_rad)
         };

@@ -21,7 +21,7 @@ const PER_PA: f64 = 1e-5;
 /// Times closer than this are the same, s.
 const SAME_INSTANT_S: f64 = 1e-12;
 /// Changes of contact at one instant before the car is declared inconsistent.
-const MOST_CHANGES: usize = 32;
+const MAX_CHANGES: usize = 32;
 
 /// Why a car could not be simulated on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -199,7 +199,7 @@ impl CarIntegrator {
             // Repeat the step up to the event, so that its state has the accuracy of a step and not of the interpolant.
             let to_event = self.trial::<N, F, P, ROWS>(model, &acting, &rates, theta * step_s);
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
-            if changes > MOST_CHANGES {
+            if changes > MAX_CHANGES {
                 return Err(CarError::Chatter { time_s: self.time_s });
             }
             self.take::<N, F, P>(&to_event, theta * step_s, inputs, record);

@@ -11,11 +11,11 @@ const SPEEDS_RAD_S: (f64, f64) = (20.0, 700.0);
 pub(super) const IDLE_RAD_S: f64 = 85.0;
 /// Throttle of the idle control per speed below idle, s/rad, and the most that the idle control gives.
 const IDLE_GAIN: f64 = 0.02;
-const IDLE_MOST: f64 = 0.3;
+const IDLE_MAX: f64 = 0.3;
 
 /// Throttle that the idle control gives at least, 0 to 1.
 pub fn idle_throttle(engine_rad_s: f64) -> f64 {
-    (IDLE_GAIN * (IDLE_RAD_S - engine_rad_s)).clamp(0.0, IDLE_MOST)
+    (IDLE_GAIN * (IDLE_RAD_S - engine_rad_s)).clamp(0.0, IDLE_MAX)
 }
 
 /// Steps of the search from above.

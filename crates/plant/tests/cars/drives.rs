@@ -85,19 +85,19 @@ fn a_dual_clutch_launches_shifts_up_comes_to_rest_and_launches_again() {
                 [[segment]]\nduration_s = 1\nthrottle = [0.4, 0.0]\n\
                 [[segment]]\nduration_s = 19\nthrottle = 0.0\nbrake = [0.0, 0.3]\n";
     let driven = samples(&car, &drive(text)).unwrap();
-    let least = driven.iter().map(|sample| sample.torques.engine_rad_s).fold(f64::INFINITY, f64::min);
+    let minimum = driven.iter().map(|sample| sample.torques.engine_rad_s).fold(f64::INFINITY, f64::min);
     let jerk = driven.windows(2).map(|pair| (pair[1].vehicle_m_s2 - pair[0].vehicle_m_s2).abs() / 0.01);
     let jerk = jerk
         .zip(&driven)
         .map(|(jerk, sample)| (jerk, sample.time_s, sample.gear))
         .fold((0.0, 0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
     let at = |time_s: f64| driven.iter().find(|sample| sample.time_s >= time_s).unwrap();
-    println!("dual clutch: slowest engine {least:.0} rad/s, change of acceleration in 10 ms {jerk:.1?} m/s^3");
+    println!("dual clutch: slowest engine {minimum:.0} rad/s, change of acceleration in 10 ms {jerk:.1?} m/s^3");
     assert!(at(0.9).vehicle_m_s.abs() < 0.05 && at(46.9).vehicle_m_s.abs() < 0.05);
     assert!(at(26.9).gear > 3 && at(26.9).vehicle_m_s > 12.0 && at(73.9).gear > 3, "{}", at(26.9).vehicle_m_s);
     // In the first second of a launch the clutch slips, and the engine turns faster than idle.
     assert!(at(3.0).slips_rad_s[0] > 20.0 && at(3.0).torques.engine_rad_s > 90.0);
-    assert!(least > 60.0 && jerk.0 < 70.0);
+    assert!(minimum > 60.0 && jerk.0 < 70.0);
 }
 
 /// A launch clutch whose piston has a stroke is filled before it takes torque: the car moves as soon as without a stroke, but for

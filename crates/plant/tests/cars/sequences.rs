@@ -7,9 +7,9 @@ use super::{HeldGear, cars, neighbours, runs, with_stroke};
 
 /// Time of the request, s.
 const REQUEST_S: f64 = 1.0;
-/// Speed of the gearbox input in the lower gear of [`CarShift::usual`], and the least in the higher one, rad/s.
+/// Speed of the gearbox input in the lower gear of [`CarShift::usual`], and the minimum in the higher one, rad/s.
 const INPUT_RAD_S: f64 = 230.0;
-const LEAST_INPUT_RAD_S: f64 = 120.0;
+const MIN_INPUT_RAD_S: f64 = 120.0;
 /// Time in which the driver moves the pedal, s.
 const PEDAL_S: f64 = 0.15;
 
@@ -128,7 +128,7 @@ fn skip_shifts_run_through_gears_between_and_end_well() {
                 let ratio = |gear: usize| model.car.gearbox.gears[gear].ratio;
                 let slowest_rad_s = INPUT_RAD_S * ratio(pair.0).min(ratio(pair.1)) / ratio(pair.0).max(ratio(pair.1));
                 if model.car.converter.is_none() {
-                    shift.vehicle_m_s *= (LEAST_INPUT_RAD_S / slowest_rad_s).max(1.0);
+                    shift.vehicle_m_s *= (MIN_INPUT_RAD_S / slowest_rad_s).max(1.0);
                 }
                 let run = run(&model, &shift, |_| pair.1, |_| throttle);
                 worst.push(&label(&model.car, pair, &format!("throttle {throttle}")), &run);

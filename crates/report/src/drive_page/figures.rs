@@ -6,7 +6,7 @@ use study::gearbox::drive::{DriveState, ScoredDrive, ScoredShift};
 use study::gearbox::{ClutchRow, ShiftScoreRow, TruePhase};
 use trace::units::{km_h, mpa, rpm};
 
-use super::{MOST_DRAWN, clutch_names, name};
+use super::{MAX_DRAWN, clutch_names, name};
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
 use crate::log_page::{ESTIMATE, health_panel};
 use crate::motion::motion_panels;
@@ -22,9 +22,9 @@ const POINTS: usize = 3000;
 const STEP: f64 = 900.0;
 /// Shortest time axis, s.
 const SHORTEST_S: f64 = 0.1;
-/// Room above the pressures of a clutch that slips, and least height of their axis, MPa.
+/// Room above the pressures of a clutch that slips, and minimum height of their axis, MPa.
 const PRESSURE_ROOM: f64 = 1.5;
-const LEAST_MPA: f64 = 0.2;
+const MIN_MPA: f64 = 0.2;
 const OPEN_LOOP: Stroke = Stroke { colour: "#767676", weight: Weight::Rival, dash: Some("6 3") };
 
 /// The gear as a number for an axis: its name where that is a number, else its place among the forward gears.
@@ -94,7 +94,7 @@ pub(super) fn overview_figure(drive: &ScoredDrive, car: &Car) -> (Figure, Vec<St
     let figure = Figure {
         x_label: "time (s)",
         x_range: (first_s, last_s.max(first_s + SHORTEST_S)),
-        spans: spans.take(MOST_DRAWN).collect(),
+        spans: spans.take(MAX_DRAWN).collect(),
         panels: panels.into_iter().chain(health_panel(&healths)).collect(),
     };
     (figure, missing)
@@ -204,9 +204,9 @@ fn torque_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
 /// speeds show nothing.
 fn pressure_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
     let slipping = rows.iter().map(|row| &row.clutches[c]).filter(|clutch| !clutch.sticks);
-    let most = slipping.flat_map(|clutch| clutch.pressure_pa).map(mpa).fold(LEAST_MPA, f64::max);
+    let maximum = slipping.flat_map(|clutch| clutch.pressure_pa).map(mpa).fold(MIN_MPA, f64::max);
     let of = |clutch: &ClutchRow| (clutch.pressure_pa.map(mpa), clutch.pressure_range_pa.map(|range| range.map(mpa)));
-    let axis = Axis::Within(0.0, PRESSURE_ROOM * most);
+    let axis = Axis::Within(0.0, PRESSURE_ROOM * maximum);
     clutch_panel(rows, c, (format!("pressure of {clutch} (MPa)"), 110.0, axis), of)
 }
 

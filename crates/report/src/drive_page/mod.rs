@@ -24,7 +24,7 @@ use shifts::filled_columns;
 pub use shifts::{shift_cells, shift_rows, shift_words};
 
 /// Shifts that are drawn; of a drive with more, the worst, or those worth a look.
-pub const MOST_DRAWN: usize = 400;
+pub const MAX_DRAWN: usize = 400;
 /// Worst shifts that are named.
 const WORST: usize = 5;
 
@@ -52,7 +52,7 @@ impl DrivePage<'_> {
         let worst = worst_first(&drive.shifts);
         let mut drawn: Vec<&ScoredShift> = drive.shifts.iter().filter(|shift| shift.is_drawn).collect();
         drawn.sort_by(|a, b| by_need(a, b));
-        let figures = within_room(drawn.iter().take(MOST_DRAWN).map(|shift| shift_figure(shift, drive, car)));
+        let figures = within_room(drawn.iter().take(MAX_DRAWN).map(|shift| shift_figure(shift, drive, car)));
         let mut figures: Vec<(&ScoredShift, Value)> = drawn.iter().copied().zip(figures).collect();
         drawn.truncate(figures.len());
         figures.sort_by_key(|(shift, _)| shift.number);
@@ -98,7 +98,7 @@ impl DrivePage<'_> {
                 opened => first,
                 worst => named.collect::<Vec<_>>(),
                 undrawn => drive.shifts.len() - drawn.len(),
-                chosen => drive.shifts.len() > MOST_DRAWN,
+                chosen => drive.shifts.len() > MAX_DRAWN,
                 by_each => BY_EACH,
                 draw => self.draw.map(|(draw, _)| draw_rows(draw, car)),
                 converter => self.draw.filter(|_| car.converter.is_some()).map(|(draw, _)| number(draw.converter, 3)),
@@ -191,8 +191,8 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
         let none = "The drive has no shift.".to_owned();
         return drive.warnings.iter().cloned().chain([none]).collect();
     }
-    let most = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
-    let longest = number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2);
+    let maximum = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
+    let longest = number(maximum(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2);
     let completed = shifts.iter().filter(|shift| shift.quality.complete_s.is_some()).count();
     let sum = |of: fn(&ScoredShift) -> u64| shifts.iter().map(of).sum::<u64>();
     let [all, inside] = [sum(|shift| 2 * shift.summary.clutches()[0]), sum(|shift| 2 * shift.summary.clutches()[1])];
@@ -203,8 +203,8 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     if shifts.iter().any(|shift| !shift.is_garage) {
         sentences.push(format!(
             "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s.",
-            number(most(|shift| shift.quality.flare_rad_s), 1),
-            number(most(|shift| shift.quality.past_synchronous_rad_s), 1),
+            number(maximum(|shift| shift.quality.flare_rad_s), 1),
+            number(maximum(|shift| shift.quality.past_synchronous_rad_s), 1),
         ));
     }
     sentences.extend([format!(

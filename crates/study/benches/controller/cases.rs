@@ -132,7 +132,7 @@ impl Case {
                 let pressures = steps.iter().map(|step| f32::from_bits(step[1]));
                 let differences = pressures.zip(&self.expected_pa).map(|(there, here)| (there - here).abs());
                 // A number that is none is no small difference.
-                difference_pa = differences.fold(0.0, |most, x| if x <= most { most } else { x });
+                difference_pa = differences.fold(0.0, |maximum, x| if x <= maximum { maximum } else { x });
             }
         }
         Some(Run { check_loop: pair("loop")?, bytes: pair("bytes")?, parts, difference_pa })

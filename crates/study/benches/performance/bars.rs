@@ -17,17 +17,17 @@ const STEP: f64 = 24.0;
 const TOP: f64 = 46.0;
 
 /// The longest value of an axis and the distance of its marks: 1, 2 or 5 times a power of ten, four to ten of them.
-fn axis(most: f64) -> (f64, f64) {
-    let power = 10_f64.powf((most / 4.0).log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|factor| factor * power).find(|step| most / step <= 8.0);
+fn axis(maximum: f64) -> (f64, f64) {
+    let power = 10_f64.powf((maximum / 4.0).log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|factor| factor * power).find(|step| maximum / step <= 8.0);
     let step = step.unwrap_or(power);
-    (step * (most / step).ceil(), step)
+    (step * (maximum / step).ceil(), step)
 }
 
 /// The bars over an axis with this title; `parts` are the names of their parts, if there are several.
 pub(crate) fn svg(title: &str, parts: &[&str], bars: &[Bar]) -> String {
     let longest = bars.iter().map(|bar| bar.parts.iter().sum::<f64>()).fold(0.0, f64::max);
-    let (most, step) = axis(longest);
+    let (maximum, step) = axis(longest);
     let bottom = TOP + STEP * bars.len() as f64;
     let (width, height) = (LABELS + WIDTH + 80.0, bottom + 54.0);
     let mut svg = format!(
@@ -36,8 +36,8 @@ pub(crate) fn svg(title: &str, parts: &[&str], bars: &[Bar]) -> String {
     );
     legend(&mut svg, parts);
     let mut mark = 0.0;
-    while mark <= most * (1.0 + 1e-9) {
-        let x = LABELS + WIDTH * mark / most;
+    while mark <= maximum * (1.0 + 1e-9) {
+        let x = LABELS + WIDTH * mark / maximum;
         let _ = writeln!(
             svg,
             "<line x1=\"{x:.1}\" y1=\"{TOP}\" x2=\"{x:.1}\" y2=\"{bottom}\" stroke=\"#dddddd\"/>\
@@ -58,7 +58,7 @@ pub(crate) fn svg(title: &str, parts: &[&str], bars: &[Bar]) -> String {
         );
         let mut x = LABELS;
         for (&part, colour) in bar.parts.iter().zip(COLOURS) {
-            let length = WIDTH * part.max(0.0) / most;
+            let length = WIDTH * part.max(0.0) / maximum;
             let _ = writeln!(
                 svg,
                 "<rect x=\"{x:.1}\" y=\"{}\" width=\"{length:.1}\" height=\"16\" fill=\"{colour}\"/>",

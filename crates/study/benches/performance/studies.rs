@@ -74,11 +74,11 @@ fn speed_up(campaign: &Campaign) -> String {
     let most = THREADS as f64;
     // Two threads cannot be more than twice as fast: what is beyond is noise.
     let beyond = ratios.iter().filter(|ratio| **ratio > most).count();
-    let [least, median, greatest] = [ratios[0], ratios[PAIRS / 2], ratios[PAIRS - 1]].map(|ratio| ratio.min(most));
+    let [minimum, median, maximum] = [ratios[0], ratios[PAIRS / 2], ratios[PAIRS - 1]].map(|ratio| ratio.min(most));
     let noise = if beyond > 0 { format!("; {beyond} of them above {most}, which is noise") } else { String::new() };
     format!(
-        "\nTwo threads are {median:.2} times as fast as one: the median of {PAIRS} ratios measured in turns, from {least:.2} to \
-         {greatest:.2}{noise}\n({} runs; aim 1.8).\n",
+        "\nTwo threads are {median:.2} times as fast as one: the median of {PAIRS} ratios measured in turns, from {minimum:.2} to \
+         {maximum:.2}{noise}\n({} runs; aim 1.8).\n",
         campaign.study.runs,
     )
 }

@@ -144,7 +144,7 @@ pub struct Relative {
     pub median: f64,
     /// Its 95 % quantile.
     pub high: f64,
-    /// The largest.
+    /// The maximum.
     pub largest: f64,
     /// 95 % quantile of the errors over the 95 % quantile of the open loop's.
     pub high_over_high: f64,

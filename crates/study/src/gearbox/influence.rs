@@ -67,7 +67,7 @@ impl Value {
         }
     }
 
-    /// Least and greatest factor on the value of an element, by its place in the gearbox. Those of a car do not depend on it.
+    /// Minimum and maximum factor on the value of an element, by its place in the gearbox. Those of a car do not depend on it.
     fn limits(&self, car: &Car, element: usize) -> [f64; 2] {
         match self.off {
             Off::Fraction(fraction) => around(fraction),
@@ -76,14 +76,14 @@ impl Value {
         }
     }
 
-    /// Least and greatest factor of all elements.
+    /// Minimum and maximum factor of all elements.
     fn widest_limits(&self, car: &Car) -> [f64; 2] {
         let elements = (0..car.clutches.len()).filter(|&element| car.clutches[element].is_some());
-        let widest = |[low, high]: [f64; 2], [least, greatest]: [f64; 2]| [low.min(least), high.max(greatest)];
+        let widest = |[low, high]: [f64; 2], [minimum, maximum]: [f64; 2]| [low.min(minimum), high.max(maximum)];
         elements.map(|element| self.limits(car, element)).reduce(widest).unwrap_or(self.limits(car, 0))
     }
 
-    /// The car with the value at its least (`end` 0) or greatest limit (1).
+    /// The car with the value at its minimum (`end` 0) or maximum limit (1).
     fn changed(&self, car: &Car, end: usize) -> Car {
         let mut changed = car.clone();
         match self.change {
@@ -201,7 +201,7 @@ pub struct CarInfluence {
     pub key: &'static str,
     /// Where it stands.
     pub from: ValueFrom,
-    /// Least and greatest factor on it; where each element has its own, those of all of them.
+    /// Minimum and maximum factor on it; where each element has its own, those of all of them.
     pub limits: [f64; 2],
     /// The errors at the limit with the greater error of the filter's torque.
     pub errors: ErrorOfEstimate,
@@ -214,7 +214,7 @@ pub struct CarInfluences {
     pub shifts: usize,
     /// With all values as they are: of the sensors and of the filter itself.
     pub as_it_is: ErrorOfEstimate,
-    /// By value, the greatest error of the filter's torque first.
+    /// By value, the largest error of the filter's torque first.
     pub values: Vec<CarInfluence>,
 }
 

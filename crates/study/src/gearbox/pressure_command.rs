@@ -8,10 +8,10 @@ use drivetrain::ClutchValve;
 
 /// Line pressures up to which a command means the line pressure: a clutch that holds is often commanded more. Beyond it is no pressure of
 /// this car.
-const MOST_LINE_PRESSURES: f64 = 3.0;
+const MAX_LINE_PRESSURES: f64 = 3.0;
 
 /// Fraction of the line pressure below zero down to which a commanded pressure is none; below it is a wrong sign or offset.
-const LEAST_LINE_PRESSURES: f64 = -0.05;
+const MIN_LINE_PRESSURES: f64 = -0.05;
 /// A command that no valve takes.
 const REFUSED: f64 = -1e3;
 
@@ -22,12 +22,12 @@ pub(super) fn command_for(car: &Car, element: usize, pressure_pa: f64) -> f64 {
     clutch.map_or(f64::NAN, |clutch| command_of_valve(&clutch.valve, car.line_pressure_pa, pressure_pa))
 }
 
-/// The same of a valve whose greatest pressure this is, Pa.
-pub fn command_of_valve(valve: &ClutchValve<f64>, most_pa: f64, pressure_pa: f64) -> f64 {
-    if pressure_pa < LEAST_LINE_PRESSURES * most_pa {
+/// The same of a valve whose maximum pressure this is, Pa.
+pub fn command_of_valve(valve: &ClutchValve<f64>, max_pa: f64, pressure_pa: f64) -> f64 {
+    if pressure_pa < MIN_LINE_PRESSURES * max_pa {
         return REFUSED;
     }
-    let limited_pa = if pressure_pa <= MOST_LINE_PRESSURES * most_pa { pressure_pa.min(most_pa) } else { pressure_pa };
+    let limited_pa = if pressure_pa <= MAX_LINE_PRESSURES * max_pa { pressure_pa.min(max_pa) } else { pressure_pa };
     valve.command_for(limited_pa.clamp(0.0, f64::INFINITY))
 }
 
@@ -40,10 +40,8 @@ mod tests {
     fn the_command_ends_at_the_pressure_that_is_asked_for() {
         let car = CarFile::eight_speed().unwrap();
         let valve = &car.clutches[0].as_ref().unwrap().valve;
-        let most_pa = car.line_pressure_pa;
-        for (asked_pa, pressure_pa) in
-            [(-1e4, 0.0), (0.0, 0.0), (2e5, 2e5), (most_pa, most_pa), (1.5 * most_pa, most_pa)]
-        {
+        let max_pa = car.line_pressure_pa;
+        for (asked_pa, pressure_pa) in [(-1e4, 0.0), (0.0, 0.0), (2e5, 2e5), (max_pa, max_pa), (1.5 * max_pa, max_pa)] {
             let settled_pa = valve.settled_pressure(command_for(&car, 0, asked_pa));
             assert!((settled_pa - pressure_pa).abs() < 1.0, "{asked_pa}: {settled_pa}");
         }

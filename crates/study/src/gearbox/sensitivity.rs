@@ -16,7 +16,7 @@ use crate::StudyError;
 /// Fraction of the valve model's standard deviation above which the speeds are of no use.
 const HIDDEN: f64 = 0.9;
 /// Rows that a phase needs.
-const LEAST_ROWS: usize = 3;
+const MIN_ROWS: usize = 3;
 
 /// What is off. Of a clutch: the one whose torque is estimated, or the other one of the shift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -211,7 +211,7 @@ fn of_shift(
         let rows: Vec<f64> =
             of_phase(&as_it_is, phase, main).map(|row| row.clutches[main].torque_n_m[0].abs()).collect();
         let torque_n_m = rows.iter().sum::<f64>() / rows.len().max(1) as f64;
-        (rows.len() >= LEAST_ROWS).then_some(PhaseOfShift { torque_n_m, effects })
+        (rows.len() >= MIN_ROWS).then_some(PhaseOfShift { torque_n_m, effects })
     });
     let phases = [phases.next().flatten(), phases.next().flatten()];
     Ok(Some(ShiftSensitivity { shift: nominal.shift, element: own, phases }))

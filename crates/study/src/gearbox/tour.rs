@@ -86,8 +86,8 @@ impl TourDriver<'_> {
         let throttle_now = self.throttle.max(idle_throttle(engine_rad_s));
         let driver = Driver { throttle: throttle_now, brake, grade_rad: 0.0 };
         self.run.advance(driver, |_| {}, record)?;
-        let most = (self.run.time_s() - before_s) / PEDAL_S;
-        self.throttle += (throttle - self.throttle).clamp(-most, most);
+        let maximum = (self.run.time_s() - before_s) / PEDAL_S;
+        self.throttle += (throttle - self.throttle).clamp(-maximum, maximum);
         Ok(())
     }
 

@@ -6,7 +6,7 @@ use drivetrain::{ClutchValve, Real, Table1, Valve, ValveMaps};
 use trace::units::mpa;
 
 use super::Statement;
-use super::rows::{BUS_PERIOD_S, COMPLIANT, COMPLIANT_SAMPLED, I, RIGID, T, least_multipliers, of, open, shaft_rms};
+use super::rows::{BUS_PERIOD_S, COMPLIANT, COMPLIANT_SAMPLED, I, RIGID, T, min_multipliers, of, open, shaft_rms};
 use crate::{Comparison, StudyError, compare};
 
 /// Runs that take one cause of error away, to say what an error is made of.
@@ -83,7 +83,7 @@ fn reason(id: &str, vehicle: &Vehicle, e1: &Comparison, e4: &Comparison, without
         ),
         "off_nominal_inertia_phase_rms" => "the phase begins with the error of the torque phase".to_owned(),
         "full_gains_least_factor" => {
-            let (_, exact) = least_multipliers(&e1.rigid, BUS_PERIOD_S);
+            let (_, exact) = min_multipliers(&e1.rigid, BUS_PERIOD_S);
             format!(
                 "the factor is the least of 1 + T (A22 − L G) over all vertices; exactly it is {exact:.2}: the full gains neither \
                  oscillate nor diverge"

@@ -231,9 +231,9 @@ fn off_nominal_inertia_phase(_: &Comparison, e2: &Comparison, gain: Case) -> Sta
     }
 }
 
-/// The least factor by which a sample multiplies the error of the rigid observer, over both phases and all
+/// The minimum factor by which a sample multiplies the error of the rigid observer, over both phases and all
 /// vertices: by forward Euler, `1 + T (A22 - L G)`, and exactly, `Phi - L G Psi`.
-pub(super) fn least_multipliers(rigid: &RigidDesign, period_s: f64) -> (f64, f64) {
+pub(super) fn min_multipliers(rigid: &RigidDesign, period_s: f64) -> (f64, f64) {
     let vertices = [&rigid.torque_phase, &rigid.inertia_phase].into_iter().flat_map(|certificate| {
         certificate.vertices.iter().map(|margin| (margin.vertex.a22_per_s, margin.decay_per_s))
     });
@@ -292,12 +292,12 @@ fn sampled(e3: &Comparison) -> [Statement; 3] {
 /// E3: the gains for continuous time at 100 Hz.
 fn full_gains(e3: &Comparison) -> Statement {
     let [iss, euler, lowered] = [ISS, EULER, LOWERED].map(|name| of(e3, name, I));
-    let (least, _) = least_multipliers(&e3.rigid, BUS_PERIOD_S);
+    let (minimum, _) = min_multipliers(&e3.rigid, BUS_PERIOD_S);
     Statement {
         claim: "At 100 Hz the ISS gains must be lowered",
         chapter_says: "lowered to −1.8e4 and (−320, −540)",
         criterion: "a factor below 0 at a vertex: the error would change its sign in each sample",
-        agrees: Some(least < 0.0),
+        agrees: Some(minimum < 0.0),
         figures: vec![
             pa("RMS with full gains", euler.rms),
             pa("with full gains and exact discretisation", iss.rms),
@@ -305,7 +305,7 @@ fn full_gains(e3: &Comparison) -> Statement {
             pa("chatter with full gains", euler.chatter),
             pa("with lowered gains", lowered.chatter),
         ],
-        ..row("full_gains_least_factor", "E3", "least factor on the error in a sample, by Euler", least, Unit::Ratio)
+        ..row("full_gains_least_factor", "E3", "least factor on the error in a sample, by Euler", minimum, Unit::Ratio)
     }
 }
 

@@ -179,9 +179,9 @@ fn a_throttle_that_moves_in_the_shift_swaps_the_roles_of_the_clutches() {
             still = ratios;
         }
         // Asked for is 0.1. One car for each shift says it no better than this.
-        let most = if throttle_draws() >= 10 { 0.1 } else { 0.2 };
+        let maximum = if throttle_draws() >= 10 { 0.1 } else { 0.2 };
         assert!(
-            ratios.iter().zip(&still).all(|(moved, still)| moved - still < most),
+            ratios.iter().zip(&still).all(|(moved, still)| moved - still < maximum),
             "{after_s:?}: {ratios:?} {still:?}"
         );
     }

@@ -55,10 +55,10 @@ fn errors(
     let rows = shifts.iter().flat_map(|shift| &shift.rows).filter(|row| row.clutches.iter().all(|it| it.in_range));
     let off: Vec<f64> = rows.map(|row| row.clutches[0].torque_n_m[1] - row.clutches[0].torque_n_m[0]).collect();
     let squares: f64 = off.iter().map(|off| off * off).sum();
-    let most = off.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
+    let maximum = off.iter().fold(0.0_f64, |maximum, off| maximum.max(off.abs()));
     let counted: usize = shifts.iter().map(|shift| shift.rows.len()).sum();
     assert_eq!(off.len(), counted, "no row is outside its range");
-    ([(squares / off.len() as f64).sqrt(), most], shifts.len())
+    ([(squares / off.len() as f64).sqrt(), maximum], shifts.len())
 }
 
 /// Speeds of different times show a slip wherever the car accelerates: what the model carries on shows none.

@@ -191,9 +191,9 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
                 }
                 // Far from the valve model they all are. A converter that is off beside all clutches is a scale of all torques, which only
                 // the stiffness of the shafts shows.
-                let most = if converter == 1.0 { 0.6 } else { 0.7 };
+                let maximum = if converter == 1.0 { 0.6 } else { 0.7 };
                 let [found, open_loop] = learnt.all();
-                assert!(found < most * open_loop, "{name} {way}, converter {converter}: {found} {open_loop}");
+                assert!(found < maximum * open_loop, "{name} {way}, converter {converter}: {found} {open_loop}");
                 sums[0].add(&before);
                 sums[1].add(&learnt);
                 of_both.add(&learnt);
@@ -202,8 +202,8 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
             // smaller or the same, and the known car's own most, by 6 %: 1.46 to 1.37 N m with two draws. The bound is that of the earlier error
             // of the known car. What each way has stands in docs/explanation/results.md.
             println!("{name} either way: {:.2} of the known car's", over_known(&of_both));
-            let most = 1.2 * 1.46 / 1.37;
-            assert!(over_known(&of_both) < most, "{name}, converter {converter}: {}", over_known(&of_both));
+            let maximum = 1.2 * 1.46 / 1.37;
+            assert!(over_known(&of_both) < maximum, "{name}, converter {converter}: {}", over_known(&of_both));
         }
         // Over these cars learning pays.
         let [before, learnt] = sums.map(|sum| sum.all()[0]);
@@ -232,8 +232,8 @@ fn cars_of_the_budget_are_learnt() {
         }
         let [before, learnt, long] = sums.each_ref().map(|sum| sum.all()[0]);
         // Shifts show an inertia that is 5 to 8 % above the true one, so of one that is high in the tables a third is not learnt.
-        let most = if inertia > 1.0 { 1.08 } else { 1.0 };
-        assert!(learnt < most * before && long < most * before, "{inertia}: {before} {learnt} {long}");
+        let maximum = if inertia > 1.0 { 1.08 } else { 1.0 };
+        assert!(learnt < maximum * before && long < maximum * before, "{inertia}: {before} {learnt} {long}");
         assert!(sums[0].inertia_phase() < 0.65 && sums[1].inertia_phase() < 0.55);
     }
 }

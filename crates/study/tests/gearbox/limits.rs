@@ -70,12 +70,12 @@ impl Without {
         let mut car = truth.clone();
         for (clutch, errors) in car.clutches.iter_mut().zip(&budget.elements) {
             let Some((clutch, errors)) = clutch.as_mut().zip(errors.as_ref()) else { continue };
-            let [least_s, most_s] = errors.valve_delay_s;
+            let [min_s, max_s] = errors.valve_delay_s;
             if drag {
                 clutch.drag_n_m = 0.0;
             }
             if let (true, ClutchValve::Proportional(maps)) = (delay, &mut clutch.valve) {
-                maps.delay_s = Table1::constant(0.5 * (least_s + most_s));
+                maps.delay_s = Table1::constant(0.5 * (min_s + max_s));
             }
         }
         Some(car)

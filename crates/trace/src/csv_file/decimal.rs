@@ -14,7 +14,7 @@ pub(super) fn plain(cell: &[u8]) -> Option<f64> {
     let whole = first_point(first).min(text.len());
     // None behind the point, or behind a whole number.
     let places = text.len() - (whole + 1).min(text.len());
-    if !(1..=7).contains(&whole) || places > 16 || whole + places > MOST_DIGITS {
+    if !(1..=7).contains(&whole) || places > 16 || whole + places > MAX_DIGITS {
         return None;
     }
     let digits = if places == 0 {
@@ -33,13 +33,13 @@ pub(super) fn plain(cell: &[u8]) -> Option<f64> {
 }
 
 /// As many digits never make a number that is too large for 64 bits.
-const MOST_DIGITS: usize = 19;
+const MAX_DIGITS: usize = 19;
 
 /// Powers of ten.
-const POWERS: [u64; MOST_DIGITS] = {
-    let mut powers = [1; MOST_DIGITS];
+const POWERS: [u64; MAX_DIGITS] = {
+    let mut powers = [1; MAX_DIGITS];
     let mut at = 1;
-    while at < MOST_DIGITS {
+    while at < MAX_DIGITS {
         powers[at] = 10 * powers[at - 1];
         at += 1;
     }
@@ -125,10 +125,10 @@ fn quotient(digits: u64, places: usize) -> f64 {
 
 /// Reciprocals of the powers of ten whose highest bit was moved to the highest place: of each, what is above `2^64` of the whole part of
 /// `(2^128 - 1) / power`.
-const RECIPROCALS: [u64; MOST_DIGITS] = {
-    let mut reciprocals = [0; MOST_DIGITS];
+const RECIPROCALS: [u64; MAX_DIGITS] = {
+    let mut reciprocals = [0; MAX_DIGITS];
     let mut at = 0;
-    while at < MOST_DIGITS {
+    while at < MAX_DIGITS {
         let power = POWERS[at] << POWERS[at].leading_zeros();
         // The part above 2^64 is 1.
         let above = (u128::MAX / power as u128) as u64;
@@ -208,11 +208,11 @@ mod tests {
     fn a_quotient_by_a_reciprocal_is_that_of_a_division() {
         let mut random_bits = Pcg64Mcg::new(3);
         for i in 0..400_000 {
-            let at = i % MOST_DIGITS;
+            let at = i % MAX_DIGITS;
             let by = POWERS[at] << POWERS[at].leading_zeros();
             let random = random_bits.next_u64();
             // Near the ends and near multiples too.
-            let high = [0, by - 1, random % by, (by - 1) & random][i / MOST_DIGITS % 4];
+            let high = [0, by - 1, random % by, (by - 1) & random][i / MAX_DIGITS % 4];
             let low = [0, u64::MAX, random_bits.next_u64(), random << 62][i / 7 % 4];
             let number = u128::from(high) << 64 | u128::from(low);
             let expected = (number / u128::from(by), number % u128::from(by));

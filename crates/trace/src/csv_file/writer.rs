@@ -201,8 +201,8 @@ fn make_room(bytes: &mut Vec<u8>, at: usize) {
 
 #[cold]
 #[inline(never)]
-fn grow(bytes: &mut Vec<u8>, least: usize) {
-    bytes.resize(least.max(2 * bytes.len()).max(WRITTEN_AT_ONCE + 4096), 0);
+fn grow(bytes: &mut Vec<u8>, minimum: usize) {
+    bytes.resize(minimum.max(2 * bytes.len()).max(WRITTEN_AT_ONCE + 4096), 0);
 }
 
 /// A row while it is written. Cells one after the other that are those of the row before are copied together.

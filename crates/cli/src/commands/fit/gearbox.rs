@@ -17,7 +17,7 @@ use wetclutch::estimate::gearbox::source::{CarReading, CarSource};
 use wetclutch::read_sensors as sensors;
 
 use super::{
-    HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, page, print_json, progress, reasons, said_of_file, table,
+    HELD_OUT_MIN, MIN_FOR_HELD_OUT, nothing_held_out, page, print_json, progress, reasons, said_of_file, table,
 };
 use crate::args::Fit;
 use crate::commands::{channel_map_of_car, shell_quoted, write_text};
@@ -141,7 +141,7 @@ fn record_one(
 fn divided(shifts: Vec<ShiftLog>) -> (Vec<ShiftLog>, Vec<ShiftLog>) {
     let count = shifts.len();
     let every = HELD_OUT_EVERY.min(count / HELD_OUT_MIN);
-    let is_held_out = |at: usize| count >= LEAST_FOR_HELD_OUT && at % every == every - 1;
+    let is_held_out = |at: usize| count >= MIN_FOR_HELD_OUT && at % every == every - 1;
     let some = SHIFTS_MAX.min(count);
     let chosen = (0..some).map(|i| shifts[i * count / some.max(1)].clone()).enumerate();
     let (held_out, fitted): (Vec<_>, Vec<_>) = chosen.partition(|(at, _)| is_held_out(*at));

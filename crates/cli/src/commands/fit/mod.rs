@@ -21,8 +21,8 @@ use crate::output;
 use wetclutch::read_sensors as sensors;
 
 /// Fewer shifts are all fitted.
-const LEAST_FOR_HELD_OUT: usize = 8;
-/// Least number of shifts that are held out.
+const MIN_FOR_HELD_OUT: usize = 8;
+/// Minimum number of shifts that are held out.
 const HELD_OUT_MIN: usize = 3;
 /// Reasons that are printed one by one.
 const REASONS_MAX: usize = 10;
@@ -194,7 +194,7 @@ fn collect(options: &Fit, vehicle: &VehicleFile, bar: &ProgressBar) -> Result<Co
 fn divided(mut shifts: Vec<ShiftRecord>) -> (Vec<ShiftRecord>, Vec<ShiftRecord>) {
     let count = shifts.len();
     let held_out =
-        if count < LEAST_FOR_HELD_OUT { Vec::new() } else { shifts.split_off(count - HELD_OUT_MIN.max(count / 5)) };
+        if count < MIN_FOR_HELD_OUT { Vec::new() } else { shifts.split_off(count - HELD_OUT_MIN.max(count / 5)) };
     let some = SHIFTS_MAX.min(shifts.len());
     ((0..some).map(|i| shifts[i * shifts.len() / some].clone()).collect(), held_out)
 }
@@ -245,7 +245,7 @@ fn said_of(checked: Option<&HeldOut>) -> String {
 }
 
 fn nothing_held_out() -> String {
-    format!("no shift is held out: fewer than {LEAST_FOR_HELD_OUT} can be used, so nothing checks this fit")
+    format!("no shift is held out: fewer than {MIN_FOR_HELD_OUT} can be used, so nothing checks this fit")
 }
 
 /// A line on standard error that says what is being done; nothing if standard error is not a terminal.

@@ -22,7 +22,7 @@ use crate::vehicle::{FINAL_RATIOS, MASSES_KG, WHEEL_RADII_M};
 use crate::{ConfigError, GearboxFile, Source, toml_string};
 
 /// Ratio from engine to wheels that no car's lowest gear has \[chosen\]: trucks have 60 with 16 gears, cars 8 to 25.
-const MOST_RATIO: f64 = 40.0;
+const MAX_RATIO: f64 = 40.0;
 
 /// What is known of a car with a gearbox without a measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +41,7 @@ pub struct CarFacts {
     pub wheel_radius_m: f64,
     /// Ratio of the differential, with any ratio between it and the gearbox output.
     pub final_ratio: f64,
-    /// Greatest engine torque, N m.
+    /// Maximum engine torque, N m.
     pub engine_torque_n_m: f64,
 }
 
@@ -219,7 +219,7 @@ fn commented(taken: &[DefaultTaken], table: &str, key: &str) -> String {
 fn refuse_ratio(facts: &CarFacts, gearbox: &Source) -> Result<(), ConfigError> {
     let lowest = lowest_ratio(&GearboxFile::from_source(gearbox.clone())?.gearbox);
     let whole = lowest * facts.final_ratio;
-    if whole <= MOST_RATIO {
+    if whole <= MAX_RATIO {
         return Ok(());
     }
     let message = format!(

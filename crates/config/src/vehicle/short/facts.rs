@@ -24,7 +24,7 @@ pub struct Facts {
     pub ratio_after: f64,
     /// Ratio of the differential, with any ratio between it and the gearbox output.
     pub final_ratio: f64,
-    /// Greatest engine torque, N m.
+    /// Maximum engine torque, N m.
     pub engine_torque_n_m: f64,
     /// The kind of the valves.
     pub valve: ValveKind,
@@ -40,12 +40,12 @@ pub enum ValveKind {
     PulseWidth,
 }
 
-/// Greatest torques of engines, N m.
+/// Maximum torques of engines, N m.
 pub(super) const ENGINE_TORQUES_N_M: std::ops::RangeInclusive<f64> = 20.0..=2000.0;
 /// Ratios of gears.
 const RATIOS: std::ops::RangeInclusive<f64> = 0.6..=20.0;
 /// A shift changes the ratio by more than this factor.
-const LEAST_STEP: f64 = 1.02;
+const MIN_STEP: f64 = 1.02;
 
 /// The built-in vehicle's valve [chosen]; its comments have the reasons.
 const PROPORTIONAL: [(&str, &str); 9] = [
@@ -168,7 +168,7 @@ fn ratios(check: &Check<'_>, value: Option<(usize, &DeValue<'_>)>) -> Result<(f6
     let list: Numbers = Spanned::new(at..at, list.unwrap_or_default());
     check.numbers(key, &list, RATIOS)?;
     match **list.get_ref() {
-        [before, after] if before > LEAST_STEP * after => Ok((before, after)),
+        [before, after] if before > MIN_STEP * after => Ok((before, after)),
         [before, after] => {
             let message = format!("the ratio before the shift is {before} and after it {after}, which is no upshift");
             let hint = "the ratio is turbine over output speed, such as 4.17 in 1st gear and 2.34 in 2nd".to_owned();

@@ -17,7 +17,7 @@ const SUNS: std::ops::RangeInclusive<u32> = 20..=480;
 const RING_MAX: f64 = 500.0;
 /// A ratio as near to 1 is 1.
 const DIRECT: f64 = 2e-3;
-/// Least fraction of the turbine torque that a clutch is made for: in a shift it carries more than in its gear.
+/// Minimum fraction of the turbine torque that a clutch is made for: in a shift it carries more than in its gear.
 const FRACTION_MIN: f64 = 0.3;
 /// Inertia of a braked shaft, as it counts at the turbine, kg m^2, of the car that is scaled.
 const BRAKED_KG_M2: f64 = 0.0044;

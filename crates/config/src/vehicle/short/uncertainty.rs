@@ -62,8 +62,8 @@ impl DefaultTaken {
             "clutch.*.valve.lag.time_constant_s" => scale(budget.valve_lag_factor),
             "clutch.*.valve.gain.gain_pa_a" => scale(budget.valve_gain_factor),
             "clutch.*.valve.delay.delay_s" => {
-                let [least, greatest] = budget.valve_delay_s;
-                let half = 0.5 * (greatest - least);
+                let [minimum, maximum] = budget.valve_delay_s;
+                let half = 0.5 * (maximum - minimum);
                 Some(Uncertainty { change: Change::Add, limits: [-half, half] })
             }
             // A plate more or less has two faces, a single-sided one has one.

@@ -148,7 +148,7 @@ fn a_learnt_lag_and_delay_are_those_of_the_valve() {
         state.take_timing(&known, &ValveTiming { mean, variance: [0.3; 2] });
         assert_eq!(state.taken_off(), mean);
     }
-    let (mut most_pa, mut found, mut expected) = (0.0_f64, [0.0; 2], [0.0; 2]);
+    let (mut max_pa, mut found, mut expected) = (0.0_f64, [0.0; 2], [0.0; 2]);
     for k in 0..150 {
         let command = Some(Reading::now(if k < 20 { 0.1 } else { 0.25 + 0.002 * f64::from(k) }));
         true_state.step(&truth, command, 0.01);
@@ -156,20 +156,20 @@ fn a_learnt_lag_and_delay_are_those_of_the_valve() {
             state.step(&known, command, 0.01);
         }
         assert!((learnt.valve_pa - true_state.valve_pa).abs() < 1.0, "{k}");
-        most_pa = most_pa.max((unlearnt.valve_pa - true_state.valve_pa).abs());
+        max_pa = max_pa.max((unlearnt.valve_pa - true_state.valve_pa).abs());
         let by_pa = unlearnt.by_timing_pa(&UNCERTAINTY);
         for (k, state) in [&slow, &late].into_iter().enumerate() {
             found[k] += (state.valve_pa - unlearnt.valve_pa) / 0.01;
             expected[k] += by_pa[k];
         }
     }
-    assert!(most_pa > 5e3, "{most_pa}");
+    assert!(max_pa > 5e3, "{max_pa}");
     for (found, expected) in found.iter().zip(expected) {
         assert!(expected < -1e5 && (found / expected - 1.0).abs() < 0.1, "{found} {expected}");
     }
     // No length of the lag and no command before it was sent.
     learnt.take_timing(&known, &ValveTiming { mean: [-9.0, -9.0], variance: [1.0; 2] });
-    assert_eq!((learnt.lag, learnt.delay_s), (LAG_LEAST, 0.0));
+    assert_eq!((learnt.lag, learnt.delay_s), (LAG_MIN, 0.0));
 }
 
 #[test]

@@ -101,9 +101,9 @@ fn what_cannot_be_is_refused_and_often_refused_is_another_car() {
         assert!(!learnt.take(&acting, &before, &odd, &CORRELATIONS));
     }
     assert_eq!(learnt, known);
-    for refused in 1..=REFUSED_MOST {
+    for refused in 1..=REFUSED_MAX {
         learnt.count(false, &CORRELATIONS);
-        assert_eq!(learnt.shifts, u32::from(refused < REFUSED_MOST));
+        assert_eq!(learnt.shifts, u32::from(refused < REFUSED_MAX));
     }
     assert_eq!(learnt, Learnt::nothing(&CORRELATIONS));
 }
@@ -274,10 +274,10 @@ fn the_scale_of_the_wheel_speed_is_kept_within_its_bounds_and_apart_from_all_els
     let mut learnt = Learnt::nothing(&CORRELATIONS);
     assert_eq!(learnt.of_wheel(), [0.0, 1.0]);
     learnt.keep_wheel(0.8, 1e-9);
-    assert_eq!(learnt.of_wheel(), [0.8, WHEEL_LEAST]);
+    assert_eq!(learnt.of_wheel(), [0.8, WHEEL_MIN]);
     for wrong in [[f64::NAN, 0.1], [0.1, f64::NAN], [f64::INFINITY, 0.1]] {
         learnt.keep_wheel(wrong[0], wrong[1]);
-        assert_eq!(learnt.of_wheel(), [0.8, WHEEL_LEAST], "{wrong:?}");
+        assert_eq!(learnt.of_wheel(), [0.8, WHEEL_MIN], "{wrong:?}");
     }
     learnt.keep_wheel(-9.0, 7.0);
     assert_eq!(learnt.of_wheel(), [-EDGE, 1.0]);

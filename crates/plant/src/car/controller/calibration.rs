@@ -64,8 +64,8 @@ pub struct CarCalibration {
     pub hand_over_s: f64,
     /// Torque of the oncoming clutch at the end over the turbine torque.
     pub lock_margin: f64,
-    /// Least torque that is given to the oncoming clutch at the end, N m at the turbine.
-    pub lock_least_n_m: f64,
+    /// Minimum torque that is given to the oncoming clutch at the end, N m at the turbine.
+    pub lock_min_n_m: f64,
     /// Slip at which the oncoming clutch counts as locked, rad/s at the turbine.
     pub lock_slip_rad_s: f64,
     /// Time for which it must be locked, s.
@@ -82,7 +82,7 @@ pub struct CarCalibration {
     pub engine_way: f64,
     /// Time in which the fraction of the engine torque changes by one, s.
     pub engine_ramp_s: f64,
-    /// Time in which the engine torque rises from none to the greatest in a shift, s, when the driver asks for it: a pedal that is
+    /// Time in which the engine torque rises from none to the maximum in a shift, s, when the driver asks for it: a pedal that is
     /// moved in a shift is followed as fast as the clutches can answer.
     pub tip_in_s: f64,
     /// Time in which the lock-up clutch opens, s: less than that of the fill.
@@ -96,7 +96,7 @@ pub struct CarCalibration {
     /// Engine speed at a launch above idle speed, per throttle, rad/s.
     pub launch_rad_s: f64,
     /// The most of it, rad/s.
-    pub launch_most_rad_s: f64,
+    pub launch_max_rad_s: f64,
     /// Gain of the engine speed at a launch, 1/s.
     pub launch_per_s: f64,
     /// Rate at which the launch clutch takes torque, N m/s; it gives it up four times as fast.
@@ -151,7 +151,7 @@ impl CarCalibration {
         hand_over_lead_s: 0.09,
         hand_over_s: 0.12,
         lock_margin: 1.25,
-        lock_least_n_m: 12.0,
+        lock_min_n_m: 12.0,
         lock_slip_rad_s: 3.0,
         lock_hold_s: 0.03,
         lock_ramp_s: 0.15,
@@ -166,7 +166,7 @@ impl CarCalibration {
         slip_per_s2: 30.0,
         launch_open_rad_s: 95.0,
         launch_rad_s: 260.0,
-        launch_most_rad_s: 160.0,
+        launch_max_rad_s: 160.0,
         launch_per_s: 2.0,
         launch_n_m_s: 300.0,
         launch_lock_s: 0.1,

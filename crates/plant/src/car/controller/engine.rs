@@ -46,12 +46,12 @@ impl EngineControl {
         let driver_n_m = car.engine.torque(measured.engine_rad_s, throttle);
         let asked_n_m = if driver_n_m > 0.0 { driver_n_m * self.stage_fraction } else { driver_n_m };
         let rise_n_m_s = car.engine.torque(measured.engine_rad_s, 1.0).max(0.0) / c.tip_in_s;
-        let most_n_m = |after_s: f64, from_n_m: f64| from_n_m.max(0.0) + rise_n_m_s * after_s;
-        let at_once_n_m = most_n_m(period_s, self.passed_n_m);
+        let max_n_m = |after_s: f64, from_n_m: f64| from_n_m.max(0.0) + rise_n_m_s * after_s;
+        let at_once_n_m = max_n_m(period_s, self.passed_n_m);
         // After the shift until the driver has what he asks for.
         self.is_limited = stage_fraction.is_some() || (self.is_limited && asked_n_m > at_once_n_m);
         self.passed_n_m = if self.is_limited { asked_n_m.min(at_once_n_m) } else { asked_n_m };
-        self.expected_n_m = asked_n_m.min(most_n_m(c.lead_s, self.passed_n_m));
+        self.expected_n_m = asked_n_m.min(max_n_m(c.lead_s, self.passed_n_m));
         if driver_n_m > 0.0 { self.passed_n_m / driver_n_m } else { 1.0 }
     }
 

@@ -54,14 +54,14 @@ impl Launch {
         let pedal = if throttle > idle_throttle(engine_rad_s) { throttle } else { 0.0 };
         let free_n_m = car.engine.torque(engine_rad_s, throttle) - car.engine.drag_n_m_s * engine_rad_s;
         let wanted = if pedal > 0.0 {
-            let target = IDLE_RAD_S + (c.launch_rad_s * pedal).min(c.launch_most_rad_s);
+            let target = IDLE_RAD_S + (c.launch_rad_s * pedal).min(c.launch_max_rad_s);
             free_n_m - car.engine.inertia_kg_m2 * c.launch_per_s * (target - engine_rad_s)
         } else {
             c.creep_n_m * (1.0 - measured.brake / c.creep_brake).max(0.0)
         };
         // An engine below its idle speed gives way.
-        let most = c.stall_n_m_s_rad * (engine_rad_s - IDLE_RAD_S + c.stall_rad_s);
-        let wanted = wanted.clamp(0.0, most.max(0.0));
+        let maximum = c.stall_n_m_s_rad * (engine_rad_s - IDLE_RAD_S + c.stall_rad_s);
+        let wanted = wanted.clamp(0.0, maximum.max(0.0));
         if let Some(pressure_pa) = self.filling_pa((car, c), time_s, wanted, piston) {
             return (self.clutch.element, self.clutch.valve_command(pressure_pa));
         }

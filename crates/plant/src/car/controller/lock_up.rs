@@ -39,20 +39,20 @@ impl LockUpControl {
         let period_s = c.control_period_s;
         let step = if self.is_closed { period_s / lock_up.ramp_s } else { -period_s / c.unlock_s };
         self.fraction = (self.fraction + step).clamp(0.0, 1.0);
-        let most_n_m = self.fraction * lock_up.capacity_n_m;
+        let max_n_m = self.fraction * lock_up.capacity_n_m;
         if lock_up.slip_rad_s > 0.0 {
-            self.slipping_n_m((car, c), &lock_up, most_n_m, engine_n_m, measured)
+            self.slipping_n_m((car, c), &lock_up, max_n_m, engine_n_m, measured)
         } else {
-            most_n_m
+            max_n_m
         }
     }
 
-    /// The torque that keeps the slip, N m, at most `most_n_m`.
+    /// The torque that keeps the slip, N m, at most `max_n_m`.
     fn slipping_n_m(
         &mut self,
         (car, c): (&Car, &CarCalibration),
         lock_up: &LockUp,
-        most_n_m: f64,
+        max_n_m: f64,
         engine_n_m: f64,
         measured: &CarMeasured,
     ) -> f64 {
@@ -65,11 +65,11 @@ impl LockUpControl {
         let wanted = surplus + inertia * (c.slip_per_s * error + c.slip_per_s2 * self.integral_rad);
         // Friction has the sign of the slip.
         let size = wanted * slip.signum();
-        if !self.is_closed || most_n_m <= 0.0 {
+        if !self.is_closed || max_n_m <= 0.0 {
             self.integral_rad = 0.0;
-        } else if (0.0..most_n_m).contains(&size) {
+        } else if (0.0..max_n_m).contains(&size) {
             self.integral_rad += error * c.control_period_s;
         }
-        size.clamp(0.0, most_n_m)
+        size.clamp(0.0, max_n_m)
     }
 }

@@ -195,7 +195,7 @@ impl ActiveShift {
         };
         // A clutch that holds takes more at once and gives it up by and by: the torque may come back with the other sign.
         let kept = self.held_n_m * (1.0 - c.control_period_s / c.holding_s);
-        self.held_n_m = now.turbine_n_m.abs().max(kept).max(c.lock_least_n_m);
+        self.held_n_m = now.turbine_n_m.abs().max(kept).max(c.lock_min_n_m);
         self.change_stage(c, &now);
         self.is_filled_by_plan = false;
         let torques = match self.stage {
@@ -413,7 +413,7 @@ impl ActiveShift {
 
     /// Torque of the closed oncoming clutch, N m at the turbine.
     fn closing_n_m(&self, c: &CarCalibration, now: &Now) -> f64 {
-        (c.lock_margin * now.turbine_n_m.abs()).max(c.lock_least_n_m)
+        (c.lock_margin * now.turbine_n_m.abs()).max(c.lock_min_n_m)
     }
 
     /// Torque of the oncoming clutch against a slip beyond synchronous speed, where both clutches hold the turbine, N m.

@@ -13,7 +13,7 @@ use config::CarFile;
 use evaluate::drive::ScoredDrive;
 use evaluate::logged::LoggedDrive;
 use observer::ShiftTables;
-use report::drive_page::{DrivePage, MOST_DRAWN, findings, shift_words};
+use report::drive_page::{DrivePage, MAX_DRAWN, findings, shift_words};
 use trace::{Cell, ShownPath as _};
 
 use self::checks::{RowTimes, refused};
@@ -138,7 +138,7 @@ pub fn estimate(
     let mut checks = source.columns(car, tables);
     let mut times = RowTimes::default();
     // Without a page no shift is drawn.
-    let most_drawn = if options.with_page { MOST_DRAWN } else { 0 };
+    let max_drawn = if options.with_page { MAX_DRAWN } else { 0 };
     while let Some(step) = source.next_step()? {
         options.check_interrupt()?;
         times.push(&step);
@@ -146,7 +146,7 @@ pub fn estimate(
             checks.push(&step);
         }
         let estimate = drive.push(&step);
-        drive.draw_at_most(most_drawn, |shift| passing.wants(shift.number, car, [shift.from, shift.to]));
+        drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, [shift.from, shift.to]));
         let gears = [step.input.gear.from, step.input.gear.to];
         let row = Row { car, places: &places, gears, estimate, ranges_pa: drive.pressure_ranges_pa() };
         passing.push(step.time_s, row, |time_s, row| {

@@ -79,7 +79,8 @@ struct Rows {
 /// Steps of mapped channels. The first are looked at before the first estimate, as those of a table are.
 struct Channels<'a> {
     steps: Steps<'a>,
-    /// The valve for whose command the pressure that is asked of it stands, and its greatest pressure, Pa, where the map has no other command.
+    /// The valve for whose command the pressure that is asked of it stands, and its maximum pressure, Pa, where the map has no other
+    /// command.
     asked_of: Option<(ClutchValve<f64>, f64)>,
     looked_at: VecDeque<(Step, Vec<Reading>)>,
     median_step_s: f64,
@@ -461,8 +462,8 @@ impl Channels<'_> {
         let step = self.steps.next_seeing(|reading| readings.push(reading))?;
         let resets = self.steps.readings().resets();
         Some(step.map_err(Error::from).map(|mut step| {
-            if let (Some((valve, most_pa)), Some(command)) = (&self.asked_of, &mut step.input.command) {
-                command.value = command_of_valve(valve, *most_pa, command.value);
+            if let (Some((valve, max_pa)), Some(command)) = (&self.asked_of, &mut step.input.command) {
+                command.value = command_of_valve(valve, *max_pa, command.value);
             }
             let step = Step::of_channels(step.time_s, step.input, resets, &readings);
             (step, readings)

@@ -2,7 +2,7 @@
 
 use car::Vehicle;
 use logs::Shift;
-use report::log_page::MOST_DRAWN;
+use report::log_page::MAX_DRAWN;
 use study::shift_estimates::{is_of_vehicle, thinned};
 use study::{LogSample, Overview, RecentSamples, ShiftEstimate};
 
@@ -54,7 +54,7 @@ impl<'a> Shifts<'a> {
         }
         let of_vehicle = is_of_vehicle(&shift, &self.ratios, self.vehicle);
         let mut found = ShiftEstimate::of(self.selection.seen, shift, of_vehicle, &self.recent, self.vehicle);
-        let is_drawn = self.found.len() < MOST_DRAWN;
+        let is_drawn = self.found.len() < MAX_DRAWN;
         let samples = self.recent.between(found.window_s);
         if self.is_selective() {
             write(samples)?;
