@@ -133,7 +133,7 @@ pub struct Experiment {
     pub sensors: Option<Sensors>,
     /// The sensors of the file without their errors, which the observers assume; scenarios and studies do not change
     /// them.
-    pub sensors_told: Option<Sensors>,
+    pub sensors_given: Option<Sensors>,
     /// The observers to be run.
     pub observers: Vec<ObserverEntry>,
     /// Variations for the bench.
@@ -169,7 +169,7 @@ impl Experiment {
         for entry in varied.observers.iter_mut().filter(|entry| entry.real_sensors) {
             entry.sample_time_s = scenario.row_time_s.unwrap_or(entry.sample_time_s);
         }
-        for sensors in [&mut varied.sensors, &mut varied.sensors_told].into_iter().flatten() {
+        for sensors in [&mut varied.sensors, &mut varied.sensors_given].into_iter().flatten() {
             sensors.wheel.periods = scenario.wheel_periods.unwrap_or(sensors.wheel.periods);
             sensors.output.periods = scenario.output_periods.unwrap_or(sensors.output.periods);
         }

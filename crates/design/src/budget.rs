@@ -24,7 +24,9 @@ impl ValveErrors {
         let (budget, real) = (&vehicle.error_bounds, &vehicle.oncoming.valve);
         let (pressure_pa, time_constant_s) = (shift_pressure(vehicle), shift_time_constant(vehicle));
         let lag = match (&vehicle.settings.valve, real) {
-            (Valve::PulseWidth(told), ClutchValve::PulseWidth { law, .. }) => told.flow_sqrt_pa_s / law.flow_sqrt_pa_s,
+            (Valve::PulseWidth(stated), ClutchValve::PulseWidth { law, .. }) => {
+                stated.flow_sqrt_pa_s / law.flow_sqrt_pa_s
+            }
             (_, real) => real.maps().map_or(1.0, |maps| maps.time_constant_s.at(pressure_pa) / time_constant_s),
         };
         let command = real.command_for(pressure_pa);

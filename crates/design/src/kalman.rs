@@ -101,7 +101,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
 
 /// What the filter does not know.
 fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64> {
-    let (budget, told) = (&vehicle.error_bounds, &vehicle.settings.filter);
+    let (budget, given) = (&vehicle.error_bounds, &vehicle.settings.filter);
     let line = &vehicle.driveline;
     let wheels = vehicle.road.inertia_at_wheel() + line.wheel_inertia_kg_m2;
     // A quarter of a swing of the shafts between the gearbox, with the gear's part of the turbine, and the wheels.
@@ -113,16 +113,16 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
     let delay = std_dev_of(0.5 * (delay_max_s - delay_min_s)) / shift_time_constant(vehicle);
     Uncertainty {
         turbine_share: std_dev_of(budget.turbine_torque_share),
-        turbine_share_s: told.turbine_share_s,
+        turbine_share_s: given.turbine_share_s,
         stiffness_fraction: std_dev_within(budget.shaft_stiffness_factor),
         backlash_n_m: budget.backlash_rad * line.shaft_stiffness_n_m_rad,
         valve_fraction: Real::hypot(lag, delay),
         valve_gain: std_dev_within(budget.valve_gain_factor),
-        rate_s: told.valve_rate_s,
+        rate_s: given.valve_rate_s,
         friction: std_dev_within(budget.friction_factor),
         clutch_s: CLUTCH_S,
-        offgoing_n_m: told.offgoing_n_m,
-        offgoing_release_s: told.offgoing_release_s,
+        offgoing_n_m: given.offgoing_n_m,
+        offgoing_release_s: given.offgoing_release_s,
         load_shifting_n_m: budget.shaft_torque_n_m / quarter_swing_s.sqrt(),
         load_in_gear_n_m: LOAD_IN_GEAR * budget.shaft_torque_n_m / LOAD_IN_GEAR_S.sqrt(),
         wheel_scale: std_dev_of(budget.wheel_scale),
@@ -130,7 +130,7 @@ fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64>
         skew_s: budget.channel_skew_s,
         scale_min: SCALE_MIN.min(std_dev_of(budget.wheel_scale)),
         delay_min_s: DELAY_MIN_S,
-        output_least_rad_s: told.output_least_rad_s,
+        output_least_rad_s: given.output_least_rad_s,
     }
 }
 
@@ -154,21 +154,21 @@ pub fn unscented_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> Unscent
 }
 
 fn aged_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> ExtendedFilter<f64> {
-    let (budget, told) = (&vehicle.error_bounds, &vehicle.settings.filter);
+    let (budget, given) = (&vehicle.error_bounds, &vehicle.settings.filter);
     let valve = ValveErrors::of(vehicle);
     let noise = FilterNoise {
         turbine_rad_s: std_dev_rad_s(sensors.map(|sensors| &sensors.turbine), budget.turbine_quantum_rad_s),
         output_rad_s: std_dev_rad_s(sensors.map(|sensors| &sensors.output), budget.output_quantum_rad_s),
         wheel_rad_s: std_dev_rad_s(sensors.map(|sensors| &sensors.wheel), budget.wheel_quantum_rad_s),
-        turbine_share: told.turbine_share,
-        turbine_share_s: told.turbine_share_s,
-        twist_rate_rad_s: told.twist_rate_rad_s,
-        output_least_rad_s: told.output_least_rad_s,
+        turbine_share: given.turbine_share,
+        turbine_share_s: given.turbine_share_s,
+        twist_rate_rad_s: given.twist_rate_rad_s,
+        output_least_rad_s: given.output_least_rad_s,
         valve_moving: fraction(std_dev_of(Real::hypot(valve.lag_pa_s, valve.delay_pa_s)), budget.shift_ramp_pa_s),
         valve_resting_per_s: fraction(std_dev_of(valve.gain_pa_s), shift_pressure(vehicle)),
-        valve_rate_s: told.valve_rate_s,
-        offgoing_n_m: told.offgoing_n_m,
-        offgoing_release_s: told.offgoing_release_s,
+        valve_rate_s: given.valve_rate_s,
+        offgoing_n_m: given.offgoing_n_m,
+        offgoing_release_s: given.offgoing_release_s,
     };
     let lag = |sensor: fn(&Sensors) -> &SpeedSensor| sensors.map_or(0.0, |sensors| lag_rad(sensor(sensors)));
     let readings = Readings {

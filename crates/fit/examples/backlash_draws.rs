@@ -11,7 +11,7 @@ use common::{Logs, TestCar};
 fn main() {
     let number = |name: &str, usual: u32| std::env::var(name).map_or(usual, |text| text.parse().unwrap());
     let (cars, minutes) = (number("FIT_CARS", 16), number("FIT_DRIVING", 2));
-    let (mut squares, mut stated, mut outside, mut told) = (0.0, 0.0, 0, 0);
+    let (mut squares, mut stated, mut outside, mut identified) = (0.0, 0.0, 0, 0);
     for seed in 0..u64::from(cars) {
         let mut car = TestCar::drawn(seed).on_another_road().with_reversals();
         let driving = car.collected(&car.driven(minutes), "backlash").driving;
@@ -30,16 +30,16 @@ fn main() {
                     found.reversals,
                     found.verdict().name()
                 );
-                told += 1;
+                identified += 1;
                 squares += error * error;
                 stated += found.sd_rad * found.sd_rad;
                 outside += u32::from(error.abs() > 1.96 * found.sd_rad);
             }
         }
     }
-    let rms = |sum: f64| (sum / f64::from(told)).sqrt();
+    let rms = |sum: f64| (sum / f64::from(identified)).sqrt();
     println!(
-        "found in {told} of {cars}: RMS error {:.4} rad, stated {:.4}, outside of the 95 % {outside}",
+        "found in {identified} of {cars}: RMS error {:.4} rad, stated {:.4}, outside of the 95 % {outside}",
         rms(squares),
         rms(stated)
     );

@@ -21,7 +21,7 @@ use fit::Known;
 use fit::gearbox::{Driving, GearboxFit, Quantity};
 
 /// Of a quantity the error of the fit, and the standard deviations stated and before, in its unknown.
-struct Told {
+struct Identified {
     name: String,
     error: f64,
     stated: f64,
@@ -32,8 +32,8 @@ struct Told {
 struct Outcome {
     /// RMS error of the torques by the valve models on held-out shifts, N m: given file, fitted file.
     torque_n_m: [f64; 2],
-    told: Vec<Told>,
-    channels: Vec<Told>,
+    identified: Vec<Identified>,
+    channels: Vec<Identified>,
     estimates: Vec<Estimated>,
 }
 
@@ -120,13 +120,13 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
         _ => true,
     };
     let known = quantities.all.iter().enumerate().filter(|(_, quantity)| is_known(**quantity));
-    let told = known.map(|(place, quantity)| Told {
+    let identified = known.map(|(place, quantity)| Identified {
         name: quantities.name(*quantity),
         error: fit.unknowns[place] - drawn.true_unknown(&tables, quantities, *quantity),
         stated: fit.sd(*quantity),
         before: quantities.sd_before(place),
     });
-    let told = told.collect();
+    let identified = identified.collect();
     let estimates = match std::env::var("FIT_ESTIMATE") {
         Ok(_) => {
             let without = Car { error_bounds: drawn.file.error_bounds.clone(), ..file.car.clone() };
@@ -135,12 +135,12 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
         }
         Err(_) => Vec::new(),
     };
-    Outcome { torque_n_m, told, channels, estimates }
+    Outcome { torque_n_m, identified, channels, estimates }
 }
 
 /// What was found of the channels of the speeds and the drive shafts.
-fn of_channels(drawn: &Drawn, fit: &GearboxFit) -> Vec<Told> {
-    let told = |name: &str, known: &Known, truth: f64| {
+fn of_channels(drawn: &Drawn, fit: &GearboxFit) -> Vec<Identified> {
+    let identified = |name: &str, known: &Known, truth: f64| {
         let error = known.value - truth;
         println!(
             "{name}: {:+.5}, true {truth:+.5}, sd {:.5}, off by {:+.1} sd",
@@ -148,7 +148,7 @@ fn of_channels(drawn: &Drawn, fit: &GearboxFit) -> Vec<Told> {
             known.sd,
             error / known.sd
         );
-        Told { name: name.to_owned(), error, stated: known.sd, before: known.before }
+        Identified { name: name.to_owned(), error, stated: known.sd, before: known.before }
     };
     let channels = drawn.channels;
     let stiffness = |car: &Car| car.driveline.shaft_stiffness_n_m_rad;
@@ -159,21 +159,21 @@ fn of_channels(drawn: &Drawn, fit: &GearboxFit) -> Vec<Told> {
     }
     match &fit.wheel {
         Ok(found) => all.extend([
-            told("wheel speed: scale", &found.scale, channels.wheel_scale),
-            told("wheel speed: delay s", &found.late_s, channels.late_s[3] - channels.late_s[2]),
-            told("drive shafts", &found.stiffness, (stiffness(&drawn.truth) / stiffness(&drawn.file)).ln()),
+            identified("wheel speed: scale", &found.scale, channels.wheel_scale),
+            identified("wheel speed: delay s", &found.late_s, channels.late_s[3] - channels.late_s[2]),
+            identified("drive shafts", &found.stiffness, (stiffness(&drawn.truth) / stiffness(&drawn.file)).ln()),
         ]),
         Err(reason) => println!("wheel speed: {reason}"),
     }
     match &fit.channels.output {
         Ok(found) => all.extend([
-            told("output speed: scale", &found.scale, 0.0),
-            told("output speed: delay s", &found.late_s, channels.late_s[2]),
+            identified("output speed: scale", &found.scale, 0.0),
+            identified("output speed: delay s", &found.late_s, channels.late_s[2]),
         ]),
         Err(reason) => println!("output speed: {reason}"),
     }
     let engine = fit.engine_late_s();
-    all.extend(engine.map(|found| told("engine speed: delay s", &found, channels.late_s[0])));
+    all.extend(engine.map(|found| identified("engine speed: delay s", &found, channels.late_s[0])));
     all
 }
 
@@ -189,25 +189,25 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Of each quantity how many truths lie in the stated 95 %, bias and spread of the errors.
-fn print_quantities(outcomes: &[Outcome], told: fn(&Outcome) -> &[Told]) {
-    let is_inside = |told: &&Told| told.error.abs() <= 1.96 * told.stated;
-    let all = || outcomes.iter().flat_map(told);
+fn print_quantities(outcomes: &[Outcome], identified: fn(&Outcome) -> &[Identified]) {
+    let is_inside = |identified: &&Identified| identified.error.abs() <= 1.96 * identified.stated;
+    let all = || outcomes.iter().flat_map(identified);
     let mut names: Vec<&str> = Vec::new();
-    for told in all() {
-        if !names.contains(&told.name.as_str()) {
-            names.push(&told.name);
+    for identified in all() {
+        if !names.contains(&identified.name.as_str()) {
+            names.push(&identified.name);
         }
     }
     for name in names {
-        let of = || all().filter(|told| told.name == name);
+        let of = || all().filter(|identified| identified.name == name);
         println!(
             "{name:32} cars {} held {:.2} bias {:+.4} rms error {:.4} stated {:.4} before {:.4}",
             of().count(),
             of().filter(is_inside).count() as f64 / of().count() as f64,
-            mean(of().map(|told| told.error)),
-            mean(of().map(|told| told.error.powi(2))).sqrt(),
-            mean(of().map(|told| told.stated.powi(2))).sqrt(),
-            mean(of().map(|told| told.before))
+            mean(of().map(|identified| identified.error)),
+            mean(of().map(|identified| identified.error.powi(2))).sqrt(),
+            mean(of().map(|identified| identified.stated.powi(2))).sqrt(),
+            mean(of().map(|identified| identified.before))
         );
     }
     println!("all held {:.3}", all().filter(is_inside).count() as f64 / all().count() as f64);
@@ -264,7 +264,7 @@ fn main() {
         outcome(&drawn, case, &drive)
     };
     let outcomes: Vec<Outcome> = (first..first + cars).map(of_car).collect();
-    print_quantities(&outcomes, |outcome| &outcome.told);
+    print_quantities(&outcomes, |outcome| &outcome.identified);
     print_quantities(&outcomes, |outcome| &outcome.channels);
     print_estimates(&outcomes);
     let rms = [0, 1].map(|which| mean(outcomes.iter().map(|outcome| outcome.torque_n_m[which].powi(2))).sqrt());

@@ -32,7 +32,7 @@ const SHIFTS_MAX: usize = 5;
 const MISFIT: f64 = 0.1;
 const STEP_S: f64 = 0.002;
 /// Which measurement would tell a fill volume.
-pub(crate) const FILL_TOLD_BY: &str =
+pub(crate) const FILL_IDENTIFIED_BY: &str =
     "measure the pressure of the clutch in one shift, from its first command on until both clutches slip";
 
 /// What is known of a fill volume after a fit.
@@ -97,17 +97,17 @@ impl FillFit {
 
     /// What the logs tell of it.
     pub fn verdict(&self) -> Verdict {
-        if self.shifts == 0 { Verdict::NotTold } else { Verdict::of(self.sd[0], self.sd[1]) }
+        if self.shifts == 0 { Verdict::NotIdentifiable } else { Verdict::of(self.sd[0], self.sd[1]) }
     }
 
     /// Factor on the volume in the fitted file: that of the given file where it is not told.
     pub(crate) fn factor(&self) -> f64 {
-        if self.verdict() == Verdict::NotTold { 1.0 } else { Real::exp(self.log_volume) }
+        if self.verdict() == Verdict::NotIdentifiable { 1.0 } else { Real::exp(self.log_volume) }
     }
 
     /// Factor on the preload of its spring beside the fitted kiss point: volume and preload were found together, and are written together.
     pub(crate) fn preload_factor(&self) -> f64 {
-        if self.verdict() == Verdict::NotTold { 1.0 } else { self.preload }
+        if self.verdict() == Verdict::NotIdentifiable { 1.0 } else { self.preload }
     }
 
     /// A warning about pressures that do not follow the model.

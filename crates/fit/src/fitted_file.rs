@@ -28,7 +28,7 @@ impl Fit {
             self.write(&mut text, &fitted, &oncoming, prior.parameter)?;
         }
         self.write_fill(&mut text, vehicle, &oncoming)?;
-        if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
+        if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_identifiable()) {
             text.put(&["driveline"], "backlash_rad", backlash.rad, &backlash.comment())?;
             let max_rad = (backlash.rad + BUDGET_SIDES * backlash.sd_rad).min(backlash::MAX_RAD);
             text.put(&["design", "error_bounds"], "backlash_rad", max_rad, BUDGET_COMMENT)?;
@@ -77,7 +77,7 @@ impl Fit {
             Parameter::Damping => times(text, &["driveline", "shaft_damping_n_m_s_rad"]),
             Parameter::Tyre => times(text, &["tyre", "slip_scale"]),
             Parameter::Mass => times(text, &["vehicle", "mass_kg"]),
-            Parameter::Rolling | Parameter::Air if self.verdict(parameter) == Verdict::NotTold => Ok(()),
+            Parameter::Rolling | Parameter::Air if self.verdict(parameter) == Verdict::NotIdentifiable => Ok(()),
             Parameter::Rolling => times(text, &["vehicle", "rolling_moment_n_m"]),
             Parameter::Air => times(text, &["vehicle", "drag_coefficient"]),
             Parameter::EngineInertia => times(text, &["engine", "inertia_kg_m2"]),
@@ -89,16 +89,16 @@ impl Fit {
     /// What a fitted value says of itself.
     fn comment(&self, parameter: Parameter) -> String {
         let (value, sd) = (self.value(parameter).unwrap_or(1.0), self.sd(parameter).unwrap_or(0.0));
-        let told = self.verdict(parameter).name();
+        let verdict = self.verdict(parameter).name();
         if parameter.is_delay() {
             let half_ms = 1e3 * SIDES * crate::parameters::DELAY_UNIT_S * sd;
-            return format!("{:+.1} ms, 95 % +- {half_ms:.1} ms, {told}", 1e3 * value);
+            return format!("{:+.1} ms, 95 % +- {half_ms:.1} ms, {verdict}", 1e3 * value);
         }
         if parameter == Parameter::Hysteresis {
-            return format!("95 % +- {:.1} kPa, {told}", 1e-3 * SIDES * HYSTERESIS_UNIT_PA * sd);
+            return format!("95 % +- {:.1} kPa, {verdict}", 1e-3 * SIDES * HYSTERESIS_UNIT_PA * sd);
         }
         let (minimum, maximum) = (value * Real::exp(-SIDES * sd), value * Real::exp(SIDES * sd));
-        format!("x {value:.3}, 95 % {minimum:.3} to {maximum:.3}, {told}")
+        format!("x {value:.3}, 95 % {minimum:.3} to {maximum:.3}, {verdict}")
     }
 
     /// The error budget: what the fit leaves open of each parameter.
@@ -156,7 +156,7 @@ impl Fit {
     fn write_fill(&self, text: &mut VehicleText, vehicle: &VehicleFile, clutch: &str) -> Result<(), FitError> {
         let table = ["clutch", clutch, "fill"];
         let spring = self.value(Parameter::Spring).unwrap_or(1.0);
-        let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) else {
+        let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotIdentifiable) else {
             let preload = keys(&["clutch", clutch, "fill", "preload_n"]);
             let words = Some("keeps its ratio to the fitted return spring");
             return if text.has(&preload) { text.map(&preload, |force| spring * force, words) } else { Ok(()) };
@@ -203,7 +203,7 @@ impl Fit {
                 text.set(&bound(key), &limits_pa, Some("moves with the fitted return spring"))?;
             }
         }
-        if let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) {
+        if let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotIdentifiable) {
             let given = given.volume_m3.map(|volume_m3| volume_m3 / vehicle.oncoming.cylinder.stroke_m3);
             let factors = budget::factors(fill.sd[0], fill.factor(), given);
             if text.has(&bound("volume_factor")) {
@@ -253,10 +253,10 @@ fn write_clutch(
 pub(crate) fn fill_comment(fill: &FillFit) -> String {
     let [minimum, value, maximum] = [-SIDES, 0.0, SIDES].map(|sides| Real::exp(fill.log_volume + sides * fill.sd[0]));
     match fill.verdict() {
-        Verdict::NotTold => format!("as in the given file: {}", Verdict::NotTold.name()),
-        told => format!(
+        Verdict::NotIdentifiable => format!("as in the given file: {}", Verdict::NotIdentifiable.name()),
+        verdict => format!(
             "fill volume x {value:.3}, 95 % {minimum:.3} to {maximum:.3}, {}; by the flow of the passages of this file",
-            told.name()
+            verdict.name()
         ),
     }
 }

@@ -357,13 +357,13 @@ pub(crate) struct Held {
 fn hold(priors: &mut [Prior]) -> Vec<Held> {
     /// Fraction of its standard deviation in which it is held; none would make it a constant, with which nothing is correlated.
     const HELD_FRACTION: f64 = 0.1;
-    let untold = [Parameter::Gain, Parameter::Shape(Map::Gain, 0)];
+    let unidentified = [Parameter::Gain, Parameter::Shape(Map::Gain, 0)];
     let hold = |prior: &mut Prior| {
         let held = Held { parameter: prior.parameter, sd: prior.sd };
         prior.sd *= HELD_FRACTION;
         held
     };
-    priors.iter_mut().filter(|prior| untold.contains(&prior.parameter)).map(hold).collect()
+    priors.iter_mut().filter(|prior| unidentified.contains(&prior.parameter)).map(hold).collect()
 }
 
 /// Gives them back what was known of them.

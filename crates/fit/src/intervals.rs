@@ -93,7 +93,7 @@ pub(crate) fn precision(priors: &[Prior], normal: &Normal, held: &[Held]) -> Opt
         stated.column_mut(i).scale_mut(scale);
     }
     for covariance in [&mut auto, &mut stated] {
-        for (weights, variance) in untold(priors, held) {
+        for (weights, variance) in unidentified(priors, held) {
             forget(covariance, &weights, variance);
         }
     }
@@ -104,7 +104,7 @@ pub(crate) fn precision(priors: &[Prior], normal: &Normal, held: &[Held]) -> Opt
 ///
 /// The factor of all torques: what speeds seem to say of it comes from rolling resistance, drag and the inertia of
 /// the wheels, which the file takes as exact. And what is held near the file.
-fn untold(priors: &[Prior], held: &[Held]) -> Vec<(DVector<f64>, f64)> {
+fn unidentified(priors: &[Prior], held: &[Held]) -> Vec<(DVector<f64>, f64)> {
     let (scale, precision) = torque_scale(priors);
     let mut combinations = vec![(scale, precision.recip())];
     for held in held {

@@ -3,7 +3,7 @@
 use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
-use crate::fill::{FILL_TOLD_BY, FillFit};
+use crate::fill::{FILL_IDENTIFIED_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, OFFSET_UNIT_PA};
@@ -220,8 +220,10 @@ impl Fit {
             "for valve gain, spring and friction singly, measure the pressure of the oncoming clutch in one shift; one tells what ten tell",
         );
         when(
-            self.fill.is_some_and(|fill| fill.verdict() == Verdict::NotTold),
-            &format!("for the fill volume of the oncoming clutch, which is not told by these logs, {FILL_TOLD_BY}"),
+            self.fill.is_some_and(|fill| fill.verdict() == Verdict::NotIdentifiable),
+            &format!(
+                "for the fill volume of the oncoming clutch, which is not told by these logs, {FILL_IDENTIFIED_BY}"
+            ),
         );
         when(!self.available.wheel, "for shafts, tyres and mass, log the speed of the driven wheels");
         when(
@@ -229,7 +231,7 @@ impl Fit {
             "for the torque ratio of the converter, shift early, at low speed, where the engine turns much faster than the turbine",
         );
         when(
-            self.verdict(Parameter::Lag) == Verdict::NotTold && self.available.pressure,
+            self.verdict(Parameter::Lag) == Verdict::NotIdentifiable && self.available.pressure,
             "for the lag of the valve, shifts with a longer inertia phase",
         );
         when(

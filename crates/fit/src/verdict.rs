@@ -10,7 +10,7 @@ pub enum Verdict {
     /// Its interval is less than 0.7 of what it was.
     Partly,
     /// It is what it was before.
-    NotTold,
+    NotIdentifiable,
 }
 
 impl Verdict {
@@ -19,7 +19,7 @@ impl Verdict {
         match after / before {
             fraction if fraction < 1.0 / 3.0 => Self::Measured,
             fraction if fraction < 0.7 => Self::Partly,
-            _ => Self::NotTold,
+            _ => Self::NotIdentifiable,
         }
     }
 
@@ -28,7 +28,7 @@ impl Verdict {
         match self {
             Self::Measured => "measured",
             Self::Partly => "partly told by these logs",
-            Self::NotTold => "not told by these logs",
+            Self::NotIdentifiable => "not told by these logs",
         }
     }
 }
@@ -36,12 +36,12 @@ impl Verdict {
 impl Fit {
     /// What the logs tell of a parameter.
     pub fn verdict(&self, parameter: Parameter) -> Verdict {
-        let Some(place) = self.place(parameter) else { return Verdict::NotTold };
+        let Some(place) = self.place(parameter) else { return Verdict::NotIdentifiable };
         Verdict::of(self.sd(parameter).unwrap_or(f64::INFINITY), self.priors[place].sd)
     }
 
     /// What the logs tell of the factor that all torques have in common: an engine torque signal is a measurement of it.
     pub fn torque_scale_verdict(&self) -> Verdict {
-        if self.available.engine_torque { Verdict::Partly } else { Verdict::NotTold }
+        if self.available.engine_torque { Verdict::Partly } else { Verdict::NotIdentifiable }
     }
 }

@@ -190,7 +190,7 @@ fn a_log_that_begins_in_the_shift_is_fitted_to_what_is_left() {
     let Ok(fit) = fitted(&car, &shifts) else { return };
     assert!(fit.unknowns.iter().all(|x| x.is_finite()));
     // Half of an inertia phase says nothing of the clutch that held before.
-    assert_eq!(fit.verdict(Parameter::OffgoingFriction), Verdict::NotTold);
+    assert_eq!(fit.verdict(Parameter::OffgoingFriction), Verdict::NotIdentifiable);
     fit.vehicle_file(&car.file, "a simulation").unwrap();
 }
 

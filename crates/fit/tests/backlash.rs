@@ -83,6 +83,6 @@ fn the_speed_of_the_car_in_place_of_that_of_the_wheels_tells_no_backlash() {
     let fit = fitted(&car, &shifts, &car.collected(&log, "car").driving);
     let found = fit.backlash.as_ref().unwrap();
     assert!((found.rad - car.car.backlash_rad).abs() < 2.0 * found.sd_rad, "{found:?}");
-    assert_eq!(found.verdict(), Verdict::NotTold, "{found:?}");
+    assert_eq!(found.verdict(), Verdict::NotIdentifiable, "{found:?}");
     assert!(fit.statements().iter().any(|line| line.starts_with("backlash of the driveline: not told, +- ")));
 }

@@ -93,7 +93,7 @@ fn a_drive_without_changes_of_speed_tells_neither_inertia_nor_delay() {
         }
     }
     let (fit, _) = fitted(&record);
-    assert_eq!([fit.inertia_verdict(), fit.delay_verdict()], [Verdict::NotTold; 2], "{fit:?}");
+    assert_eq!([fit.inertia_verdict(), fit.delay_verdict()], [Verdict::NotIdentifiable; 2], "{fit:?}");
 }
 
 #[test]

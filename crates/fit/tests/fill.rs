@@ -21,7 +21,11 @@ fn a_pressure_in_one_shift_tells_the_fill_volume_and_the_file_gets_it() {
     let shifts = shifts(&mut car, 3);
     let fit = fitted(&car, &shifts, &[]);
     let fill = fit.fill.unwrap();
-    assert_eq!((fill.verdict() == Verdict::NotTold, fill.shifts, fill.is_misfit), (false, 1, false), "{fill:?}");
+    assert_eq!(
+        (fill.verdict() == Verdict::NotIdentifiable, fill.shifts, fill.is_misfit),
+        (false, 1, false),
+        "{fill:?}"
+    );
     let error = fill.log_volume - car.fill.ln();
     // The file is off by more than what is left.
     assert!(error.abs() < 2.0 * fill.sd[0] && error.abs() < 0.5 * car.fill.ln().abs(), "{fill:?} {}", car.fill.ln());
@@ -75,7 +79,7 @@ fn without_a_measured_pressure_the_fill_volume_is_said_not_to_be_told() {
     shifts.iter_mut().for_each(|shift| shift.pressure = Series::default());
     let fit = fitted(&car, &shifts, &[]);
     let fill = fit.fill.unwrap();
-    assert_eq!((fill.verdict(), fill.log_volume, fill.sd[0]), (Verdict::NotTold, 0.0, fill.sd[1]));
+    assert_eq!((fill.verdict(), fill.log_volume, fill.sd[0]), (Verdict::NotIdentifiable, 0.0, fill.sd[1]));
     let said = fit.statements().join("\n");
     assert!(
         said.contains("fill volume of the oncoming clutch, which is not told by these logs, measure the pressure"),
@@ -131,7 +135,7 @@ fn a_wrong_pressure_channel_is_not_believed() {
         };
         let warned = fit.statements().iter().any(|line| line.starts_with("warning: "));
         let fill = fit.fill.unwrap();
-        assert!(warned || fill.verdict() == Verdict::NotTold, "{case}: {fill:?} {:#?}", fit.statements());
+        assert!(warned || fill.verdict() == Verdict::NotIdentifiable, "{case}: {fill:?} {:#?}", fit.statements());
         assert!(fit.unknowns.iter().all(|x| x.is_finite()) && fill.sd[0] <= fill.sd[1], "{case}");
     }
     // A pressure that begins within the fill shows no fill.
@@ -139,7 +143,7 @@ fn a_wrong_pressure_channel_is_not_believed() {
         let (time_s, value) = pressure.between([-0.15, 9.0]).unzip();
         Series { time_s, value }
     });
-    assert_eq!(fitted(&car, &late, &[]).fill.unwrap().verdict(), Verdict::NotTold);
+    assert_eq!(fitted(&car, &late, &[]).fill.unwrap().verdict(), Verdict::NotIdentifiable);
 }
 
 #[test]

@@ -28,9 +28,9 @@ fn speeds_and_current_give_the_torque_but_neither_valve_gain_nor_torque_scale() 
     assert!(ratio < 0.35, "{ratio}");
     let (held, all) = inside(&car, &fit);
     assert!(held + 2 >= all, "{held} of {all}");
-    assert_eq!(fit.verdict(Parameter::Gain), Verdict::NotTold);
-    assert_eq!(fit.torque_scale_verdict(), Verdict::NotTold);
-    assert_ne!(fit.verdict(Parameter::Lag), Verdict::NotTold);
+    assert_eq!(fit.verdict(Parameter::Gain), Verdict::NotIdentifiable);
+    assert_eq!(fit.torque_scale_verdict(), Verdict::NotIdentifiable);
+    assert_ne!(fit.verdict(Parameter::Lag), Verdict::NotIdentifiable);
     let [before, after] =
         fit.combination_sd(&[(Parameter::Friction, 1.0), (Parameter::Gain, 1.0), (Parameter::Capacity, -1.0)]);
     assert!(after < 0.3 * before, "{after} of {before}");
@@ -43,7 +43,7 @@ fn an_engine_torque_signal_and_one_pressure_tell_both() {
     let (held, all) = inside(&car, &fit);
     assert!(held + 2 >= all, "{held} of {all}");
     assert_eq!(fit.verdict(Parameter::Gain), Verdict::Measured);
-    assert_ne!(fit.verdict(Parameter::Capacity), Verdict::NotTold);
+    assert_ne!(fit.verdict(Parameter::Capacity), Verdict::NotIdentifiable);
 }
 
 /// Shifts of a car with an engine torque signal, whose pressure sensor in the first shift reads this much too high, from `from_s` before the

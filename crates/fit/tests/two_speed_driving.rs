@@ -31,7 +31,7 @@ fn driving_tells_of_the_mass_where_there_are_few_shifts() {
     // What is not told stays as it is in the text.
     let file = with.vehicle_file(&car.file, "a simulation").unwrap();
     for (parameter, key) in [(Parameter::Rolling, "rolling_moment_n_m"), (Parameter::Air, "drag_coefficient")] {
-        assert_eq!(with.verdict(parameter), Verdict::NotTold);
+        assert_eq!(with.verdict(parameter), Verdict::NotIdentifiable);
         let line = |text: &str| text.lines().find(|line| line.starts_with(key)).unwrap().to_owned();
         assert_eq!(line(&file.source.text), line(&car.file.source.text));
     }

@@ -292,13 +292,13 @@ impl Log {
                 self.path.shown(),
                 found.len(),
                 error::shown(name),
-                self.told_apart(&found)
+                self.distinguished(&found)
             ))),
         }
     }
 
     /// How channels with the same name are told apart.
-    fn told_apart(&self, found: &[usize]) -> String {
+    fn distinguished(&self, found: &[usize]) -> String {
         let group = |i: &usize| self.channels[*i].group.as_str();
         let is_alone = |i: &&usize| found.iter().filter(|other| group(other) == group(i)).count() == 1;
         let groups: Vec<String> =

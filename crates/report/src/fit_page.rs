@@ -42,7 +42,7 @@ fn part(rows: &[ReportRow], bars: &Bars) -> Part {
         rank: match row.verdict {
             Verdict::Measured => 0,
             Verdict::Partly => 1,
-            Verdict::NotTold => 2,
+            Verdict::NotIdentifiable => 2,
         },
     };
     Part {

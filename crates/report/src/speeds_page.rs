@@ -54,14 +54,16 @@ pub struct SpeedsPage<'a> {
 /// Inertia of the engine and delay of its torque, each with its interval of 95 %.
 fn inertia_and_delay(fit: &ConverterFit) -> String {
     let inertia = match fit.inertia_verdict() {
-        Verdict::NotTold => {
+        Verdict::NotIdentifiable => {
             "not identifiable: the engine hardly changes its speed with the converter slipping".to_owned()
         }
         _ => format!("{:.3} ± {:.3} kg m²", fit.inertia_kg_m2, 2.0 * fit.inertia_sd_kg_m2),
     };
     let [late_ms, half_ms] = [fit.delay_s, 2.0 * fit.delay_sd_s].map(|time_s| 1e3 * time_s);
     let delay = match fit.delay_verdict() {
-        Verdict::NotTold => "The delay of the engine's torque against its signal is not identifiable".to_owned(),
+        Verdict::NotIdentifiable => {
+            "The delay of the engine's torque against its signal is not identifiable".to_owned()
+        }
         _ if late_ms < 0.0 => format!("The engine's torque comes {:.0} ± {half_ms:.0} ms before its signal", -late_ms),
         _ => format!("The engine's torque comes {late_ms:.0} ± {half_ms:.0} ms after its signal"),
     };

@@ -157,9 +157,10 @@ pub fn bench(
         progress(&scenario.name);
         let mut varied = experiment.with_scenario(scenario);
         let trace = driven(vehicle, &varied, &mut drives)?;
-        let told_otherwise = varied.sensors_told != experiment.sensors_told || varied.observers != experiment.observers;
-        let told_otherwise = told_otherwise.then(|| self::observers(vehicle, &varied)).transpose()?;
-        let observers = told_otherwise.as_ref().unwrap_or(&observers);
+        let given_otherwise =
+            varied.sensors_given != experiment.sensors_given || varied.observers != experiment.observers;
+        let given_otherwise = given_otherwise.then(|| self::observers(vehicle, &varied)).transpose()?;
+        let observers = given_otherwise.as_ref().unwrap_or(&observers);
         // One noise, the same for all, would decide between observers that are close.
         let seed = varied.sensors.map(|sensors| mixed(sensors.seed, number as u64));
         let completed = ShiftQuality::of(trace, &vehicle.shift).is_some();

@@ -140,7 +140,7 @@ fn compare_on(trace: Trace, vehicle: &Vehicle, experiment: &Experiment) -> Resul
 /// # Errors
 /// There are no gains for what the vehicle file requires.
 pub fn observers(vehicle: &Vehicle, experiment: &Experiment) -> Result<Vec<AnyObserver>, DesignError> {
-    let sensors = experiment.sensors_told.as_ref();
+    let sensors = experiment.sensors_given.as_ref();
     experiment.observers.iter().map(|entry| AnyObserver::of(vehicle, entry, sensors)).collect()
 }
 

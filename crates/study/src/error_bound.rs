@@ -242,8 +242,8 @@ impl Models {
         let rows = self.rigid.coefficients(phase);
         let slip_row = |x: f64| if with_slip { x } else { 0.0 };
         let turbine_off = s.turbine_n_m[i] - self.rigid.known_torques(engine, turbine, slip).turbine_n_m;
-        let told = self.rigid.clutch.torque_capacity(s.pressure_pa[i], slip) * slip.signum();
-        let oncoming_off = s.oncoming_n_m[i] - told;
+        let modelled = self.rigid.clutch.torque_capacity(s.pressure_pa[i], slip) * slip.signum();
+        let oncoming_off = s.oncoming_n_m[i] - modelled;
         // In the torque phase the offgoing clutch sticks and has no column of its own.
         let offgoing_off = if with_slip { s.offgoing_n_m[i] } else { 0.0 };
         let part = |torque: f64, per_turbine: f64, per_slip: f64| [torque * per_turbine, torque * slip_row(per_slip)];

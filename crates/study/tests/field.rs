@@ -47,7 +47,7 @@ impl Field {
     }
 
     fn kalman(&self, rows: &[Row]) -> Vec<Estimate<f64>> {
-        self.estimates(&kalman_filter(&self.vehicle, self.experiment.sensors_told.as_ref()), rows)
+        self.estimates(&kalman_filter(&self.vehicle, self.experiment.sensors_given.as_ref()), rows)
     }
 }
 
@@ -196,7 +196,7 @@ fn one_wrong_turbine_speed_is_no_flare() {
 #[test]
 fn a_command_that_is_late_or_slow_leaves_a_range_of_use() {
     let field = Field::new();
-    let filter = bounded(&field.vehicle, kalman_filter(&field.vehicle, field.experiment.sensors_told.as_ref()));
+    let filter = bounded(&field.vehicle, kalman_filter(&field.vehicle, field.experiment.sensors_given.as_ref()));
     let rows = field.rows("nominal");
     let with = |command: &dyn Fn(usize) -> Option<Reading<f64>>| {
         let of =
@@ -226,7 +226,7 @@ fn the_filter_is_as_sure_as_it_may_be_and_the_same_in_single_precision() {
         let varied = field.experiment.with_scenario(scenario);
         let sample_s = varied.observers[0].sample_time_s;
         let measured = through_sensors(&field.drive, sample_s, &varied.sensors.unwrap(), &field.vehicle);
-        let filter = kalman_filter(&field.vehicle, varied.sensors_told.as_ref());
+        let filter = kalman_filter(&field.vehicle, varied.sensors_given.as_ref());
         let columns = RunColumns::of(&measured, &field.vehicle).unwrap();
         all = all.with(&Consistency::of(&filter, &measured, &columns).unwrap());
     }
@@ -246,7 +246,7 @@ fn single_precision_gives_the_same_in_shifts_with_all_errors() {
         let full = campaign.run_in_full(run).unwrap();
         let (vehicle, experiment) = (&full.varied.vehicle, &full.varied.experiment);
         let measured = through_sensors(&full.trace, SAMPLE_S, &experiment.sensors.unwrap(), vehicle);
-        let filter = kalman_filter(vehicle, experiment.sensors_told.as_ref());
+        let filter = kalman_filter(vehicle, experiment.sensors_given.as_ref());
         let columns = RunColumns::of(&measured, vehicle).unwrap();
         let consistency = Consistency::of(&filter, &measured, &columns).unwrap();
         far += u64::from(consistency.largest_pa > 1e3 || consistency.excess_in_single().abs() > 0.02);
@@ -268,7 +268,7 @@ fn what_is_learnt_in_a_launch_is_no_more_than_twice_too_sure() {
         let (vehicle, experiment) = (&full.varied.vehicle, &full.varied.experiment);
         let sensors = experiment.sensors.unwrap();
         let measured = through_sensors(&full.trace, SAMPLE_S, &sensors, vehicle);
-        let filter = kalman_filter(vehicle, experiment.sensors_told.as_ref());
+        let filter = kalman_filter(vehicle, experiment.sensors_given.as_ref());
         let mut state = filter.start();
         let columns = RunColumns::of(&measured, vehicle).unwrap();
         for (sample, time_s) in columns.samples().zip(&measured.time_s) {
@@ -355,7 +355,7 @@ fn a_reported_engine_torque_makes_up_for_wrong_converter_maps() {
             age_s: 0.03,
         };
         let run = |is_reported: bool| {
-            let filter = kalman_filter(&field.vehicle, experiment.sensors_told.as_ref());
+            let filter = kalman_filter(&field.vehicle, experiment.sensors_given.as_ref());
             let mut state = filter.start();
             let columns = RunColumns::of(&measured, &field.vehicle).unwrap();
             let estimates: Vec<Estimate<f64>> = (columns.samples().enumerate())
@@ -383,7 +383,7 @@ fn the_command_of_the_offgoing_clutch_limits_what_it_carries() {
     let (vehicle, experiment) = (&full.varied.vehicle, &full.varied.experiment);
     let measured = through_sensors(&full.trace, SAMPLE_S, &experiment.sensors.unwrap(), vehicle);
     let (truth, phases) = (measured.get(signal::ONCOMING_TORQUE).unwrap(), true_phases(&measured).unwrap());
-    let filter = kalman_filter(vehicle, experiment.sensors_told.as_ref());
+    let filter = kalman_filter(vehicle, experiment.sensors_given.as_ref());
     let [without, with] = [false, true].map(|known| {
         let mut state = filter.start();
         let columns = RunColumns::of(&measured, vehicle).unwrap();
@@ -428,7 +428,7 @@ fn after_an_hour_of_shifts_nothing_that_is_learnt_is_more_than_twice_too_sure() 
     (sensors.wheel.errors.scale, sensors.wheel.delay_s, sensors.output.delay_s) = (0.988, 0.017, 0.006);
     // Friction and gain are as in the vehicle file; then scale and the two delays.
     let truth = [0.0, 0.0, -0.012, 0.017, 0.006];
-    let filter = kalman_filter(&field.vehicle, field.experiment.sensors_told.as_ref());
+    let filter = kalman_filter(&field.vehicle, field.experiment.sensors_given.as_ref());
     let mut state = filter.start();
     let mut squares = [0.0; 5];
     for launch in 0..LAUNCHES {

@@ -185,7 +185,7 @@ fn checked(check: &Check<'_>, raw: &RawExperiment) -> Result<Experiment, ConfigE
     let sensors = raw.sensors.as_ref().map(|raw| sensors::sensors(check, "sensors", raw, None)).transpose()?;
     Ok(Experiment {
         sensors,
-        sensors_told: sensors.map(Sensors::without_errors),
+        sensors_given: sensors.map(Sensors::without_errors),
         observers,
         scenarios: scenarios(check, &raw.scenario, sensors.as_ref(), sample_time_s, throttle.axis().len())?,
         draws: draws(check, raw.draws.as_ref())?,

@@ -51,6 +51,6 @@ pub(super) fn changed_experiment<'a>(
     let source = &experiment.source;
     let mut changed = ExperimentFile::from_tree(source, &changed(source, tree, changes)?)?;
     changed.observers = experiment.observers.clone();
-    changed.sensors_told = experiment.sensors_told;
+    changed.sensors_given = experiment.sensors_given;
     Ok(changed)
 }

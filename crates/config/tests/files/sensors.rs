@@ -21,9 +21,9 @@ fn bench_error(from: &str, to: &str) -> String {
 fn observers_are_never_told_the_errors_of_a_sensor() {
     let errors = "scale = 1.02\nmissing_share = 0.03\nburst_s = 0.05\nfrozen_s = 0.05\noutliers = 2";
     let experiment = with_wheel(errors).unwrap();
-    let (real, told) = (experiment.sensors.unwrap(), experiment.sensors_told.unwrap());
+    let (real, told) = (experiment.sensors.unwrap(), experiment.sensors_given.unwrap());
     assert_eq!((real.wheel.errors.scale, real.wheel.errors.outliers), (1.02, 2.0));
-    assert_eq!(told, ExperimentFile::bench().unwrap().sensors_told.unwrap());
+    assert_eq!(told, ExperimentFile::bench().unwrap().sensors_given.unwrap());
     assert_eq!(told.wheel.errors, ReadingErrors::NONE);
 }
 
@@ -46,7 +46,7 @@ fn a_scenario_changes_what_it_names_of_the_sensors_and_nothing_that_observers_ar
     let fraction = |sensor: &car::SpeedSensor| sensor.errors.missing_share;
     assert_eq!([&after.engine, &after.turbine, &after.output, &after.wheel].map(fraction), [0.03, 0.0, 0.03, 0.03]);
     assert_eq!(after.current.unwrap().errors.missing_share, 0.03);
-    assert_eq!(varied.sensors_told, experiment.sensors_told);
+    assert_eq!(varied.sensors_given, experiment.sensors_given);
     for (entry, before) in varied.observers.iter().zip(&experiment.observers) {
         assert_eq!(entry.sample_time_s, if entry.real_sensors { 0.005 } else { before.sample_time_s });
     }

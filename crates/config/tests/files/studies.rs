@@ -75,7 +75,7 @@ fn a_study_changes_other_experiments_as_far_as_they_have_what_it_varies() {
         }
         // What makes it this experiment stays.
         assert_eq!((&varied.name, varied.off_nominal), (&experiment.name, experiment.off_nominal));
-        assert_eq!((&varied.observers, varied.sensors_told), (&experiment.observers, experiment.sensors_told));
+        assert_eq!((&varied.observers, varied.sensors_given), (&experiment.observers, experiment.sensors_given));
     }
     let [e1, ..] = ExperimentFile::built_in().unwrap();
     let at = study.factors.iter().position(|factor| factor.name == "throttle").unwrap();

@@ -145,7 +145,7 @@ impl ConverterFit {
     pub fn delay_verdict(&self) -> Verdict {
         let ends_s = [*DELAYS.start(), *DELAYS.end()].map(|step| DELAY_STEP_S * f64::from(step));
         let is_inside = ends_s[0] + DELAY_STEP_S / 2.0 < self.delay_s && self.delay_s < ends_s[1] - DELAY_STEP_S / 2.0;
-        if is_inside { Verdict::of(self.delay_sd_s, DELAY_SD_S) } else { Verdict::NotTold }
+        if is_inside { Verdict::of(self.delay_sd_s, DELAY_SD_S) } else { Verdict::NotIdentifiable }
     }
 
     /// Capacity and its standard deviation at a speed ratio, N m s^2; none below the fitted ones.

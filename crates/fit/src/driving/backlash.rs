@@ -11,7 +11,7 @@
 
 use drivetrain::Real;
 
-use super::twist::{Cell, InputTorque, changes, rests, told};
+use super::twist::{Cell, InputTorque, changes, identified, rests};
 use super::{DrivenCar, Driving};
 use crate::Verdict;
 use crate::fitted_file::SIDES;
@@ -29,7 +29,7 @@ const BEFORE_RAD: f64 = 0.1 / 3.464;
 pub(crate) const MAX_RAD: f64 = 0.2;
 
 /// Which drive tells it.
-const BACKLASH_TOLD_BY: &str = "press and release the accelerator in a gear on a straight road, each for 2 s, with the speed of the driven wheels logged";
+const BACKLASH_IDENTIFIED_BY: &str = "press and release the accelerator in a gear on a straight road, each for 2 s, with the speed of the driven wheels logged";
 
 /// What was found of the backlash.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,8 +49,8 @@ impl BacklashFit {
     }
 
     /// Whether it goes into the file.
-    pub(crate) fn is_told(&self) -> bool {
-        self.verdict() != Verdict::NotTold
+    pub(crate) fn is_identifiable(&self) -> bool {
+        self.verdict() != Verdict::NotIdentifiable
     }
 
     /// What it says of itself in the file.
@@ -66,7 +66,7 @@ impl BacklashFit {
     /// What a fit says of it, or of what the logs lack for it.
     pub(crate) fn statement(found: &Result<Self, String>) -> String {
         match found {
-            Ok(found) if found.is_told() => format!(
+            Ok(found) if found.is_identifiable() => format!(
                 "backlash of the driveline: {:.4} rad at the wheels, +- {:.4} rad, from {} reversals of its torque in a gear. The speed of one wheel tells it on \
                  straight roads, that of both driven wheels on all",
                 found.rad,
@@ -74,7 +74,10 @@ impl BacklashFit {
                 found.reversals
             ),
             Ok(found) => {
-                format!("backlash of the driveline: not told, +- {:.3} rad; {BACKLASH_TOLD_BY}", SIDES * found.sd_rad)
+                format!(
+                    "backlash of the driveline: not told, +- {:.3} rad; {BACKLASH_IDENTIFIED_BY}",
+                    SIDES * found.sd_rad
+                )
             }
             Err(reason) => format!("backlash of the driveline: not told: {reason}"),
         }
@@ -107,14 +110,14 @@ pub(crate) fn fit_backlash<'a>(
     let (changes, reversals) = changes(&stretches, 1, f64::NEG_INFINITY, &InputTorque::OF_FILE);
     if reversals < REVERSALS {
         return Err(format!(
-            "{reversals} reversals of the torque in a gear with a wheel speed, {REVERSALS} are needed; {BACKLASH_TOLD_BY}"
+            "{reversals} reversals of the torque in a gear with a wheel speed, {REVERSALS} are needed; {BACKLASH_IDENTIFIED_BY}"
         ));
     }
     let stiffness = car.driveline.shaft_stiffness_n_m_rad;
     let compliance = stiffness.recip();
-    let found = told(&changes, compliance, STIFFNESS);
-    let found =
-        found.ok_or_else(|| format!("the speeds of output and wheels do not fit together; {BACKLASH_TOLD_BY}"))?;
+    let found = identified(&changes, compliance, STIFFNESS);
+    let found = found
+        .ok_or_else(|| format!("the speeds of output and wheels do not fit together; {BACKLASH_IDENTIFIED_BY}"))?;
     let (rad, sd_rad) = (found.value[3], found.sd[3]);
     if rad > MAX_RAD {
         return Err(format!("it would be {rad:.2} rad at the wheels, and more than {MAX_RAD} rad is none of a car"));

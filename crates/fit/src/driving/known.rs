@@ -33,16 +33,16 @@ impl Known {
 
     /// Whether it is told, and more than this and its interval away from zero.
     pub(crate) fn is_off_by(&self, minimum: f64) -> bool {
-        self.verdict() != Verdict::NotTold && self.value.abs() > (SIDES * self.sd).max(minimum)
+        self.verdict() != Verdict::NotIdentifiable && self.value.abs() > (SIDES * self.sd).max(minimum)
     }
 }
 
 /// What is said of the delay of a channel against another one, and where it belongs.
-pub(crate) fn said_of_delay(role: &str, against: &str, late_s: &Known, told_by: &str) -> String {
+pub(crate) fn said_of_delay(role: &str, against: &str, late_s: &Known, identified_by: &str) -> String {
     let [late_ms, half_ms] = [late_s.value, SIDES * late_s.sd].map(|time_s| 1e3 * time_s);
     let found = format!("{role} is {late_ms:+.1} +- {half_ms:.1} ms behind {against}");
-    if late_s.verdict() == Verdict::NotTold {
-        return format!("{found}: its delay is not told by these logs; {told_by}");
+    if late_s.verdict() == Verdict::NotIdentifiable {
+        return format!("{found}: its delay is not told by these logs; {identified_by}");
     }
     match late_ms {
         _ if !late_s.is_off_by(MIN_DELAY_S) => format!("{found}: they belong together"),

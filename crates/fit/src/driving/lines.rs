@@ -22,12 +22,12 @@ pub(crate) struct Line<const N: usize> {
 
 /// What lines tell of the unknowns: their values, and the larger of two standard deviations, with the correlation of the errors in sequence, and by the
 /// scatter of the groups.
-pub(crate) struct Told<const N: usize> {
+pub(crate) struct Identified<const N: usize> {
     pub(crate) value: [f64; N],
     pub(crate) sd: [f64; N],
 }
 
-impl<const N: usize> Told<N> {
+impl<const N: usize> Identified<N> {
     /// From lines, and the values and standard deviations of before; none if the equations have no finite solution.
     pub(crate) fn of(lines: &[Line<N>], before: [f64; N], sd: [f64; N]) -> Option<Self> {
         let root = |i: usize| lines[i].span_s.sqrt();

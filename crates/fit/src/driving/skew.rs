@@ -7,10 +7,10 @@
 //! w_t = i (1 + e) (r + d r')
 //! ```
 //!
-//! Means over tenths of a second, with the rate between the means before and after; robust least squares ([`Told`]).
+//! Means over tenths of a second, with the rate between the means before and after; robust least squares ([`Identified`]).
 
 use super::known::{Known, MIN_DELAY_S, MIN_SCALE, said_of_delay};
-use super::lines::{Line, Told};
+use super::lines::{Identified, Line};
 use super::recorder::{Dated, turns_by};
 use super::twist::{DELAY_S, SCALE};
 use crate::Series;
@@ -51,7 +51,7 @@ pub struct SkewFit {
 
 impl SkewFit {
     /// By how much the readings are late, s, where it is told and not small.
-    pub(crate) fn told_late_s(&self) -> Option<f64> {
+    pub(crate) fn identified_late_s(&self) -> Option<f64> {
         self.late_s.is_off_by(MIN_DELAY_S).then_some(self.late_s.value)
     }
 
@@ -88,7 +88,7 @@ impl SkewFit {
                 groups.len()
             ));
         }
-        let found = Told::of(&lines, [0.0; 2], [SCALE, DELAY_S]).ok_or("the speeds do not fit together")?;
+        let found = Identified::of(&lines, [0.0; 2], [SCALE, DELAY_S]).ok_or("the speeds do not fit together")?;
         Ok(Self {
             scale: Known::of(found.value[0], found.sd[0], FLOORS[0], SCALE),
             late_s: Known::of(found.value[1], found.sd[1], FLOORS[1], DELAY_S),

@@ -9,7 +9,7 @@
 //! the next, whose errors are independent as far as those of the speeds are; robust by Huber's weights.
 
 use super::DrivenCar;
-use super::lines::{Line, Told};
+use super::lines::{Identified, Line};
 use crate::Series;
 
 /// Length of a cell, s, and time between the points of its means, s.
@@ -222,6 +222,6 @@ pub(crate) fn changes(
 
 /// What changes tell of scale, delay, compliance and backlash, with the compliance of before and its standard deviation as a fraction;
 /// none if the equations have no finite solution.
-pub(crate) fn told(changes: &[Line<UNKNOWNS>], compliance: f64, fraction: f64) -> Option<Told<UNKNOWNS>> {
-    Told::of(changes, [0.0, 0.0, compliance, 0.0], [SCALE, DELAY_S, fraction * compliance, FREE_RAD])
+pub(crate) fn identified(changes: &[Line<UNKNOWNS>], compliance: f64, fraction: f64) -> Option<Identified<UNKNOWNS>> {
+    Identified::of(changes, [0.0, 0.0, compliance, 0.0], [SCALE, DELAY_S, fraction * compliance, FREE_RAD])
 }

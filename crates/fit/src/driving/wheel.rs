@@ -6,7 +6,7 @@
 use drivetrain::Real;
 
 use super::known::{Known, MIN_SCALE, said_of_delay};
-use super::twist::{Cell, DELAY_S, InputTorque, SCALE, changes, told};
+use super::twist::{Cell, DELAY_S, InputTorque, SCALE, changes, identified};
 use super::{DrivenCar, Driving};
 use crate::Verdict;
 use crate::fitted_file::SIDES;
@@ -22,9 +22,9 @@ const OUTPUT_MIN_RAD_S: f64 = 15.0;
 const FLOORS: [f64; 3] = [1e-4, 0.3e-3, 0.015];
 
 /// Which drive tells it.
-const WHEEL_TOLD_BY: &str =
+const WHEEL_IDENTIFIED_BY: &str =
     "press and release the accelerator in a gear on a straight road, with the speed of the driven wheels logged";
-const STIFFNESS_TOLD_BY: &str =
+const STIFFNESS_IDENTIFIED_BY: &str =
     "press and release the accelerator in a low gear, each for 2 s and by different amounts, some twenty times";
 
 /// What was found of the wheel speed and the drive shafts.
@@ -43,7 +43,7 @@ pub struct WheelFit {
 impl WheelFit {
     /// Whether the stiffness goes into the file.
     pub(crate) fn tells_stiffness(&self) -> bool {
-        self.stiffness.verdict() != Verdict::NotTold
+        self.stiffness.verdict() != Verdict::NotIdentifiable
     }
 
     /// Factor on the stiffness of the file.
@@ -67,8 +67,8 @@ impl WheelFit {
             1.0 + value,
             self.time_s
         );
-        if self.scale.verdict() == Verdict::NotTold {
-            return format!("{found}: its scale is not told by these logs; {WHEEL_TOLD_BY}");
+        if self.scale.verdict() == Verdict::NotIdentifiable {
+            return format!("{found}: its scale is not told by these logs; {WHEEL_IDENTIFIED_BY}");
         }
         if value.abs() <= half.max(MIN_SCALE) {
             return format!("{found}: its scale and the final ratio fit together");
@@ -81,19 +81,21 @@ impl WheelFit {
     }
 
     fn said_of_delay(&self) -> String {
-        said_of_delay("wheel_speed", "the output speed", &self.late_s, WHEEL_TOLD_BY)
+        said_of_delay("wheel_speed", "the output speed", &self.late_s, WHEEL_IDENTIFIED_BY)
     }
 
     fn said_of_stiffness(&self) -> String {
         let half = 100.0 * SIDES * self.stiffness.sd;
         match self.stiffness.verdict() {
-            Verdict::NotTold => {
-                format!("stiffness of the drive shafts: not told by these logs, +- {half:.0} %; {STIFFNESS_TOLD_BY}")
+            Verdict::NotIdentifiable => {
+                format!(
+                    "stiffness of the drive shafts: not told by these logs, +- {half:.0} %; {STIFFNESS_IDENTIFIED_BY}"
+                )
             }
-            told => format!(
+            verdict => format!(
                 "stiffness of the drive shafts: x {:.3} +- {half:.0} %, {}; the common factor of all torques is in it. Their damping is not looked for",
                 self.stiffness_factor(),
-                told.name()
+                verdict.name()
             ),
         }
     }
@@ -120,14 +122,14 @@ pub(crate) fn fit_wheel(
     let time_s = changes.iter().fold(0.0, |sum, change| sum + change.span_s);
     if time_s < TIME_S || groups.len() < GROUPS {
         return Err(format!(
-            "{time_s:.0} s of driving in a gear with a wheel speed, in {} stretches; {TIME_S:.0} s in {GROUPS} are needed; {WHEEL_TOLD_BY}",
+            "{time_s:.0} s of driving in a gear with a wheel speed, in {} stretches; {TIME_S:.0} s in {GROUPS} are needed; {WHEEL_IDENTIFIED_BY}",
             groups.len()
         ));
     }
     let compliance = car.driveline.shaft_stiffness_n_m_rad.recip();
-    let found = told(&changes, compliance, stiffness_sd)
+    let found = identified(&changes, compliance, stiffness_sd)
         .filter(|found| found.value[2] > 0.0)
-        .ok_or_else(|| format!("the speeds of output and wheels do not fit together; {WHEEL_TOLD_BY}"))?;
+        .ok_or_else(|| format!("the speeds of output and wheels do not fit together; {WHEEL_IDENTIFIED_BY}"))?;
     let [scale, late_s, shafts, _] = found.value;
     // The twist tells the compliance per torque.
     let stiffness_sd_found = Real::hypot(found.sd[2] / shafts, torque.sd);

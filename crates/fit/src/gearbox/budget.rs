@@ -29,7 +29,7 @@ impl GearboxFit {
             let fraction = edge(self.input_sd()).min(given.converter);
             text.put(&["error_bounds"], "converter_share", &number(fraction), comment)?;
         }
-        if self.is_told(Quantity::Mass) {
+        if self.is_identifiable(Quantity::Mass) {
             let fraction = edge(self.sd(Quantity::Mass));
             text.put(&["error_bounds"], "mass_share", &number(fraction), comment)?;
         }
@@ -70,7 +70,7 @@ impl GearboxFit {
                 factors(self.friction_sd(place), self.friction_factor(place), given.friction_factor),
                 factors(self.sd(Quantity::Gain(place)), self.gain_factor(place), given.valve_gain_factor),
             ],
-            false => self.untold_friction_and_gain(place, [given.friction_factor, given.valve_gain_factor]),
+            false => self.unidentified_friction_and_gain(place, [given.friction_factor, given.valve_gain_factor]),
         };
         let lag = Quantity::Lag(place);
         let lag = factors(self.sd(lag), Real::exp(self.unknown(lag)), given.valve_lag_factor);
@@ -101,7 +101,7 @@ impl GearboxFit {
     /// Ranges of friction and valve gain where only their product is told, beside the file that has the product as friction: what the product
     /// leaves of one where the other is anywhere in its range, and no more than was known before. Both contain 1, so that the range of the
     /// torque contains that of the file.
-    fn untold_friction_and_gain(&self, place: usize, [friction, gain]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    fn unidentified_friction_and_gain(&self, place: usize, [friction, gain]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
         let torque = Quantity::Torque(place);
         let value = Real::exp(self.unknown(torque));
         let product = factors(self.sd(torque), value, [friction[0] * gain[0], friction[1] * gain[1]]);

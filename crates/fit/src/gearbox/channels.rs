@@ -36,7 +36,7 @@ impl ChannelFits {
 
     /// By how much the readings of output and engine speed are late against those of the turbine speed where it is told, s.
     pub(crate) fn late_s(&self) -> [f64; 2] {
-        let late_s = |found: Option<&SkewFit>| found.and_then(SkewFit::told_late_s).unwrap_or(0.0);
+        let late_s = |found: Option<&SkewFit>| found.and_then(SkewFit::identified_late_s).unwrap_or(0.0);
         [late_s(self.output.as_ref().ok()), late_s(self.engine.as_ref().and_then(|found| found.as_ref().ok()))]
     }
 

@@ -83,7 +83,7 @@ impl GearboxFit {
             let element = car.gearbox.elements.iter().position(|element| element.name == *name);
             let known = element.and_then(|at| car.clutches[at].as_ref());
             let drag = Quantity::Drag(place);
-            if let (Some(known), true) = (known, self.is_told(drag)) {
+            if let (Some(known), true) = (known, self.is_identifiable(drag)) {
                 let value = (known.drag_n_m + DRAG_UNIT_N_M * self.unknown(drag)).max(0.0);
                 text.put(&["clutch", name], "drag_n_m", &number(value), &self.comment(drag))?;
             }
@@ -100,12 +100,12 @@ impl GearboxFit {
             (Quantity::EngineInertia, "engine", "inertia_kg_m2", car.engine.inertia_kg_m2),
         ];
         for (quantity, table, key, given) in values {
-            if self.is_told(quantity) {
+            if self.is_identifiable(quantity) {
                 let value = number(given * Real::exp(self.unknown(quantity)));
                 text.put(&[table], key, &value, &self.comment(quantity))?;
             }
         }
-        if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
+        if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_identifiable()) {
             text.put(&["driveline"], "backlash_rad", &number(backlash.rad), &backlash.comment())?;
         }
         if let Some(wheel) = self.wheel.as_ref().ok().filter(|wheel| wheel.tells_stiffness()) {
@@ -117,8 +117,8 @@ impl GearboxFit {
     }
 
     /// Whether the logs say something of a quantity.
-    pub(super) fn is_told(&self, quantity: Quantity) -> bool {
-        self.verdict(quantity) != Verdict::NotTold
+    pub(super) fn is_identifiable(&self, quantity: Quantity) -> bool {
+        self.verdict(quantity) != Verdict::NotIdentifiable
     }
 
     fn write_element(&self, text: &mut Written, car: &CarFile, element: usize, place: usize) -> Result<(), FitError> {
@@ -215,23 +215,23 @@ impl GearboxFit {
     /// What a fitted value says of itself.
     pub(crate) fn comment(&self, quantity: Quantity) -> String {
         let (value, half) = (self.unknown(quantity), SIDES * self.sd(quantity));
-        let told = self.verdict(quantity).name();
+        let verdict = self.verdict(quantity).name();
         match quantity {
             Quantity::Delay(_) | Quantity::InputDelay | Quantity::EngineDelay | Quantity::ReportedDelay => {
                 let ms = 1e3 * DELAY_UNIT_S;
-                format!("delays {:+.1} ms, 95 % within {:.1} ms, {told}", ms * value, ms * half)
+                format!("delays {:+.1} ms, 95 % within {:.1} ms, {verdict}", ms * value, ms * half)
             }
             Quantity::Kiss(_) => {
                 let kpa = 1e-3 * KISS_UNIT_PA;
                 format!(
-                    "kiss point {:+.1} kPa, 95 % within {:.1} kPa, {told}; of pressures that are as in the valve's maps",
+                    "kiss point {:+.1} kPa, 95 % within {:.1} kPa, {verdict}; of pressures that are as in the valve's maps",
                     kpa * value,
                     kpa * half
                 )
             }
             Quantity::Drag(_) => {
                 let n_m = DRAG_UNIT_N_M;
-                format!("drag {:+.2} N m, 95 % within {:.2} N m, {told}", n_m * value, n_m * half)
+                format!("drag {:+.2} N m, 95 % within {:.2} N m, {verdict}", n_m * value, n_m * half)
             }
             _ => {
                 let more = match quantity {

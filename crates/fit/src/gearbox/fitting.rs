@@ -199,7 +199,7 @@ fn drawn_off(quantities: &Quantities, at: &mut [f64], stated: &mut DMatrix<f64>)
         let Some(place) = quantities.place(Quantity::Inertia(pair)) else { continue };
         let before = quantities.sd_before(place);
         let verdict = Verdict::of(stated[(place, place)].sqrt(), before);
-        if verdict == Verdict::NotTold && at[place].abs() > SIDES * before {
+        if verdict == Verdict::NotIdentifiable && at[place].abs() > SIDES * before {
             found.push((pair, at[place]));
             at[place] = 0.0;
             stated.row_mut(place).fill(0.0);
@@ -313,7 +313,7 @@ impl GearboxFit {
 
     /// What the logs tell of a quantity.
     pub fn verdict(&self, quantity: Quantity) -> Verdict {
-        let Some(place) = self.quantities.place(quantity) else { return Verdict::NotTold };
+        let Some(place) = self.quantities.place(quantity) else { return Verdict::NotIdentifiable };
         Verdict::of(self.sd(quantity), self.quantities.sd_before(place))
     }
 
@@ -380,7 +380,7 @@ mod tests {
     use config::CarFile;
 
     #[test]
-    fn an_inertia_that_is_far_off_and_not_told_is_that_of_the_file() {
+    fn an_inertia_that_is_far_off_and_not_identifiable_is_that_of_the_file() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let car = CarFile::read(&root.join("vehicles/eight_speed.toml")).unwrap();
         let tables = ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();

@@ -6,7 +6,7 @@ use super::command_delay::said_of_commands;
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
 use crate::driving::{Balance, DRAG_UNIT_N_M, MIN_DELAY_S, said_of_delay};
-use crate::fill::{FILL_TOLD_BY, FillFit};
+use crate::fill::{FILL_IDENTIFIED_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::report::{MEAN_GRADE, cautions, fill_row, offset_row, said_of_offset};
 use crate::{BacklashFit, Known, Measure, ReportRow, Verdict, WheelFit, correlated};
@@ -76,7 +76,7 @@ impl GearboxFit {
             Quantity::Delay(at) => self.elements_seen[at],
             Quantity::Gain(at) => self.quantities.measured[at],
             // Of one that is always open or held in these shifts the drag may be told too.
-            Quantity::Drag(at) => self.elements_seen[at] || self.is_told(quantity),
+            Quantity::Drag(at) => self.elements_seen[at] || self.is_identifiable(quantity),
             Quantity::Inertia(at) => self.by_pair[at].iter().any(|count| *count > 0),
             _ => true,
         }
@@ -191,10 +191,10 @@ impl GearboxFit {
 
     /// Delays of output and engine speed, for the channel map.
     fn said_of_channels(&self) -> Vec<String> {
-        const TOLD_BY: &str = "shifts in which the engine changes its speed quickly would tell it";
+        const IDENTIFIED_BY: &str = "shifts in which the engine changes its speed quickly would tell it";
         let mut lines = self.channels.statements();
         let engine = self.engine_late_s();
-        lines.extend(engine.map(|late_s| said_of_delay("engine_speed", "the turbine speed", &late_s, TOLD_BY)));
+        lines.extend(engine.map(|late_s| said_of_delay("engine_speed", "the turbine speed", &late_s, IDENTIFIED_BY)));
         let is_off = engine.is_some_and(|late_s| late_s.is_off_by(MIN_DELAY_S));
         if is_off || self.channels.late_s() != [0.0; 2] {
             lines.push(
@@ -324,8 +324,9 @@ impl GearboxFit {
             ));
         }
         let of_element = |quantity: fn(usize) -> Quantity| {
-            let is_open =
-                |at: usize| quantities.place(quantity(at)).is_some() && self.verdict(quantity(at)) == Verdict::NotTold;
+            let is_open = |at: usize| {
+                quantities.place(quantity(at)).is_some() && self.verdict(quantity(at)) == Verdict::NotIdentifiable
+            };
             let open = (0..quantities.elements.len()).filter(|at| self.elements_seen[*at] && is_open(*at));
             open.map(|at| quantities.elements[at].as_str()).collect::<Vec<_>>().join(", ")
         };
@@ -336,11 +337,11 @@ impl GearboxFit {
             ));
         }
         let torque = of_element(Quantity::Torque);
-        let open = self.seen_fills().filter(|(_, fill)| fill.verdict() == Verdict::NotTold);
+        let open = self.seen_fills().filter(|(_, fill)| fill.verdict() == Verdict::NotIdentifiable);
         let fill = open.map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         if !fill.is_empty() {
             lines.push(format!(
-                "to know more: for the fill volume of {fill}, which is not told by these logs, {FILL_TOLD_BY}"
+                "to know more: for the fill volume of {fill}, which is not told by these logs, {FILL_IDENTIFIED_BY}"
             ));
         }
         if !torque.is_empty() {

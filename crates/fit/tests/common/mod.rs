@@ -296,7 +296,7 @@ impl TestCar {
         let (slips, pressures, commands) = self.points();
         let (car, file) = (&self.car.oncoming, &self.file.oncoming);
         let friction = slips.map(|slip| car.clutch.friction.at(slip) / file.clutch.friction.at(slip));
-        let mut told = vec![
+        let mut identifiable = vec![
             (P::Friction, friction[2].ln()),
             (P::FrictionAtRest, friction[0] / friction[2] - 1.0),
             (P::FrictionSlope, friction[4] / friction[2] - 1.0),
@@ -305,15 +305,15 @@ impl TestCar {
         ];
         let capacity = [0.5, 0.75, 0.95]
             .map(|ratio| self.car.converter.capacity_n_m_s2.at(ratio) / self.file.converter.capacity_n_m_s2.at(ratio));
-        told.extend(around(P::Capacity, Map::Capacity, capacity));
+        identifiable.extend(around(P::Capacity, Map::Capacity, capacity));
         if let (Some(car), Some(file)) = (car.valve.maps(), file.valve.maps()) {
             let lag = pressures.map(|p| car.time_constant_s.at(p) / file.time_constant_s.at(p));
             let gain = commands.map(|a| car.gain_pa_a.at(a) / file.gain_pa_a.at(a));
-            told.extend(around(P::Lag, Map::Lag, lag));
-            told.extend(around(P::Gain, Map::Gain, gain));
+            identifiable.extend(around(P::Lag, Map::Lag, lag));
+            identifiable.extend(around(P::Gain, Map::Gain, gain));
         }
-        self.truth.retain(|(parameter, _)| told.iter().all(|(other, _)| other != parameter));
-        self.truth.extend(told);
+        self.truth.retain(|(parameter, _)| identifiable.iter().all(|(other, _)| other != parameter));
+        self.truth.extend(identifiable);
     }
 
     /// The unknown of a perfect fit.

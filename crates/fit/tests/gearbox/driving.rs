@@ -78,7 +78,7 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
             let sd = with.sd(quantity);
             assert!(error.abs() <= 2.0 * sd, "{seed} {quantity:?}: {error} {sd}");
         }
-        assert_ne!(with.verdict(Quantity::Mass), Verdict::NotTold, "{seed}");
+        assert_ne!(with.verdict(Quantity::Mass), Verdict::NotIdentifiable, "{seed}");
         // Not what verdicts call "not told".
         let before = with.quantities.sd_before(with.quantities.place(Quantity::Mass).unwrap());
         assert!(with.sd_beside_scale(Quantity::Mass) < 0.7 * before, "{}", with.sd_beside_scale(Quantity::Mass));
@@ -96,7 +96,7 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
         for (quantity, key) in
             [(Quantity::EngineInertia, "inertia_kg_m2 = "), (Quantity::Rolling, "rolling_moment_n_m")]
         {
-            assert_eq!(with.verdict(quantity), Verdict::NotTold, "{quantity:?}");
+            assert_eq!(with.verdict(quantity), Verdict::NotIdentifiable, "{quantity:?}");
             let given = drawn.file.source.text.lines().find(|line| line.starts_with(key)).unwrap();
             assert!(file.source.text.lines().any(|line| line == given), "{given}");
         }
@@ -208,7 +208,7 @@ fn constant_speed_in_one_gear_tells_no_mass() {
     let constant = driving(6000, 100.0);
     assert!(constant.time_s() > 55.0, "{}", constant.time_s());
     let fit = fit(&drawn.file, &tables, &shifts, &constant, &mut |_| ()).unwrap();
-    assert_eq!(fit.verdict(Quantity::Mass), Verdict::NotTold, "{}", fit.sd(Quantity::Mass));
+    assert_eq!(fit.verdict(Quantity::Mass), Verdict::NotIdentifiable, "{}", fit.sd(Quantity::Mass));
     assert!(fit.unknown(Quantity::Mass).abs() < 0.05, "{}", fit.unknown(Quantity::Mass));
     // Standing with the engine above idle, and one row.
     for (count, output) in [(6000, 0.0), (1, 100.0), (0, 100.0)] {

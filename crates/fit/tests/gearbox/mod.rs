@@ -146,12 +146,12 @@ fn one_shift_tells_little_and_says_so() {
     // It passes through some pressures, which may tell a kiss point or a lag, and no torque for itself.
     let is_torque =
         |quantity: &Quantity| matches!(quantity, Quantity::Input | Quantity::Torque(_) | Quantity::Inertia(_));
-    let told = fit
+    let identifiable = fit
         .quantities
         .all
         .iter()
         .filter(|quantity| is_torque(quantity) && fit.verdict(**quantity) == Verdict::Measured);
-    assert_eq!(told.count(), 0);
+    assert_eq!(identifiable.count(), 0);
     assert!(held(&drawn, &fit) > 0.9, "{}", held(&drawn, &fit));
     for (place, quantity) in fit.quantities.all.iter().enumerate() {
         assert!(fit.sd(*quantity) <= 1.000_001 * before(place), "{quantity:?}");
@@ -324,7 +324,7 @@ fn a_measured_pressure_tells_friction_and_gain_apart() {
     truth.measure(&mut with, &tables, place, 1);
     let [without, with] = [&recorded.shifts, &with].map(|shifts| fitted(&drawn, shifts));
     let gain = Quantity::Gain(place);
-    assert_eq!((without.verdict(gain), with.verdict(gain)), (Verdict::NotTold, Verdict::Measured));
+    assert_eq!((without.verdict(gain), with.verdict(gain)), (Verdict::NotIdentifiable, Verdict::Measured));
     let error = with.unknown(gain) - drawn.true_unknown(&tables, &with.quantities, gain);
     assert!(error.abs() < 2.0 * with.sd(gain) && with.sd(gain) < 0.01, "{error} {}", with.sd(gain));
     let [before, kept, found] = [None, Some(&without), Some(&with)].map(|fit| match fit {
@@ -370,10 +370,14 @@ fn a_measured_pressure_tells_a_fill_volume() {
     let fill = with.fills[place].unwrap();
     let error = fill.log_volume - drawn.fill[at].ln();
     assert!(
-        fill.shifts > 0 && fill.verdict() != Verdict::NotTold && error.abs() < 2.0 * fill.sd[0],
+        fill.shifts > 0 && fill.verdict() != Verdict::NotIdentifiable && error.abs() < 2.0 * fill.sd[0],
         "{fill:?} {error}"
     );
-    assert!(without.fills.iter().all(|fill| fill.unwrap().verdict() == Verdict::NotTold), "{:?}", without.fills);
+    assert!(
+        without.fills.iter().all(|fill| fill.unwrap().verdict() == Verdict::NotIdentifiable),
+        "{:?}",
+        without.fills
+    );
     let said = without.statements().join("\n");
     assert!(said.contains("for the fill volume of ") && said.contains("measure the pressure"), "{said}");
     let volume = |car: &Car| car.clutches[at].unwrap().cylinder.stroke_m3;

@@ -74,26 +74,25 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         let bent = T::of(0.5) * age_s * (rate - running.rates[k]);
         let noise = square(sensor.std_dev_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
-        let innovation = reading.value - scale * then;
-        let measured = Measured { row, innovation, noise };
+        let measured = Measured { row, innovation: reading.value - scale * then, noise };
         if k == WHEEL && !self.is_of_this_car(running, reading, age_s) {
             return ChannelHealth::Refused;
         }
-        let mut look = running.x.look(&measured);
-        let variance = look.variance;
+        let mut innovation = running.x.innovation(&measured);
         if k != WHEEL {
             let fraction = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
-            running.misfit = running.misfit + fraction * (innovation * innovation / variance - running.misfit);
+            running.misfit =
+                running.misfit + fraction * (square(innovation.value) / innovation.variance - running.misfit);
         }
-        match running.gates[k].judge(innovation, variance) {
+        match running.gates[k].judge(innovation.value, innovation.variance) {
             Verdict::Refused => return ChannelHealth::Refused,
             Verdict::Jumped => {
-                running.x.add(k, k, innovation * innovation);
-                look = running.x.look(&measured);
+                running.x.add(k, k, square(innovation.value));
+                innovation = running.x.innovation(&measured);
             }
             Verdict::Taken => {}
         }
-        running.x.correct(&look);
+        running.x.correct(&innovation);
         running.silent_s[k] = T::zero();
         ChannelHealth::Good
     }

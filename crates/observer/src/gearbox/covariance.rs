@@ -27,9 +27,9 @@ pub(super) struct Measured<T> {
     pub(super) noise: T,
 }
 
-/// A measurement beside what the states say.
-pub(super) struct Look<T> {
-    pub(super) innovation: T,
+/// What a measurement differs by from the prediction of the states.
+pub(super) struct Innovation<T> {
+    pub(super) value: T,
     /// Its variance.
     pub(super) variance: T,
     /// Covariance of the states with it.
@@ -198,37 +198,41 @@ impl<T: Real> Gaussian<T> {
         with
     }
 
-    /// What a measurement says beside the states.
-    pub(super) fn look(&self, measured: &Measured<T>) -> Look<T> {
+    /// The innovation of a measurement, with its variance.
+    pub(super) fn innovation(&self, measured: &Measured<T>) -> Innovation<T> {
         if self.in_gear() {
-            return self.look_first::<IN_GEAR>(measured);
+            return self.innovation_of_first::<IN_GEAR>(measured);
         }
-        Look { by_timing: self.timing.of(&measured.row), ..self.look_first::<N>(measured) }
+        Innovation { by_timing: self.timing.of(&measured.row), ..self.innovation_of_first::<N>(measured) }
     }
 
-    fn look_first<const M: usize>(&self, measured: &Measured<T>) -> Look<T> {
+    fn innovation_of_first<const M: usize>(&self, measured: &Measured<T>) -> Innovation<T> {
         let with = self.with_first::<M>(&measured.row);
         let variance = dot_first::<T, M>(&with, &measured.row).at_least(T::zero()) + measured.noise;
-        Look { innovation: measured.innovation, variance, with, by_timing: [T::zero(); TIMINGS] }
+        Innovation { value: measured.innovation, variance, with, by_timing: [T::zero(); TIMINGS] }
     }
 
     /// Corrects by a measurement: `x + S e/V`, `P - S S'/V`. The product is made of two equal factors, so that `P` stays
     /// symmetric to the last digit.
-    pub(super) fn correct(&mut self, look: &Look<T>) {
-        if look.variance <= T::zero() {
+    pub(super) fn correct(&mut self, innovation: &Innovation<T>) {
+        if innovation.variance <= T::zero() {
             return;
         }
         if self.in_gear() {
-            return self.correct_first::<IN_GEAR>(look);
+            return self.correct_first::<IN_GEAR>(innovation);
         }
-        let per = look.variance.sqrt().recip();
-        self.timing.take(&look.by_timing.map(|by| per * by), per * look.innovation, &look.with.map(|with| per * with));
-        self.correct_first::<N>(look);
+        let per = innovation.variance.sqrt().recip();
+        self.timing.take(
+            &innovation.by_timing.map(|by| per * by),
+            per * innovation.value,
+            &innovation.with.map(|with| per * with),
+        );
+        self.correct_first::<N>(innovation);
     }
 
-    fn correct_first<const M: usize>(&mut self, look: &Look<T>) {
-        let per = look.variance.sqrt().recip();
-        let Some(with) = look.with.first_chunk::<M>() else { return };
+    fn correct_first<const M: usize>(&mut self, innovation: &Innovation<T>) {
+        let per = innovation.variance.sqrt().recip();
+        let Some(with) = innovation.with.first_chunk::<M>() else { return };
         let factor = with.map(|with| per * with);
         for (i, (row, own)) in self.covariance.iter_mut().zip(&factor).enumerate() {
             let Some(row) = row.first_chunk_mut::<M>() else { continue };
@@ -239,7 +243,7 @@ impl<T: Real> Gaussian<T> {
                 *variance = variance.at_least(T::zero());
             }
         }
-        let innovation = per * look.innovation;
+        let innovation = per * innovation.value;
         for (x, factor) in self.mean.iter_mut().zip(&factor) {
             *x = *x + *factor * innovation;
         }
@@ -299,9 +303,9 @@ mod tests {
             let mut x = states(active);
             x.pass(&rows, &[1.0, 2.0, 3.0, 4.0]);
             x.fade(IN_GEAR - 1, 0.9);
-            let look = x.look(&measured);
-            x.correct(&look);
-            (x, ([look.variance, x.variance(&measured.row), x.value(&measured.row)], x.is_sound()))
+            let innovation = x.innovation(&measured);
+            x.correct(&innovation);
+            (x, ([innovation.variance, x.variance(&measured.row), x.value(&measured.row)], x.is_sound()))
         };
         let (gear, found) = after(IN_GEAR);
         let (whole, all) = after(N);

@@ -12,7 +12,7 @@
 //! | `l`, `d` | element | lag and delay of its valve: the valve model is changed by them, and the filter has no states of them |
 //!
 //! Together they are one Gaussian, each in units of the standard deviation that it has unlearnt. A shift begins with the ten of
-//! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift. What it shows ([`Shown`])
+//! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift. What it shows ([`InformationGain`])
 //! are up to ten measurements of these, with noise of variance one, and one Kalman filter of all quantities takes them:
 //!
 //! ```text
@@ -43,8 +43,8 @@
 use drivetrain::Real;
 
 use super::elements::ValveTiming;
+use super::information::{InformationGain, Matrix, around, cholesky, is_positive, lower_inverse};
 use super::powertrain::dot;
-use super::shown::{Matrix, Shown, around, cholesky, is_positive, lower_inverse};
 use super::systematic::is_considered;
 use super::tables::MAX_ELEMENTS;
 
@@ -391,9 +391,9 @@ impl<T: Real> Learnt<T> {
         after: &Known<T>,
         correlations: &Correlations<T>,
     ) -> bool {
-        let Some(shown) = Shown::between(before, after) else { return false };
-        let by_car = Innovation::of(|k| self.mean[k], |i, j| self.covariance[i][j], acting, &shown);
-        let by_budget = Innovation::of(|_| T::zero(), |i, j| unlearnt(correlations, i, j), acting, &shown);
+        let Some(gain) = InformationGain::between(before, after) else { return false };
+        let by_car = Innovation::of(|k| self.mean[k], |i, j| self.covariance[i][j], acting, &gain);
+        let by_budget = Innovation::of(|_| T::zero(), |i, j| unlearnt(correlations, i, j), acting, &gain);
         let (Some(mut by_car), Some(by_budget)) = (by_car, by_budget) else {
             return false;
         };
@@ -569,7 +569,7 @@ impl<T: Real> Innovation<T> {
         mean: impl Fn(usize) -> T,
         covariance_of_all: impl Fn(usize, usize) -> T,
         acting: &Acting<T>,
-        shown: &Shown<T>,
+        gain: &InformationGain<T>,
     ) -> Option<Self> {
         let seen: [[T; ACTING]; LEARNT] = core::array::from_fn(|k| acting.seen(|place| covariance_of_all(k, place)));
         // `(H, s) P (H, s)' + D`, by its rows: `seen` is `P (H, s)'`.
@@ -577,17 +577,17 @@ impl<T: Real> Innovation<T> {
         for (a, row) in covariance.iter_mut().enumerate() {
             row[a] = row[a] + acting.per_unit(a).1;
         }
-        let mut noisy = around(&shown.rows, &covariance);
+        let mut noisy = around(&gain.rows, &covariance);
         for (k, row) in noisy.iter_mut().enumerate() {
             row[k] = row[k] + T::one();
         }
         let lower = cholesky(&noisy)?;
         let inverse = lower_inverse(&lower);
         let expected = acting.seen(mean);
-        let beside: [T; ACTING] = core::array::from_fn(|i| shown.values[i] - dot(&shown.rows[i], &expected));
+        let beside: [T; ACTING] = core::array::from_fn(|i| gain.values[i] - dot(&gain.rows[i], &expected));
         let innovation = inverse.map(|row| dot(&row, &beside));
         let with = seen.map(|row| {
-            let by_value = shown.rows.map(|of| dot(&of, &row));
+            let by_value = gain.rows.map(|of| dot(&of, &row));
             inverse.map(|row| dot(&row, &by_value))
         });
         let distance = dot(&innovation, &innovation);

@@ -15,9 +15,9 @@
 
 use drivetrain::Real;
 
+use super::information::{cholesky, lower_inverse};
 use super::learnt::{ACTING, Known, STATES_ACTING};
 use super::powertrain::{CORE, dot};
-use super::shown::{cholesky, lower_inverse};
 use super::{LASTING, N, OUTPUT, PRESSURE, TURBINE};
 
 /// Lag and delay of the offgoing, then of the oncoming clutch.
@@ -229,8 +229,8 @@ mod tests {
             let row: [f64; N] = core::array::from_fn(|k| number(seed + 300 + k));
             let (value, noise) = (number(seed + 400), 0.3);
             x.timing.add_pressure(&by);
-            let look = x.look(&Measured { row, innovation: value - dot(&row, &x.mean), noise });
-            x.correct(&look);
+            let innovation = x.innovation(&Measured { row, innovation: value - dot(&row, &x.mean), noise });
+            x.correct(&innovation);
             x.timing.add_pressure(&back);
             whole.correct(&row, &by, value, noise);
         }

@@ -77,19 +77,19 @@ impl<T: Real> KalmanFilter<T> {
         rate_n_m_s: T,
     ) {
         let Some(running) = &mut state.running else { return };
-        let (one, told) = (T::one(), &self.reported);
+        let (one, reported) = (T::one(), &self.reported);
         let (acceleration, acceleration_std_dev) = engine.acceleration();
         let (speed, turbine) = (engine.speed_before(reading.age_s), running.mean[TURBINE]);
         let by_map = self.model.rigid.converter.torques(speed, turbine);
         let ratio = self.model.rigid.converter.torque_ratio.at(turbine / speed.at_least(one));
-        let found = ratio * (reading.value - told.engine_kg_m2 * acceleration);
+        let found = ratio * (reading.value - reported.engine_kg_m2 * acceleration);
         let square = |x: T| x * x;
         // Its error lasts as long as that of the maps: readings within this time count as one.
         let alike = (T::of(2.0) * self.uncertainty.turbine_share_s / since_s).at_least(one);
         // It is old, and compared with an acceleration that is found late.
         let changed = rate_n_m_s * (reading.age_s + T::of(SETTLED_S));
-        let own = alike * (square(told.fraction * reading.value.abs() + told.beside_n_m) + square(changed));
-        let noise = square(ratio) * (own + square(told.engine_kg_m2 * acceleration_std_dev));
+        let own = alike * (square(reported.fraction * reading.value.abs() + reported.beside_n_m) + square(changed));
+        let noise = square(ratio) * (own + square(reported.engine_kg_m2 * acceleration_std_dev));
         let mut measured = running.covariance.with_state::<FRACTION>(by_map.turbine_n_m);
         measured.variance = (by_map.turbine_n_m * measured.with[FRACTION]).at_least(T::zero()) + noise;
         let innovation = found - by_map.turbine_n_m * (one + running.mean[FRACTION]);

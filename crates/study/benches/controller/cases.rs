@@ -49,7 +49,7 @@ pub(crate) fn cases() -> Vec<Case> {
     let car = |file: &str| VehicleFile::read(&root().join("vehicles").join(file)).unwrap().vehicle;
     let mut cases = Vec::new();
     for (note, vehicle) in [("", car("two_speed_at.toml")), (", piston stroke", car("two_speed_stroke.toml"))] {
-        let told = ExperimentFile::bench().unwrap().experiment.sensors_told;
+        let told = ExperimentFile::bench().unwrap().experiment.sensors_given;
         let range = range(&vehicle);
         let (readings, filter) = (readings(&vehicle), kalman_filter(&vehicle, told.as_ref()));
         let rigid = rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains());

@@ -98,7 +98,7 @@ fn steps(observer: impl Estimator<f64, State: 'static> + 'static) -> Box<dyn FnM
 }
 
 fn kalman_step() -> Box<dyn FnMut()> {
-    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_told;
+    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_given;
     steps(kalman_filter(&vehicle(), sensors.as_ref()))
 }
 
@@ -143,7 +143,7 @@ fn estimate_rows() -> Box<dyn FnMut()> {
 
 /// An observer for such a log.
 fn observer(kind: ObserverKind) -> AnyObserver {
-    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_told;
+    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_given;
     AnyObserver::designed(&vehicle(), kind, GainMethod::Iss, SAMPLE_TIME_S, sensors.as_ref()).unwrap()
 }
 

@@ -26,7 +26,7 @@ fn over_shift<'a, O: Estimator<f64> + 'a>(observer: O, samples: &'a [Input<f64>]
 /// The table of all observers, with its figure.
 pub(crate) fn steps(page: &mut String) -> Figure {
     let (vehicle, samples) = (vehicle(), samples());
-    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_told;
+    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_given;
     let mut names = Vec::new();
     let mut jobs = Vec::new();
     // By itself, with its guaranteed ranges, and with the range of the shaft torque too.

@@ -55,17 +55,17 @@ impl Found {
     /// Errors after thirty shifts, N m: of a filter that is told nothing, and of one that is told the timing.
     fn print(&self, name: &str) -> [f64; 2] {
         let of = |count: usize| self.0.each_ref().map(|sums| sums[count].all()[0]);
-        let ([before, before_told], [after, after_told]) = (of(0), of(1));
-        let less = |told: f64, untold: f64| 100.0 * (1.0 - told / untold);
+        let ([before, before_given], [after, after_given]) = (of(0), of(1));
+        let less = |told: f64, unknown: f64| 100.0 * (1.0 - told / unknown);
         println!(
-            "{name}: unlearnt {before:.2}, told {before_told:.2} ({:.1} % less); after {SHIFTS} shifts {after:.2}, told {after_told:.2} ({:.1} % less)",
-            less(before_told, before),
-            less(after_told, after)
+            "{name}: unlearnt {before:.2}, told {before_given:.2} ({:.1} % less); after {SHIFTS} shifts {after:.2}, told {after_given:.2} ({:.1} % less)",
+            less(before_given, before),
+            less(after_given, after)
         );
         for (who, sums) in ["told nothing", "told"].iter().zip(&self.0) {
             println!("    {who}: {}", sums[1].show());
         }
-        [after, after_told]
+        [after, after_given]
     }
 }
 
@@ -111,7 +111,7 @@ fn in_thirty_shifts_lag_and_delay_are_learnt() {
             |at: usize| draw.timing[at].map_or((1.0, None), |ValveTiming { lag, delay_s, .. }| (lag, Some(delay_s)));
         found.add(&car, &[truth, told(&car, timing)], seed);
     }
-    let [after, after_told] = found.print("cars of the whole budget");
+    let [after, after_given] = found.print("cars of the whole budget");
     let before = found.0[0][0].all()[0];
-    assert!(after < 0.7 * before && after < 1.4 * after_told, "{before} {after} {after_told}");
+    assert!(after < 0.7 * before && after < 1.4 * after_given, "{before} {after} {after_given}");
 }

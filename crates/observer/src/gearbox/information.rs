@@ -25,12 +25,12 @@ const LEFT: (f64, f64) = (1e-4, 0.99);
 const SWEEPS: usize = 6;
 
 /// Measurements of the acting quantities with noise of variance one; a row of zeros where nothing was seen.
-pub(super) struct Shown<T> {
+pub(super) struct InformationGain<T> {
     pub(super) rows: Matrix<T>,
     pub(super) values: [T; ACTING],
 }
 
-impl<T: Real> Shown<T> {
+impl<T: Real> InformationGain<T> {
     /// What leads from the one knowledge to the other; `None` if these are not means and covariances.
     pub(super) fn between(before: &Known<T>, after: &Known<T>) -> Option<Self> {
         let root = lower_inverse(&cholesky(&before.covariance)?);
@@ -40,9 +40,9 @@ impl<T: Real> Shown<T> {
         if !parts.iter().chain(&moved).all(|x| x.is_finite()) {
             return None;
         }
-        let mut shown = Self { rows: [[T::zero(); ACTING]; ACTING], values: [T::zero(); ACTING] };
+        let mut gain = Self { rows: [[T::zero(); ACTING]; ACTING], values: [T::zero(); ACTING] };
         for ((row, value), (part, direction)) in
-            shown.rows.iter_mut().zip(&mut shown.values).zip(parts.iter().zip(&directions))
+            gain.rows.iter_mut().zip(&mut gain.values).zip(parts.iter().zip(&directions))
         {
             let part = part.max(T::of(LEFT.0));
             if part > T::of(LEFT.1) {
@@ -56,7 +56,7 @@ impl<T: Real> Shown<T> {
             }
             *value = dot(row, &before.mean) + dot(direction, &moved) / (part * root_of_information);
         }
-        Some(shown)
+        Some(gain)
     }
 }
 
@@ -206,8 +206,8 @@ mod tests {
                 after.covariance[a][b] -= with[a] * with[b] / variance;
             }
         }
-        let shown = Shown::between(&before, &after).unwrap();
-        let mut seen = shown.rows.iter().zip(&shown.values).filter(|(row, _)| **row != [0.0; ACTING]);
+        let gain = InformationGain::between(&before, &after).unwrap();
+        let mut seen = gain.rows.iter().zip(&gain.values).filter(|(row, _)| **row != [0.0; ACTING]);
         let (row, found) = seen.next().unwrap();
         assert!(seen.next().is_none());
         let sign = (row[0] * h[0]).signum();
@@ -216,6 +216,6 @@ mod tests {
         }
         assert!((found - sign * value / noise.sqrt()).abs() < 1e-9);
         after.covariance[3][3] = f64::NAN;
-        assert!(Shown::between(&before, &after).is_none());
+        assert!(InformationGain::between(&before, &after).is_none());
     }
 }
