@@ -27,6 +27,7 @@ pub mod error_budget;
 mod experiment;
 mod fill_budget;
 mod ids;
+mod input;
 #[cfg(feature = "std")]
 mod observers;
 #[cfg(feature = "std")]
@@ -51,7 +52,8 @@ mod vehicle;
 pub use discretisation::Discretisation;
 pub use fill_budget::FillBudget;
 pub use ids::{ElementId, Gear, GearId, MAX_ELEMENTS, ShiftId};
-pub use reading::Reading;
+pub use input::Input;
+pub use reading::{LOST_S, Reading};
 pub use step::{Commands, ShiftCommand, Speeds, Step};
 
 #[cfg(feature = "std")]

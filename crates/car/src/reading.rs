@@ -2,6 +2,9 @@
 
 use drivetrain::Real;
 
+/// Time without a reading after which a channel is lost, and without any speed after which a filter begins anew, s.
+pub const LOST_S: f64 = 0.25;
+
 /// The newest value of a sensor or a controller, and how old it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -7,7 +7,7 @@ use design::{
     Model, compliant_observer, design_compliant, design_discrete, inversion, kalman_filter, rigid_observer,
     unscented_filter,
 };
-use observer::{Estimator, Health, Input, Phase, RigidGains, RigidObserver, RigidState, Sample, SampleEstimator};
+use observer::{Estimator, Health, Phase, RigidGains, RigidObserver, RigidState, Sample, SampleEstimator};
 
 #[test]
 fn a_reading_that_no_pressure_explains_is_rejected_and_nothing_possible_is_left() {
@@ -43,7 +43,7 @@ fn says_so(observer: &impl Estimator<f64>, name: &str) {
     let usable = Sample { wheel_rad_s: 40.0, ..input(0.01, 300.0, 300.0, 0.0) };
     let mut state = observer.start();
     let mut health = |input: Sample<f64>| {
-        observer.step(&mut state, &Input::of_sample(&input, &VehicleFile::built_in().unwrap().vehicle.shift)).health
+        observer.step(&mut state, &input.input(&VehicleFile::built_in().unwrap().vehicle.shift)).health
     };
     assert_eq!([(); 3].map(|()| health(usable)), [Health::Good; 3], "{name}: the first start is no new one");
     // The gap is longer than any gain is made for.

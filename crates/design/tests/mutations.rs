@@ -9,7 +9,7 @@ use design::{
     Model, Quantity, best_compliant, best_rigid, bounded, compliant_observer, design_discrete_phase, design_sliding,
     extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
 };
-use observer::{Estimator, Input, Phase, RigidGains, Sample};
+use observer::{Estimator, Phase, RigidGains, Sample};
 
 /// A few samples through a shift; every estimate must be a number.
 fn runs(observer: &impl Estimator<f64>, vehicle: &Vehicle, name: &str) {
@@ -24,7 +24,7 @@ fn runs(observer: &impl Estimator<f64>, vehicle: &Vehicle, name: &str) {
             wheel_rad_s: 45.0 + turned,
             command: vehicle.settings.command_max * (0.3 + 0.2 * turned),
         };
-        let estimate = observer.step(&mut state, &Input::of_sample(&input, &vehicle.shift));
+        let estimate = observer.step(&mut state, &input.input(&vehicle.shift));
         assert!(estimate.pressure_pa.is_finite() && estimate.clutch_torque_n_m.is_finite(), "{name}: {n} {estimate:?}");
     }
 }

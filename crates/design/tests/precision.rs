@@ -7,7 +7,7 @@ use design::{
     Model, compliant_observer, design_compliant, design_discrete, inversion, kalman_filter, rigid_observer,
     super_twisting, unscented_filter,
 };
-use observer::{Estimator, Input, Phase, Sample};
+use observer::{Estimator, Phase, Sample};
 
 #[test]
 fn single_precision_follows_double_precision() {
@@ -51,10 +51,7 @@ fn assert_single_follows_double(double: &impl Estimator<f64>, single: &impl Esti
             wheel_rad_s: x.wheel_rad_s as f32,
             command: x.command as f32,
         };
-        let (x, y) = (
-            double.step(&mut a, &Input::of_sample(&x, &shift)),
-            single.step(&mut b, &Input::of_sample(&y, &shift.cast())),
-        );
+        let (x, y) = (double.step(&mut a, &x.input(&shift)), single.step(&mut b, &y.input(&shift.cast())));
         assert_eq!(x.phase, y.phase);
         let difference = (x.pressure_pa - f64::from(y.pressure_pa)).abs();
         assert!(difference < tolerance_pa, "{n}: {} {}", x.pressure_pa, y.pressure_pa);

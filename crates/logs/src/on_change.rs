@@ -5,7 +5,7 @@
 //! map a log shows it: two samples that come soon after each other never have the same value, and for most of the time none comes,
 //! more than once.
 
-use observer::{LOST_S, Reading};
+use car::{LOST_S, Reading};
 
 /// Pauses that are needed, so that one loss of a channel is none, and samples soon after each other \[chosen\].
 const PAUSES: u32 = 2;

@@ -4,7 +4,7 @@
 //! give a second one. So every reading reaches the observer once, with its age; the channel with the highest rate sets the steps. Rows
 //! of a table, in which all channels share a time, make one step each.
 
-use observer::{Input, Reading as Measured};
+use car::{Input, Reading as Measured};
 
 use crate::samples::BEHIND_S;
 use crate::{LogError, Reading, Readings, Role};

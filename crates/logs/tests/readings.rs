@@ -164,9 +164,8 @@ fn stamps_that_are_late_or_early_are_moved() {
     assert!(read.windows(2).all(|pair| pair[0].stamp_s <= pair[1].stamp_s));
     let mut log = Log::open(&folder.write("log.csv", &text), &map.open).unwrap();
     let steps = Steps::new(Readings::new(&mut log, &map).unwrap()).collect::<Result<Vec<_>, _>>().unwrap();
-    let row = |reading: Option<observer::Reading<f64>>| {
-        reading.map(|reading| (reading.value / 0.104_719_755_119_659_77).round())
-    };
+    let row =
+        |reading: Option<car::Reading<f64>>| reading.map(|reading| (reading.value / 0.104_719_755_119_659_77).round());
     let step = steps.iter().find(|step| (step.time_s - 0.2).abs() < 1e-6).unwrap();
     assert_eq!(
         [step.input.engine_rad_s, step.input.turbine_rad_s, step.input.wheel_rad_s].map(row),
@@ -295,7 +294,7 @@ fn every_reading_reaches_the_observer_once_with_its_age() {
     assert_eq!((engines, turbines, steps.len()), (41, 40, 41));
     for step in &steps[1..40] {
         assert!((step.input.dt_s - 0.01).abs() < 1e-6);
-        let age = |reading: Option<observer::Reading<f64>>| reading.unwrap().age_s;
+        let age = |reading: Option<car::Reading<f64>>| reading.unwrap().age_s;
         assert!((age(step.input.engine_rad_s) - 0.002).abs() < 1e-6 && age(step.input.turbine_rad_s).abs() < 1e-9);
         assert!(step.input.output_rad_s.is_none() && step.input.command.is_none());
     }

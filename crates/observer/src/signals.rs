@@ -1,77 +1,9 @@
 //! Inputs and outputs of an observer.
 
-pub use car::Reading;
+pub use car::{Input, LOST_S, Reading};
 use drivetrain::{Real, ReducedShift};
 
 use crate::{Aligned, Bounds, Phase, Tracker};
-
-/// What came since the step before: of each channel the newest reading, or none. Channels may come at any rate, in any
-/// phase and in any order.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Input<T> {
-    /// Time since the step before, s. Ignored in the first step.
-    pub dt_s: T,
-    /// Engine speed `w_e`, rad/s.
-    pub engine_rad_s: Option<Reading<T>>,
-    /// Turbine speed `w_t`, rad/s.
-    pub turbine_rad_s: Option<Reading<T>>,
-    /// Speed of the gearbox output `w_0`, rad/s.
-    pub output_rad_s: Option<Reading<T>>,
-    /// Speed of the driven wheels `w_w`, rad/s.
-    pub wheel_rad_s: Option<Reading<T>>,
-    /// Command of the oncoming clutch's valve: current in A, or duty cycle in %.
-    pub command: Option<Reading<T>>,
-    /// Command of the offgoing clutch's valve, in the same unit. A log may do without.
-    pub offgoing_command: Option<Reading<T>>,
-    /// Torque of the engine as its controller reports it, N m: that of combustion less its friction, before the inertia. A log
-    /// may do without.
-    pub engine_torque_n_m: Option<Reading<T>>,
-}
-
-impl<T: Real> Input<T> {
-    /// A step of this time, s, in which nothing came.
-    pub const fn none(dt_s: T) -> Self {
-        Self {
-            dt_s,
-            engine_rad_s: None,
-            turbine_rad_s: None,
-            output_rad_s: None,
-            wheel_rad_s: None,
-            command: None,
-            offgoing_command: None,
-            engine_torque_n_m: None,
-        }
-    }
-
-    /// The same input in another precision.
-    pub fn cast<U: Real>(&self) -> Input<U> {
-        let to = |reading: Option<Reading<T>>| reading.map(|reading| reading.cast());
-        Input {
-            dt_s: U::of(self.dt_s.to_f64_exact()),
-            engine_rad_s: to(self.engine_rad_s),
-            turbine_rad_s: to(self.turbine_rad_s),
-            output_rad_s: to(self.output_rad_s),
-            wheel_rad_s: to(self.wheel_rad_s),
-            command: to(self.command),
-            offgoing_command: to(self.offgoing_command),
-            engine_torque_n_m: to(self.engine_torque_n_m),
-        }
-    }
-
-    /// Readings of every channel at the moment of the step.
-    pub fn of_sample(sample: &Sample<T>, shift: &ReducedShift<T>) -> Self {
-        let now = |value: T| Some(Reading::now(value));
-        Self {
-            engine_rad_s: now(sample.engine_rad_s),
-            turbine_rad_s: now(sample.turbine_rad_s),
-            output_rad_s: now(shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s)),
-            wheel_rad_s: now(sample.wheel_rad_s),
-            command: now(sample.command),
-            ..Self::none(sample.dt_s)
-        }
-    }
-}
 
 /// All signals at one time, as an observer with a fixed sample time needs them. A value that is not a number is not
 /// known.
@@ -89,6 +21,21 @@ pub struct Sample<T> {
     pub wheel_rad_s: T,
     /// Command of the oncoming clutch's valve: current in A, or duty cycle in %.
     pub command: T,
+}
+
+impl<T: Real> Sample<T> {
+    /// The same as readings of every channel at the moment of the step.
+    pub fn input(&self, shift: &ReducedShift<T>) -> Input<T> {
+        let now = |value: T| Some(Reading::now(value));
+        Input {
+            engine_rad_s: now(self.engine_rad_s),
+            turbine_rad_s: now(self.turbine_rad_s),
+            output_rad_s: now(shift.output_speed(self.turbine_rad_s, self.slip_rad_s)),
+            wheel_rad_s: now(self.wheel_rad_s),
+            command: now(self.command),
+            ..Input::none(self.dt_s)
+        }
+    }
 }
 
 /// Ranges outside which an input cannot be a measurement, and an estimate cannot be a pressure.
@@ -269,9 +216,6 @@ impl Health {
         }
     }
 }
-
-/// Time without a reading after which a channel is lost, and without any speed after which a filter begins anew, s.
-pub const LOST_S: f64 = 0.25;
 
 /// What became of a channel in one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,6 +1,6 @@
 //! A speed on its way through a log.
 
-use observer::LOST_S;
+use car::LOST_S;
 
 /// The newest reading of a speed, as long as it says something of the car: a channel that dies leaves its last reading.
 #[derive(Debug, Clone, Copy, Default)]

@@ -68,7 +68,7 @@ pub(crate) fn slow_log(median_s: f64) -> Option<String> {
         format!(
             "warning: the middle time between two rows is {median_s:.3} s, too long for the estimate of a shift: an inertia phase takes 0.3 to 1 s, \
              and {} s without a reading count as a lost channel\nhint: record speeds and commands every {LONGEST_S} s or more often",
-            observer::LOST_S
+            car::LOST_S
         )
     })
 }
