@@ -20,7 +20,7 @@ const ALLOWED: [(&str, &[&str]); 18] = [
     // A file of what a filter has learnt has the numbers of the filter.
     ("config", &["car", "drivetrain", "geartrain", "observer", "trace"]),
     // It writes the fitted file and tries inertias by it.
-    ("fit", &["car", "config", "design", "drivetrain", "geartrain", "logs", "observer", "trace"]),
+    ("fit", &["car", "config", "drivetrain", "geartrain", "logs", "observer", "trace"]),
     ("study", &["car", "config", "design", "drivetrain", "evaluate", "logs", "observer", "plant", "trace"]),
     ("report", &["car", "config", "design", "drivetrain", "fit", "geartrain", "logs", "observer", "study", "trace"]),
     ("fuzz", &["car", "config", "design", "drivetrain", "logs", "observer", "plant", "report", "study", "trace"]),
