@@ -47,7 +47,8 @@ pub use certificate::{Certificate, VertexMargin, error_bound};
 pub use compliant::{CompliantCertificate, CompliantDesign, best_compliant, compliant_observer, design_compliant};
 pub use discrete::given::{UnstableCorner, longest_stable_step_s, longest_step_of, unstable_corners};
 pub use discrete::{
-    DiscreteCertificate, DiscreteDesign, Model, Quantity, SolverRecord, design_discrete, design_discrete_phase,
+    DiscreteCertificate, DiscreteDesign, ErrorModel, Model, Quantity, SolverRecord, design_discrete,
+    design_discrete_phase, error_models,
 };
 pub use iss::{DesignError, IssRequirement, OffsetMissed, design_iss};
 pub use kalman::{extended_filter, kalman_filter, open_loop_maps, unscented_filter};

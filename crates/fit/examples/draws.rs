@@ -8,6 +8,8 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
+use std::ops::ControlFlow::Continue;
+
 use config::vehicle::short::{Facts, ValveKind, short_file};
 use config::{Source, VehicleFile};
 
@@ -98,7 +100,11 @@ fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
     let driving = driving.map_or_else(Vec::new, |log| car.collected(&log, "draws").driving);
     let begin_s = cpu_s();
     let mut iterations = 0;
-    let fit = fit::fit(&car.file, &records, &driving, ages, &mut |_| iterations += 1).unwrap();
+    let fit = fit::fit(&car.file, &records, &driving, ages, &mut |_| {
+        iterations += 1;
+        Continue(())
+    })
+    .unwrap();
     let cpu_s = cpu_s() - begin_s;
     let fitted = fit.vehicle_file(&car.file, "a simulation").unwrap();
     let held_out: Vec<TestShift> = (100..100 + HELD_OUT).map(|number| car.shift(number, logs)).collect();

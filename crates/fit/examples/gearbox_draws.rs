@@ -13,6 +13,8 @@ mod drawn;
 #[path = "../tests/gearbox/estimated.rs"]
 mod estimated;
 
+use std::ops::ControlFlow::Continue;
+
 use car::{Car, Drive, DriveSegment};
 use config::DriveFile;
 use drawn::{Case, Drawn, every_fifth};
@@ -58,7 +60,11 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     }
     let begin = std::time::Instant::now();
     let mut iterations = 0;
-    let fit = fit::gearbox::fit(&drawn.file, &tables, &fitted, &driving, &mut |_| iterations += 1).unwrap();
+    let fit = fit::gearbox::fit(&drawn.file, &tables, &fitted, &driving, &mut |_| {
+        iterations += 1;
+        Continue(())
+    })
+    .unwrap();
     let seconds = begin.elapsed().as_secs_f64();
     let file = |checked| fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a simulation", checked).unwrap();
     let unchecked = file(None);

@@ -21,6 +21,19 @@ const BEFORE_S: f64 = 2.0;
 /// And until so long after it, s.
 const AFTER_S: f64 = 1.5;
 
+/// A log as a fit reads it: twice.
+#[derive(Clone, Copy)]
+pub struct LogSource<'a> {
+    /// What messages call it.
+    pub path: &'a Path,
+    /// Its channels; none where they have the names of the program.
+    pub map: &'a ChannelMap,
+    /// Opens it at its begin.
+    pub open: &'a dyn Fn() -> Result<Log, LogError>,
+    /// Whether the reading is to end with an error.
+    pub is_stopped: &'a dyn Fn() -> bool,
+}
+
 /// What was found in a log.
 #[derive(Debug, Clone, Default)]
 pub struct Collected {
@@ -86,19 +99,20 @@ pub fn own_names(log: &Log) -> Result<ChannelMap, FitError> {
 /// Finds the shifts of the vehicle in a log. Without channels in the map, the log has the names of the program.
 ///
 /// # Errors
-/// The log cannot be read, or lacks a channel that a fit needs.
-pub fn collect(path: &Path, map: &ChannelMap, vehicle: &VehicleFile) -> Result<Collected, FitError> {
+/// The log cannot be read, lacks a channel that a fit needs, or the reading was stopped.
+pub fn collect(source: LogSource<'_>, vehicle: &VehicleFile) -> Result<Collected, FitError> {
+    let LogSource { path, map, .. } = source;
     if path == Path::new("-") {
         return Err(FitError::input("a fit reads a log twice\nhint: give a file in place of standard input"));
     }
     let ratios = vec![vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
-    let mut log = Log::open(path, &map.open)?;
+    let mut log = (source.open)()?;
     let mut map =
         if map.channels.is_empty() { ChannelMap { open: map.open.clone(), ..own_names(&log)? } } else { map.clone() };
     map.gearbox = Gearbox { ratios, ..map.gearbox };
     let commands = commands(vehicle);
     needed(path, &map, commands[0])?;
-    let (shifts, mut notes) = find(&mut log, &map)?;
+    let (shifts, mut notes) = find(&mut log, &map, source.is_stopped)?;
     let mut collected = Collected::default();
     let mut between = BetweenShifts::new(vehicle, &shifts)?;
     let mut usable = Vec::new();
@@ -112,7 +126,7 @@ pub fn collect(path: &Path, map: &ChannelMap, vehicle: &VehicleFile) -> Result<C
         }
     }
     collected.notes.append(&mut notes);
-    for (mut record, shift) in read(path, &map, commands, &usable, &mut between)?.into_iter().zip(&usable) {
+    for (mut record, shift) in read(source, &map, commands, &usable, &mut between)?.into_iter().zip(&usable) {
         let found = record.find_segments(&vehicle.shift);
         collected.kinds.count(shift.direction, shift.load, found.is_ok());
         match found {
@@ -161,12 +175,15 @@ fn name(path: &Path, time_s: f64) -> String {
 }
 
 /// The shifts of a log, and what is to be said about its channels.
-fn find(log: &mut Log, map: &ChannelMap) -> Result<(Vec<Shift>, Vec<String>), FitError> {
+fn find(log: &mut Log, map: &ChannelMap, is_stopped: &dyn Fn() -> bool) -> Result<(Vec<Shift>, Vec<String>), FitError> {
     let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
     let mut readings = Readings::new(log, map)?;
     let mut resets = 0;
     while let Some(reading) = readings.next_or_refused() {
         let reading = reading?;
+        if is_stopped() {
+            return Err(FitError::Stopped);
+        }
         if readings.resets() > resets {
             resets = readings.resets();
             finder.restart();
@@ -187,21 +204,24 @@ fn find(log: &mut Log, map: &ChannelMap) -> Result<(Vec<Shift>, Vec<String>), Fi
 
 /// The readings around each of these shifts, and between all.
 fn read(
-    path: &Path,
+    source: LogSource<'_>,
     map: &ChannelMap,
     commands: [Role; 2],
     shifts: &[Shift],
     between: &mut BetweenShifts,
-) -> Result<Vec<ShiftRecord>, LogError> {
-    let mut log = Log::open(path, &map.open)?;
+) -> Result<Vec<ShiftRecord>, FitError> {
+    let mut log = (source.open)()?;
     let record = |shift: &Shift| {
         let [begin_s, end_s] = inertia_s(shift);
-        ShiftRecord { name: name(path, begin_s), lock_s: end_s - begin_s, ..ShiftRecord::default() }
+        ShiftRecord { name: name(source.path, begin_s), lock_s: end_s - begin_s, ..ShiftRecord::default() }
     };
     let mut records: Vec<ShiftRecord> = shifts.iter().map(record).collect();
     let windows = Windows::of(shifts);
     for reading in Readings::new(&mut log, map)? {
         let reading = reading?;
+        if (source.is_stopped)() {
+            return Err(FitError::Stopped);
+        }
         between.take(&reading, commands);
         for at in windows.around(reading.time_s) {
             if let Some(series) = place(&mut records[at], reading.role, commands) {

@@ -15,6 +15,9 @@ pub enum FitError {
     /// The logs or the vehicle are not what a fit can use.
     #[error("{0}")]
     Input(String),
+    /// The fit was ended from outside.
+    #[error("interrupted")]
+    Stopped,
     /// The fit found no minimum.
     #[error("{0}")]
     Work(String),

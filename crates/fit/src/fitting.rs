@@ -1,5 +1,7 @@
 //! The fit of a vehicle to shifts.
 
+use std::ops::ControlFlow;
+
 use car::Vehicle;
 use config::VehicleFile;
 use drivetrain::Real;
@@ -104,7 +106,7 @@ pub fn fit(
     shifts: &[ShiftRecord],
     driving: &[Driving],
     ages: ReadingAges,
-    progress: &mut dyn FnMut(Progress),
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Fit, FitError> {
     let (shifts, left_out) = sound(shifts)?;
     let shafts = parameters::shafts(vehicle)?;
@@ -130,7 +132,7 @@ fn fit_with(
     (shifts, shafts): (&[ShiftRecord], &[Shaft]),
     drives: &Drives<'_>,
     ages: ReadingAges,
-    progress: &mut dyn FnMut(Progress),
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(Fit, Vec<DriveErrors>), FitError> {
     let available = Available { driving: !drives.start().is_empty(), ..available(shifts) };
     let file = Car::of_file(vehicle, ages);
@@ -307,7 +309,7 @@ fn sound(shifts: &[ShiftRecord]) -> Result<(Vec<ShiftRecord>, Vec<String>), FitE
 fn fit_some(
     problem: &Problem<'_>,
     shifts: &[ShiftRecord],
-    progress: &mut dyn FnMut(Progress),
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Solved, FitError> {
     let few: Vec<ShiftModel> =
         spread_over(shifts, FIRST_SHIFTS).map(|record| ShiftModel::new(record, problem.file)).collect();

@@ -20,6 +20,7 @@
 //! factors the rows. The root is real: the cost that a step can take away, `u'u/2`, is not more than the cost.
 
 use std::cell::{Cell, RefCell};
+use std::ops::ControlFlow;
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::storage::Owned;
@@ -86,12 +87,12 @@ pub(crate) struct Minimum<O: Objective> {
     pub(crate) is_converged: bool,
 }
 
-/// Goes on from a point until a step is small. `progress` is told the number of each step.
+/// Goes on from a point until a step is small. `progress` takes the number of each step, and may end the search with an error.
 pub(crate) fn minimised<O: Objective>(
     objective: &mut O,
     mut at: O::Point,
     iterations: Iterations,
-    progress: &mut dyn FnMut(u32),
+    progress: &mut dyn FnMut(u32) -> ControlFlow<()>,
 ) -> Result<Minimum<O>, FitError> {
     let (mut done, mut reweighted) = (0, 0);
     loop {
@@ -153,7 +154,7 @@ struct Search<'a, O: Objective> {
     /// Expected decrease of the cost with which a step is the last one.
     decrease: f64,
     error: RefCell<Option<FitError>>,
-    progress: RefCell<&'a mut dyn FnMut(u32)>,
+    progress: RefCell<&'a mut dyn FnMut(u32) -> ControlFlow<()>>,
 }
 
 impl<'a, O: Objective> Search<'a, O> {
@@ -162,7 +163,7 @@ impl<'a, O: Objective> Search<'a, O> {
         at: O::Point,
         [done, maximum]: [u32; 2],
         decrease: f64,
-        progress: &'a mut dyn FnMut(u32),
+        progress: &'a mut dyn FnMut(u32) -> ControlFlow<()>,
     ) -> Self {
         let unknowns = DVector::from_iterator(
             objective.parameters(&at).len() + 1,
@@ -279,9 +280,10 @@ impl<O: Objective> LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, O> {
         if was_last || self.done.get() >= self.maximum || self.is_limited() {
             return None;
         }
-        (self.progress.borrow_mut())(self.done.get());
+        let goes_on = (self.progress.borrow_mut())(self.done.get());
         self.done.set(self.done.get() + 1);
-        match self.derivatives() {
+        let derivatives = if goes_on.is_break() { Err(FitError::Stopped) } else { self.derivatives() };
+        match derivatives {
             Ok((derivatives, base)) => {
                 self.base.replace(Some(base));
                 Some(derivatives)
@@ -296,6 +298,8 @@ impl<O: Objective> LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, O> {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow::Continue;
+
     use super::*;
     use nalgebra::{Matrix2, Vector2};
 
@@ -364,7 +368,7 @@ mod tests {
     #[test]
     fn the_derivatives_have_information_and_gradient_of_the_whole_problem() {
         let at = ([-1.2, 0.5], 1.0);
-        let mut none = |_| {};
+        let mut none = |_| Continue(());
         let search = Search::new(&VALLEY, at, [0, 1], 0.0, &mut none);
         let (derivatives, base) = search.derivatives().unwrap();
         let residuals = search.residuals().unwrap();
@@ -381,7 +385,11 @@ mod tests {
     #[test]
     fn a_curved_valley_is_followed_to_its_end() {
         let mut numbers = Vec::new();
-        let end = minimised(&mut { VALLEY }, ([-1.2, 5.0], 1.0), LONG, &mut |number| numbers.push(number)).unwrap();
+        let end = minimised(&mut { VALLEY }, ([-1.2, 5.0], 1.0), LONG, &mut |number| {
+            numbers.push(number);
+            Continue(())
+        })
+        .unwrap();
         let ([x, z], w) = end.at;
         assert!(end.is_converged && [x - 1.0, z - 2.0, w - 1.0].iter().all(|off| off.abs() < 1e-5), "{:?}", end.at);
         assert_eq!(numbers, (0..numbers.len() as u32).collect::<Vec<_>>());
@@ -390,7 +398,7 @@ mod tests {
     #[test]
     fn a_parameter_at_its_limit_is_held_and_the_others_are_best_with_it() {
         let mut valley = Valley { max_z: 1.0, ..VALLEY };
-        let end = minimised(&mut valley, ([-1.2, -5.0], 1.0), LONG, &mut |_| {}).unwrap();
+        let end = minimised(&mut valley, ([-1.2, -5.0], 1.0), LONG, &mut |_| Continue(())).unwrap();
         let ([x, z], w) = end.at;
         assert_eq!(z, 1.0);
         assert!(end.is_converged && (x - 1.5).abs() < 1e-5 && (w - 2.25).abs() < 1e-5, "{:?}", end.at);
@@ -399,10 +407,10 @@ mod tests {
     #[test]
     fn a_step_to_where_nothing_can_be_computed_is_made_smaller() {
         let mut valley = Valley { end_x: 0.5, ..VALLEY };
-        let end = minimised(&mut valley, ([-1.2, 3.0], 1.0), LONG, &mut |_| {}).unwrap();
+        let end = minimised(&mut valley, ([-1.2, 3.0], 1.0), LONG, &mut |_| Continue(())).unwrap();
         let x = end.at.0[0];
         assert!((0.3..=0.5).contains(&x), "{x}");
-        let error = minimised(&mut valley, ([0.6, 3.0], 1.0), LONG, &mut |_| {}).map(|_| ()).unwrap_err();
+        let error = minimised(&mut valley, ([0.6, 3.0], 1.0), LONG, &mut |_| Continue(())).map(|_| ()).unwrap_err();
         assert_eq!(error.to_string(), "not finite");
     }
 
@@ -412,7 +420,11 @@ mod tests {
         for (reweighted, maximum, expected) in [(3, 5, (3, 4, true)), (1, 2, (1, 2, false)), (1, 1, (0, 1, false))] {
             let (mut valley, mut steps) = (VALLEY, 0);
             let few = Iterations { reweighted, maximum, decrease: 1e-12 };
-            let end = minimised(&mut valley, ([-1.2, 5.0], 40.0), few, &mut |_| steps += 1).unwrap();
+            let end = minimised(&mut valley, ([-1.2, 5.0], 40.0), few, &mut |_| {
+                steps += 1;
+                Continue(())
+            })
+            .unwrap();
             assert_eq!((valley.reweighted, steps, end.is_converged), expected);
         }
     }

@@ -42,7 +42,7 @@ pub mod verdict;
 mod weights;
 
 pub use car::ReadingAges;
-pub use collect::{Collected, collect};
+pub use collect::{Collected, LogSource, collect, own_names};
 pub use driving::{BacklashFit, Driving, Known, SkewFit, WheelFit};
 pub use error::FitError;
 pub use fill::FillFit;

@@ -3,6 +3,8 @@
 //! Each shift has unknowns of its own (load, start of each segment). They are eliminated by their Schur complement, so the
 //! cost grows linearly with the shifts, and a step has only as many unknowns as there are parameters.
 
+use std::ops::ControlFlow;
+
 use drivetrain::Real;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -187,7 +189,7 @@ impl Problem<'_> {
         at: Unknowns,
         weights: Weights,
         iterations: Iterations,
-        progress: &mut dyn FnMut(u32),
+        progress: &mut dyn FnMut(u32) -> ControlFlow<()>,
     ) -> Result<Solved, FitError> {
         let residuals = self.residuals(shifts, &at);
         let mut weighed = Weighed { problem: self, shifts, weights };

@@ -1,5 +1,7 @@
 //! Shifts that were not fitted, with the given and with the fitted vehicle.
 
+use std::ops::ControlFlow;
+
 use car::Vehicle;
 use config::VehicleFile;
 
@@ -86,7 +88,7 @@ impl Fit {
         let own = models.iter().map(ShiftModel::start).collect();
         let start = Unknowns { shared: Vec::new(), own, drives: Vec::new() };
         const STARTS: Iterations = Iterations { reweighted: 0, maximum: 6, decrease: DECREASE };
-        let at = problem.solve(&models, start, self.weights.clone(), STARTS, &mut |_| {})?.at;
+        let at = problem.solve(&models, start, self.weights.clone(), STARTS, &mut |_| ControlFlow::Continue(()))?.at;
         let residuals = problem.residuals(&models, &at);
         let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {
             self.weights.errors(&model.blocks, rows.as_mut_slice());

@@ -1,4 +1,6 @@
 //! Logs that a fit should not have to see: it says what is wrong, or its result stays one that can be used.
+use std::ops::ControlFlow::Continue;
+
 use crate::common::{Logs, TestCar};
 use fit::{Collected, Driving, Fit, FitError, HeldOut, Map, Parameter, Series, ShiftRecord, Verdict};
 
@@ -7,7 +9,7 @@ fn shifts(car: &mut TestCar, count: u64, logs: Logs) -> Vec<ShiftRecord> {
 }
 
 fn fitted(car: &TestCar, shifts: &[ShiftRecord]) -> Result<Fit, FitError> {
-    fit::fit(&car.file, shifts, &[], car.ages(), &mut |_| {})
+    fit::fit(&car.file, shifts, &[], car.ages(), &mut |_| Continue(()))
 }
 
 /// Error of the open loop's torque on two other shifts, N m: given file, fitted file.

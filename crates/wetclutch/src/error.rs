@@ -205,6 +205,7 @@ impl From<FitError> for Error {
     fn from(error: FitError) -> Self {
         match error {
             FitError::Work(message) => Self::Work(message),
+            FitError::Stopped => Self::interrupted(),
             error => Self::Input(error.to_string()),
         }
     }

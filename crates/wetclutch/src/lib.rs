@@ -1,17 +1,21 @@
 //! A virtual pressure sensor for the wet clutches of automatic transmissions.
 //!
-//! Everything that the command `wetclutch` does is a function here: [`estimate()`] pressures and torques from a log.
+//! Everything that the command `wetclutch` does is a function here: [`estimate()`] pressures and torques from a log, [`fit()`] a car to logs.
 //! Quantities are in SI units, and names end in their unit.
 //!
 //! **Architecture invariant:** nothing here prints or parses arguments. What is to be said to a user goes to a [`Notes`] as it comes.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+pub mod checks;
+pub mod contents;
 mod error;
 pub mod estimate;
+pub mod fitted;
 pub mod gains;
 mod score;
 pub mod simulate;
+pub mod studies;
 mod table;
 mod table_text;
 mod text;
@@ -21,13 +25,15 @@ pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors
 pub use error::Error;
 pub use estimate::{Destination, EstimateOptions, Estimates, LogInput, estimate};
 pub use evaluate::Estimator;
+pub use fitted::{FitOptions, FitProgress, Fitted, fit};
 pub use gains::{DesignObserver, DesignOptions, Designed, design};
 pub use observer::Health;
 pub use observer::gearbox::{ClutchEstimate, ShiftEstimate, ShiftPhase};
 pub use score::{PhaseScore, Scores, score};
 pub use simulate::{Simulation, simulate};
+pub use studies::StudyRuns;
 pub use table::{Column, Table, Values, Words};
-pub use text::grouped;
+pub use text::{grouped, shell_quoted};
 pub use vehicle::{TemplateNumbers, VehicleFile, gearboxes, method_named, observer_named, read_drive, read_sensors};
 
 /// Takes a sentence for the user as it comes. It may have several lines; one that begins with `hint: ` says what to do.

@@ -189,7 +189,7 @@ impl Values {
         self.len() == 0
     }
 
-    fn push(&mut self, cell: Cell<'_>) {
+    pub(crate) fn push(&mut self, cell: Cell<'_>) {
         match (self, cell) {
             (Self::Numbers(numbers), Cell::Number(number)) => numbers.push(number),
             (Self::Numbers(numbers), Cell::Whole(number)) => numbers.push(number as f64),

@@ -1,4 +1,8 @@
-//! Numbers in sentences.
+//! Numbers and paths in sentences.
+
+use std::path::Path;
+
+use trace::ShownPath as _;
 
 /// A count with commas between the thousands: 60,000,000.
 pub fn grouped(count: u64) -> String {
@@ -11,6 +15,15 @@ pub fn grouped(count: u64) -> String {
         grouped.push(digit);
     }
     grouped
+}
+
+/// A path as a shell takes it.
+pub fn shell_quoted(path: &Path) -> String {
+    let path = path.shown().to_string();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
+    // A path that begins with a dash would be read as an option.
+    let path = if path.starts_with('-') { format!("./{path}") } else { path };
+    if path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', r"'\''")) }
 }
 
 #[cfg(test)]

@@ -3,14 +3,11 @@
 use std::path::Path;
 
 use car::{Experiment, GainMethod, Vehicle};
-use config::{
-    CarFile, CarStudy, ConfigError, DriveFile, ExperimentFile, GearboxFile, Kind, Source, Study, Values, VehicleFile,
-    all_errors, check_learnt,
-};
+use config::{CarFile, DriveFile, ExperimentFile, GearboxFile, Kind, Source, Study, Values, VehicleFile};
 use design::{longest_step_of, unstable_corners};
-use logs::ChannelMap;
 use report::tables::phase_name;
 use trace::ShownPath as _;
+use wetclutch::checks::errors_of;
 
 use super::car::{describe_car, describe_gearbox};
 use super::check_defaults::{describe_car_values, describe_defaults};
@@ -93,56 +90,6 @@ fn check_file(options: &Check, file: &Path) -> Result<(), Failure> {
         );
     }
     describe_file(options, file, (source, kind))
-}
-
-/// All errors of a file and of those that it names.
-pub(super) fn errors_of(source: &Source) -> Vec<ConfigError> {
-    all_errors(source, &|source| read(source.kind()?, source))
-}
-
-/// Reads a file of a kind, and the files that it names.
-fn read(kind: Kind, source: Source) -> Result<(), ConfigError> {
-    match kind {
-        Kind::Gearbox => GearboxFile::from_source(source).map(drop),
-        Kind::Car => CarFile::from_source(source).map(drop),
-        Kind::CarStudy => CarStudy::from_source(source).map(drop),
-        Kind::Drive => read_drive(source),
-        Kind::Vehicle => VehicleFile::from_source(source).map(drop),
-        Kind::Experiment => ExperimentFile::from_source(source)?.read_vehicle().map(drop),
-        Kind::Overlay => VehicleFile::check_overlay(&source),
-        Kind::Sensors => config::sensors_of(&source).map(drop),
-        Kind::Study => Study::from_source(source).map(drop),
-        Kind::Learnt => check_learnt(&source),
-        Kind::ChannelMap => read_map(&source),
-    }
-}
-
-/// Reads a drive file, and the vehicle file if it names one.
-fn read_drive(source: Source) -> Result<(), ConfigError> {
-    let drive = DriveFile::from_source(source)?;
-    drive.vehicle.as_ref().map_or(Ok(()), |_| drive.read_vehicle().map(drop))
-}
-
-/// Reads a channel map; its errors have the form of those of the other files.
-fn read_map(source: &Source) -> Result<(), ConfigError> {
-    let Err(error) = ChannelMap::of_text(&source.path, &source.text) else { return Ok(()) };
-    let (path, text) = (source.path.clone(), error.to_string());
-    let placed = text.strip_prefix(&format!("{}:", path.shown())).and_then(|rest| rest.split_once(": "));
-    let (line, message) = placed.and_then(|(line, message)| Some((line.parse().ok()?, message))).unwrap_or((1, &text));
-    let range = || -> Option<ConfigError> {
-        let (key, rest) = message.strip_prefix('`')?.split_once("` is ")?;
-        let (value, allowed) = rest.split_once(", expected ")?;
-        let value = value.parse().ok().filter(|_| allowed.contains(" to "))?;
-        Some(ConfigError::Range {
-            path: path.clone(),
-            line,
-            key: key.to_owned(),
-            value,
-            allowed: allowed.to_owned(),
-            hint: None,
-        })
-    };
-    Err(range().unwrap_or_else(|| ConfigError::Syntax { path: path.clone(), line, message: message.to_owned() }))
 }
 
 /// Says what a file without errors describes.

@@ -5,8 +5,8 @@ use std::path::Path;
 use config::{CarFile, ConfigError, DefaultTaken, Kind, Source, VehicleFile};
 use serde_json::{Value, json};
 use trace::ShownPath as _;
+use wetclutch::checks::errors_of;
 
-use super::check::errors_of;
 use crate::args::Check;
 use crate::failure::Failure;
 use crate::output;

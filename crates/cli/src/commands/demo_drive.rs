@@ -15,8 +15,8 @@ use study::gearbox::recording::Recording;
 use study::gearbox::tour::{LeftOut, drive_tour};
 use study::gearbox::{RECORD_S, ShiftDraw};
 use trace::{Cell, ShownPath as _};
+use wetclutch::studies::bench_sensors;
 
-use super::matrix::bench_sensors;
 use super::simulate_drive::{DriveTables, keeps_inputs};
 use crate::args::Demo;
 use crate::browser;

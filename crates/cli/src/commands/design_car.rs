@@ -11,9 +11,9 @@ use trace::{ShownPath as _, units};
 use super::design::{not_met, of_vehicle, options_apply};
 use super::progress;
 use crate::args::{Design, DesignChoice, MethodChoice};
-use crate::commands::shell_quoted;
 use crate::failure::Failure;
 use crate::output;
+use wetclutch::shell_quoted;
 
 /// What the designs are not for, and what serves there.
 const OTHER_KINDS: &str = "Gains are designed for upshifts with a driving engine. In the other kinds of shift, and between shifts, the gearbox filter \

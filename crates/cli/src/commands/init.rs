@@ -8,9 +8,10 @@ use config::vehicle::short::{CarFacts, Facts, complete_file, short_car_file, sho
 use trace::ShownPath as _;
 
 use crate::args::{Init, LaunchChoice};
-use crate::commands::{check_output, shell_quoted, write_text};
+use crate::commands::{check_output, write_text};
 use crate::failure::Failure;
 use crate::output;
+use wetclutch::shell_quoted;
 
 pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     check_output(Some(&options.output))?;

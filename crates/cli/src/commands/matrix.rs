@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use car::{Car, Sensors};
-use config::ExperimentFile;
 use report::matrix_page::{failures, kind_rows, matrix_page, shift_cells, shift_rows, without_tables};
 use serde_json::json;
 use study::gearbox::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::{Cell, ShownPath as _};
+use wetclutch::studies::bench_sensors;
 
 use super::car::no_shift;
 use crate::args::Bench;
@@ -55,12 +55,6 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
 /// The sensors of a file, or those of the built-in bench.
 pub(super) fn sensors_or_bench(path: Option<&Path>) -> Result<Sensors, Failure> {
     path.map_or_else(bench_sensors, wetclutch::read_sensors)
-}
-
-/// The toothed wheels of the built-in bench.
-pub(super) fn bench_sensors() -> Result<Sensors, Failure> {
-    let sensors = ExperimentFile::bench()?.sensors;
-    sensors.ok_or_else(|| Failure::Work("the built-in bench has no sensors".to_owned()))
 }
 
 fn print(result: &Matrix, car: &Car) -> Result<(), Failure> {

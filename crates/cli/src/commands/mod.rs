@@ -197,15 +197,6 @@ fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
     Ok(map)
 }
 
-/// A path as a shell takes it.
-fn shell_quoted(path: &Path) -> String {
-    let path = path.shown().to_string();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
-    // A path that begins with a dash would be read as an option.
-    let path = if path.starts_with('-') { format!("./{path}") } else { path };
-    if path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', r"'\''")) }
-}
-
 /// Refuses an output that cannot be written, before the work starts.
 fn check_output(path: Option<&PathBuf>) -> Result<(), Failure> {
     let Some(path) = path else { return Ok(()) };

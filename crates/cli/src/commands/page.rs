@@ -24,8 +24,16 @@ pub(super) fn check_page<'a>(
 
 /// Writes the page if one is wanted, says where it is, and opens it.
 pub(super) fn write_page<'a>(choice: &PageChoice, sheet: impl FnOnce() -> Sheet<'a>) -> Result<(), Failure> {
+    if choice.page.is_none() {
+        return Ok(());
+    }
+    write_html(choice, &sheet().html()?)
+}
+
+/// Writes the text of a page where one is wanted, says where it is, and opens it.
+pub(super) fn write_html(choice: &PageChoice, html: &str) -> Result<(), Failure> {
     let Some(page) = &choice.page else { return Ok(()) };
-    write_text(page, &sheet().html()?)?;
+    write_text(page, html)?;
     output::note(&format!("page: {}", page.shown()));
     if choice.open {
         browser::open(page);

@@ -15,9 +15,10 @@ use trace::ShownPath as _;
 use super::car::no_shift;
 use super::matrix::sensors_or_bench;
 use crate::args::SensitivityOptions;
-use crate::commands::{read_car, sensors_without_effect, shell_quoted, write_text};
+use crate::commands::{read_car, sensors_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
+use wetclutch::shell_quoted;
 
 pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
     let vehicle = match &options.vehicle {

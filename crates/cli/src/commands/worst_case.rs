@@ -11,9 +11,10 @@ use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::args::{PhaseChoice, WorstCaseOptions};
-use crate::commands::{not_an_input, progress, shell_quoted, writable, write_text};
+use crate::commands::{not_an_input, progress, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
+use wetclutch::shell_quoted;
 
 pub(crate) fn worst_case(options: &WorstCaseOptions) -> Result<(), Failure> {
     let study = Study::read(&options.study)?;

@@ -11,16 +11,10 @@ const RESPONSE_SAMPLES: usize = 5000;
 
 /// What each cause does to the pressure at the corner where all of them together do most.
 pub(super) fn contributions(system: &ErrorSystem, gains: &[DMatrix<f64>]) -> Vec<Contribution> {
-    let minimum = system.corners.iter().map(|corner| corner.friction).fold(f64::INFINITY, f64::min);
     let at_corner = |corner: &Corner| -> Vec<Contribution> {
-        let gain = if corner.friction > minimum { gains.last() } else { gains.first() };
-        let Some(gain) = gain else { return Vec::new() };
+        let Some(gain) = system.gain_at(corner, gains) else { return Vec::new() };
         let a = corner.error_dynamics(gain);
-        let of_readings = (DMatrix::identity(a.nrows(), a.ncols()) - &a) * gain * &system.readings;
-        let of_readings = of_readings.column_iter().map(|column| (READINGS, column.into_owned()));
-        let through = corner.through_gain.iter().map(|cause| (cause.name, -gain * &cause.column));
-        let direct = corner.direct.iter().map(|cause| (cause.name, cause.column.clone()));
-        let columns: Vec<_> = of_readings.chain(through).chain(direct).collect();
+        let columns = system.columns(corner, gain);
         let mut sums: Vec<Contribution> = Vec::new();
         for (cause, _) in &columns {
             if !sums.iter().any(|sum| sum.cause == *cause) {

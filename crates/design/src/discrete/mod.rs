@@ -25,6 +25,7 @@
 
 mod contributions;
 mod ellipsoid;
+mod error_model;
 pub(crate) mod given;
 mod interval;
 pub(crate) mod norm;
@@ -43,6 +44,7 @@ use crate::iss::DesignError;
 use crate::lmi::{Block, largest_eigenvalue};
 use crate::rigid::requirement;
 use contributions::contributions;
+pub use error_model::{ErrorModel, error_models};
 use norm::{Norm, longest_certified_step};
 pub use search::SolverRecord;
 use system::{ErrorSystem, outputs, state_units};

@@ -4,7 +4,6 @@ use std::path::{Component, Path, PathBuf};
 
 use config::{CarFile, Source, toml_string};
 use drivetrain::{ClutchValve, Real, Table1};
-use trace::ShownPath as _;
 
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
@@ -247,11 +246,9 @@ impl GearboxFit {
 
 /// The file with a text, as it is to stand at `path`, with a line at its head.
 fn written(mut text: Written, car: &CarFile, path: &Path, head: &str) -> Result<CarFile, FitError> {
-    let gearbox = gearbox_path(car)?;
-    text.set_gearbox(car, path, &gearbox)?;
+    text.set_gearbox(car, path)?;
     let source = Source { path: path.to_owned(), text: headed(head, &text.finish()) };
-    let gearbox = if gearbox.exists() { Source::read(&gearbox)? } else { return Err(no_gearbox(&gearbox)) };
-    CarFile::from_sources(source, gearbox).map_err(|error| {
+    CarFile::from_sources(source, car.gearbox_source.clone()).map_err(|error| {
         FitError::Work(format!(
             "the fitted values are not those of a possible car: {error}\n\
              hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
@@ -314,7 +311,8 @@ impl Written {
     }
 
     /// Keeps the gearbox file where it is when the vehicle file moves to another folder.
-    fn set_gearbox(&mut self, car: &CarFile, path: &Path, gearbox: &Path) -> Result<(), FitError> {
+    fn set_gearbox(&mut self, car: &CarFile, path: &Path) -> Result<(), FitError> {
+        let gearbox = car.gearbox_source.path.as_path();
         let folder = |path: &Path| match path.parent() {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
             _ => PathBuf::from("."),
@@ -348,18 +346,6 @@ fn bare_or_quoted(key: &str) -> String {
 
 pub(super) fn list(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
-}
-
-/// The gearbox file of a vehicle file.
-fn gearbox_path(car: &CarFile) -> Result<PathBuf, FitError> {
-    let table: toml::Table =
-        car.source.text.parse().map_err(|error: toml::de::Error| FitError::input(error.to_string()))?;
-    let named = table.get("gearbox").and_then(toml::Value::as_str).unwrap_or_default();
-    Ok(car.source.path.parent().unwrap_or(Path::new("")).join(named))
-}
-
-fn no_gearbox(path: &Path) -> FitError {
-    FitError::input(format!("{}: the gearbox file of the vehicle file is not there", path.shown()))
 }
 
 /// The way from a folder to a file, both from the root; the file itself where there is none.

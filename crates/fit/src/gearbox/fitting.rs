@@ -1,5 +1,7 @@
 //! The fit of a car to its shifts.
 
+use std::ops::ControlFlow;
+
 use car::Car;
 use car::ErrorBudget;
 use drivetrain::{Real, ShiftKind};
@@ -90,7 +92,7 @@ pub fn fit(
     tables: &ShiftTables<f64>,
     shifts: &[ShiftLog],
     driving: &Driving,
-    progress: &mut dyn FnMut(Progress),
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<GearboxFit, FitError> {
     let channels = ChannelFits::of(car, driving);
     let shifts = &channels.moved(shifts, tables, 0.0);
@@ -130,7 +132,7 @@ fn fit_with(
     tables: &ShiftTables<f64>,
     shifts: &[ShiftLog],
     (driving, balances): (&Driving, &Balances),
-    progress: &mut dyn FnMut(Progress),
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(GearboxFit, [f64; 2]), FitError> {
     let quantities = Quantities::of(car, tables, shifts, balances.used());
     let models: Vec<ShiftModel> =

@@ -3,6 +3,8 @@
 //! A shift's own unknowns act linearly: for given parameters they are found at once, and the parameters see what is left (variable
 //! projection). The weights are those of the one-shift fit.
 
+use std::ops::ControlFlow;
+
 use drivetrain::Real;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
@@ -207,7 +209,11 @@ impl<'a> Problem<'a> {
     }
 
     /// Finds the parameters of shifts and driving, from those of the file.
-    pub(crate) fn solve(&self, models: &Models<'_>, progress: &mut dyn FnMut(u32)) -> Result<Solved, FitError> {
+    pub(crate) fn solve(
+        &self,
+        models: &Models<'_>,
+        progress: &mut dyn FnMut(u32) -> ControlFlow<()>,
+    ) -> Result<Solved, FitError> {
         let mut weighed = Weighed { problem: self, models, weights: Weights::START };
         let start = weighed.at(vec![0.0; self.quantities.all.len()]);
         let start = weighed.reweighted(start);

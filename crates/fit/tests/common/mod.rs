@@ -1,6 +1,8 @@
 //! Cars drawn at random, their shifts behind sensors, and what a fit is compared with.
 #![allow(dead_code, clippy::unwrap_used, reason = "shared by several tests; a test may panic")]
 
+use std::ops::ControlFlow::Continue;
+
 use car::ShiftClutch;
 use car::{Sensors, Vehicle};
 use config::{ExperimentFile, Source, VehicleFile};
@@ -15,7 +17,7 @@ use trace::{Trace, Values, signal};
 
 /// The fit of a car to shifts, and to driving between them.
 pub(crate) fn fitted(car: &TestCar, shifts: &[ShiftRecord], driving: &[Driving]) -> Fit {
-    fit::fit(&car.file, shifts, driving, car.ages(), &mut |_| {}).unwrap()
+    fit::fit(&car.file, shifts, driving, car.ages(), &mut |_| Continue(())).unwrap()
 }
 
 /// The numbers of a signal of a log.
@@ -500,7 +502,10 @@ impl TestCar {
     pub(crate) fn collected(&self, log: &Trace, name: &str) -> fit::Collected {
         let path = std::env::temp_dir().join(format!("fit_{name}_{}_{}.csv", self.seed, std::process::id()));
         trace::write_csv(&path, log).unwrap();
-        let collected = fit::collect(&path, &logs::ChannelMap::default(), &self.file);
+        let map = logs::ChannelMap::default();
+        let open = || logs::Log::open(&path, &map.open);
+        let source = fit::LogSource { path: &path, map: &map, open: &open, is_stopped: &|| false };
+        let collected = fit::collect(source, &self.file);
         std::fs::remove_file(&path).unwrap();
         collected.unwrap()
     }

@@ -1,5 +1,7 @@
 //! Scale and delays of the channels, and the stiffness of the drive shafts.
 
+use std::ops::ControlFlow::Continue;
+
 use car::Car;
 use config::CarFile;
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, fit};
@@ -15,7 +17,7 @@ fn drawn(seed: u64) -> Drawn {
 
 fn fitted(drawn: &Drawn, drive: &car::Drive) -> GearboxFit {
     let (recorded, _) = drawn.driven(&hilly(drive, drawn.seed));
-    fit(&drawn.file, &drawn.tables(), &recorded.shifts, &recorded.driving, &mut |_| ()).unwrap()
+    fit(&drawn.file, &drawn.tables(), &recorded.shifts, &recorded.driving, &mut |_| Continue(())).unwrap()
 }
 
 fn holds(known: &Known, truth: f64) -> bool {
@@ -70,7 +72,9 @@ fn what_the_wheel_speed_does_not_tell_stays_as_in_the_file_and_is_said() {
     // In town the accelerator is not pressed often enough in a gear; the wheel speed of the second car is right.
     let in_town = Drawn::of(car("eight_speed.toml"), 32, Case::Usual);
     let (recorded, _) = in_town.driven(&city(1));
-    let of = |driving: &Driving| fit(&in_town.file, &in_town.tables(), &recorded.shifts, driving, &mut |_| ()).unwrap();
+    let of = |driving: &Driving| {
+        fit(&in_town.file, &in_town.tables(), &recorded.shifts, driving, &mut |_| Continue(())).unwrap()
+    };
     let usual = of(&recorded.driving);
     let said = usual.statements().join("\n");
     assert!(said.contains("stiffness of the drive shafts: not told by these logs"), "{said}");
@@ -121,7 +125,7 @@ fn a_closed_lock_up_clutch_tells_the_delay_of_the_engine_speed_and_the_ratio_a_w
     let drawn = Drawn::of(car("eight_speed.toml"), 33, Case::Usual);
     let (recorded, _) = drawn.driven(&city(1));
     let driving = locked(&drawn, -0.006, 1.004, 0.008);
-    let fit = fit(&drawn.file, &drawn.tables(), &recorded.shifts, &driving, &mut |_| ()).unwrap();
+    let fit = fit(&drawn.file, &drawn.tables(), &recorded.shifts, &driving, &mut |_| Continue(())).unwrap();
     let (output, engine) = (fit.channels.output.clone().unwrap(), fit.channels.engine.clone().unwrap().unwrap());
     assert!(holds(&output.late_s, -0.006) && output.late_s.sd < 1e-3, "{output:?}");
     assert!(holds(&output.scale, 0.004) && output.scale.sd < 3e-4, "{output:?}");
@@ -150,7 +154,7 @@ fn a_slip_controlled_lock_up_clutch_tells_nothing_of_the_engine_speed() {
     });
     let (recorded, _) = drawn.driven(&city(1));
     let driving = locked(&drawn, 0.0, 1.0, 0.008);
-    let fit = fit(&drawn.file, &drawn.tables(), &recorded.shifts, &driving, &mut |_| ()).unwrap();
+    let fit = fit(&drawn.file, &drawn.tables(), &recorded.shifts, &driving, &mut |_| Continue(())).unwrap();
     assert!(fit.channels.output.is_ok() && fit.channels.engine.as_ref().is_some_and(Result::is_err));
     let said = fit.statements().join("\n");
     assert!(!said.contains("with the lock-up clutch closed"), "{said}");

@@ -1,5 +1,7 @@
 //! Mass, road load and the reported engine torque from driving between shifts.
 
+use std::ops::ControlFlow::Continue;
+
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorded, Recorder, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
@@ -42,7 +44,7 @@ fn recorded(drawn: &Drawn, rows: &[Row]) -> Recorded {
 }
 
 fn fitted(drawn: &Drawn, recorded: &Recorded) -> GearboxFit {
-    fit(&drawn.file, &drawn.tables(), &recorded.shifts, &recorded.driving, &mut |_| ()).unwrap()
+    fit(&drawn.file, &drawn.tables(), &recorded.shifts, &recorded.driving, &mut |_| Continue(())).unwrap()
 }
 
 /// The fit of rows after a change of each of them, and what it says.
@@ -69,7 +71,7 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
         let (recorded, _) = drawn.driven(&hilly(&city(2), seed));
         assert!(recorded.driving.time_s() > 150.0, "{}", recorded.driving.time_s());
         let (without, with) = (
-            fit(&drawn.file, &tables, &recorded.shifts, &Driving::default(), &mut |_| ()).unwrap(),
+            fit(&drawn.file, &tables, &recorded.shifts, &Driving::default(), &mut |_| Continue(())).unwrap(),
             fitted(&drawn, &recorded),
         );
         let of_driving = [Quantity::Mass, Quantity::ReportedScale, Quantity::EngineInertia, Quantity::ReportedDelay];
@@ -163,7 +165,8 @@ fn a_log_without_driving_says_that_mass_is_not_told() {
     let (usual, said) = changed(&drawn, &rows, |_, _| ());
     assert!(said.contains("mass and road load from ") && said.contains("no reported engine torque is used"), "{said}");
     let alone =
-        fit(&drawn.file, &drawn.tables(), &recorded(&drawn, &rows).shifts, &Driving::default(), &mut |_| ()).unwrap();
+        fit(&drawn.file, &drawn.tables(), &recorded(&drawn, &rows).shifts, &Driving::default(), &mut |_| Continue(()))
+            .unwrap();
     let said = alone.statements().join("\n");
     assert!(said.contains("mass and road load are not told by these logs: 0 s of driving"), "{said}");
     assert_eq!(alone.quantities.place(Quantity::Mass), None);
@@ -207,7 +210,7 @@ fn constant_speed_in_one_gear_tells_no_mass() {
     };
     let constant = driving(6000, 100.0);
     assert!(constant.time_s() > 55.0, "{}", constant.time_s());
-    let fit = fit(&drawn.file, &tables, &shifts, &constant, &mut |_| ()).unwrap();
+    let fit = fit(&drawn.file, &tables, &shifts, &constant, &mut |_| Continue(())).unwrap();
     assert_eq!(fit.verdict(Quantity::Mass), Verdict::NotIdentifiable, "{}", fit.sd(Quantity::Mass));
     assert!(fit.unknown(Quantity::Mass).abs() < 0.05, "{}", fit.unknown(Quantity::Mass));
     // Standing with the engine above idle, and one row.

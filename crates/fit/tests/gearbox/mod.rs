@@ -5,6 +5,7 @@ mod driving;
 mod estimated;
 mod pressures;
 
+use std::ops::ControlFlow::Continue;
 use std::path::Path;
 
 use car::ErrorBudget;
@@ -18,7 +19,7 @@ use observer::element_uncertainty;
 use observer::gearbox::ShiftInput;
 
 fn fitted(drawn: &Drawn, shifts: &[ShiftLog]) -> GearboxFit {
-    fit(&drawn.file, &drawn.tables(), shifts, &Driving::default(), &mut |_| ()).unwrap()
+    fit(&drawn.file, &drawn.tables(), shifts, &Driving::default(), &mut |_| Continue(())).unwrap()
 }
 
 /// The rows of a drive of a drawn car as its file's filter is shown them.
@@ -97,7 +98,8 @@ fn the_fitted_file_keeps_the_text_and_has_the_values_of_the_fit() {
     let kiss_pa = before.kiss_pressure() + 1e4 * fit.unknown(Quantity::Kiss(place));
     assert!((after.kiss_pressure() - kiss_pa).abs() < 50.0);
     // A fit to the same shifts from the fitted file has nothing to change beyond what the logs leave open.
-    let again = fit::gearbox::fit(&file, &tables(&file), &recorded.shifts, &Driving::default(), &mut |_| ()).unwrap();
+    let again =
+        fit::gearbox::fit(&file, &tables(&file), &recorded.shifts, &Driving::default(), &mut |_| Continue(())).unwrap();
     let torque = Quantity::Torque(place);
     assert!(again.unknown(torque).abs() < fit.sd(torque), "{} {}", again.unknown(torque), fit.sd(torque));
     let twice = again.vehicle_file(&file, &file.source.path, "a drive", None).unwrap().source.text;
@@ -165,7 +167,7 @@ fn one_shift_tells_little_and_says_so() {
     twice.add(recorded.clone());
     assert_eq!(twice.shifts, recorded.shifts);
     assert_eq!(twice.skipped.len(), 2 * recorded.skipped.len() + recorded.shifts.len());
-    let none = fit::gearbox::fit(&drawn.file, &drawn.tables(), &[], &recorded.driving, &mut |_| ());
+    let none = fit::gearbox::fit(&drawn.file, &drawn.tables(), &[], &recorded.driving, &mut |_| Continue(()));
     let none = none.unwrap_err().to_string();
     assert!(none.contains("no shift"), "{none}");
 }
@@ -208,7 +210,7 @@ fn what_no_car_does_is_left_out() {
     recorded(&|at, _, input| (input.gear.from, input.gear.to) = (1 + at % 3, 2));
     // Speeds that are huge: the model must not be left with numbers that are none.
     let huge = recorded(&|_, _, input| input.engine_rad_s = Some(Reading::now(1e300)));
-    if let Ok(fit) = fit::gearbox::fit(&drawn.file, &tables, &huge.shifts, &huge.driving, &mut |_| ()) {
+    if let Ok(fit) = fit::gearbox::fit(&drawn.file, &tables, &huge.shifts, &huge.driving, &mut |_| Continue(())) {
         assert!(fit.unknowns.iter().all(|x| x.is_finite()));
     }
 }

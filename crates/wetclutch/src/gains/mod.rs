@@ -8,8 +8,8 @@ use design::compliant::{best_compliant_phase, compliant_requirement, physical_ga
 use design::open_loop::is_open_loop;
 use design::rigid::best_phase;
 use design::{
-    Certificate, CompliantCertificate, DesignError, DiscreteCertificate, Model, OffsetMissed, Quantity,
-    design_discrete_phase, design_sliding, open_loop_bound_pa, requirement,
+    Certificate, CompliantCertificate, DesignError, DiscreteCertificate, ErrorModel, Model, OffsetMissed, Quantity,
+    design_discrete_phase, design_sliding, error_models, open_loop_bound_pa, requirement,
 };
 use observer::{Discretisation, Phase};
 use serde_json::{Map, Value, json};
@@ -148,6 +148,8 @@ pub struct Designed {
     pub phases: Vec<(Phase, PhaseDesign)>,
     /// Required offsets that no certified gain reaches.
     pub missed: Vec<OffsetMissed>,
+    /// How the errors of the estimate follow from their causes, by phase and corner; none of gains in continuous time and of the sliding mode.
+    pub error_models: Vec<(Phase, ErrorModel)>,
 }
 
 impl Designed {
@@ -172,9 +174,13 @@ impl Designed {
 /// # Errors
 /// The design has no solution.
 pub fn design_shift(vehicle: &Vehicle, phases: &[Phase], options: &DesignOptions) -> Result<Designed, Error> {
-    let mut designed = Designed { phases: Vec::new(), missed: Vec::new() };
+    let mut designed = Designed { phases: Vec::new(), missed: Vec::new(), error_models: Vec::new() };
     for &phase in phases {
         let (design, missed) = design_phase(vehicle, phase, options)?;
+        if let PhaseDesign::Discrete(certificate) = &design {
+            let models = error_models(vehicle, phase, certificate).into_iter();
+            designed.error_models.extend(models.map(|model| (phase, model)));
+        }
         designed.phases.push((phase, design));
         designed.missed.extend(missed);
     }

@@ -3,65 +3,19 @@
 use std::path::Path;
 
 use car::ElementErrors;
-use config::{CarStudy, CarStudyRuns, Source, significant};
+use config::{CarStudy, CarStudyRuns, significant};
 use report::matrix_page::kind_rows;
-use study::StudyError;
-use study::gearbox::campaign::{CarCampaign, CarRow, CarSummary};
+use study::gearbox::campaign::{CarCampaign, CarSummary};
 use study::gearbox::matrix::Pooled;
 use trace::ShownPath as _;
+use wetclutch::studies::bench_sensors;
 
-use super::part::{Part, Runs, lock, merged};
+use super::part::{Part, lock, merged};
 use crate::args::{Merge, StudyOptions};
 use crate::commands::car::{describe_car, warn_of_slipping};
-use crate::commands::matrix::bench_sensors;
 use crate::commands::writable;
 use crate::failure::Failure;
 use crate::output;
-
-impl Runs for CarCampaign {
-    type Row = CarRow;
-
-    fn name(&self) -> &str {
-        &self.study.name
-    }
-
-    fn sources(&self) -> Vec<(&'static str, &Source)> {
-        let study = &self.study;
-        let mut sources = vec![("study", &study.source), ("vehicle", &study.car.source)];
-        if let CarStudyRuns::Drive(drive) = &study.what {
-            sources.push(("drive", &drive.source));
-        }
-        sources
-    }
-
-    fn fingerprint(&self) -> String {
-        self.study.fingerprint()
-    }
-
-    fn count(&self) -> u64 {
-        self.study.runs
-    }
-
-    fn header(&self) -> Vec<String> {
-        Self::header(self)
-    }
-
-    fn make(&self, run: u64) -> Result<CarRow, StudyError> {
-        self.row(run)
-    }
-
-    fn line(&self, row: &CarRow) -> String {
-        row.line()
-    }
-
-    fn row_of_line(&self, run: u64, line: &str) -> Result<CarRow, String> {
-        Self::row_of_line(self, run, line)
-    }
-
-    fn at_once(&self) -> [u64; 2] {
-        [1, 1]
-    }
-}
 
 pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
     if options.run.is_some() {

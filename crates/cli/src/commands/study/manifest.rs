@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use trace::text_file::{LARGEST_LIST, read_text_of};
 use trace::{ShownPath as _, printable};
+use wetclutch::studies::Runs;
 
-use super::part::Runs;
 use crate::args::Shard;
 use crate::failure::Failure;
 

@@ -12,53 +12,17 @@ use report::StudyPage;
 use report::study_page::diverged;
 use report::tables::{COMPARED_NAMES, number, phase_name};
 use study::campaign::PHASES;
-use study::{Campaign, Row, StudyError, Summary};
+use study::{Campaign, Summary};
 use trace::{ShownPath as _, units};
+use wetclutch::shell_quoted;
 
 pub(super) use self::cars::describe as describe_cars;
 use self::one_run::one_run;
-use self::part::{Part, Runs, lock, merged};
+use self::part::{Part, lock, merged};
 use crate::args::{Merge, StudyOptions};
-use crate::commands::{shell_quoted, writable, write_text};
+use crate::commands::{writable, write_text};
 use crate::failure::Failure;
 use crate::output;
-
-impl Runs for Campaign {
-    type Row = Row;
-
-    fn name(&self) -> &str {
-        &self.study.name
-    }
-
-    fn sources(&self) -> Vec<(&'static str, &Source)> {
-        let study = &self.study;
-        vec![("study", &study.source), ("experiment", &study.experiment.source), ("vehicle", &study.vehicle.source)]
-    }
-
-    fn fingerprint(&self) -> String {
-        self.study.fingerprint()
-    }
-
-    fn count(&self) -> u64 {
-        self.study.runs
-    }
-
-    fn header(&self) -> Vec<String> {
-        self.layout.header()
-    }
-
-    fn make(&self, run: u64) -> Result<Row, StudyError> {
-        self.row(run)
-    }
-
-    fn line(&self, row: &Row) -> String {
-        row.line(&self.layout)
-    }
-
-    fn row_of_line(&self, run: u64, line: &str) -> Result<Row, String> {
-        Self::row_of_line(self, run, line)
-    }
-}
 
 pub(crate) fn study(options: &StudyOptions) -> Result<(), Failure> {
     if Source::read(&options.study)?.kind()? == Kind::CarStudy {

@@ -4,10 +4,9 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use config::Source;
-use study::StudyError;
-use study::campaign::{BLOCK, in_blocks};
+use study::campaign::in_blocks;
 use trace::{ColumnKind, Damage, FolderLock, GrowingTable, ShownPath as _, partial_path, read_rows};
+use wetclutch::studies::Runs;
 
 use super::manifest::{Manifest, in_order};
 use crate::args::{Merge, Shard, StudyOptions};
@@ -16,28 +15,6 @@ use crate::failure::Failure;
 use crate::output;
 
 const ROWS: &str = "runs.csv";
-/// Number of rows after which the table is flushed: a killed program loses fewer rows than that.
-const FLUSH_EVERY: u64 = 64;
-
-/// Runs that study and number determine, and their rows.
-pub(super) trait Runs: Sync {
-    type Row: Send;
-
-    fn name(&self) -> &str;
-    /// The files that determine the rows, by their roles.
-    fn sources(&self) -> Vec<(&'static str, &Source)>;
-    /// SHA-256 of everything that determines the rows.
-    fn fingerprint(&self) -> String;
-    fn count(&self) -> u64;
-    fn header(&self) -> Vec<String>;
-    fn make(&self, run: u64) -> Result<Self::Row, StudyError>;
-    fn line(&self, row: &Self::Row) -> String;
-    fn row_of_line(&self, run: u64, line: &str) -> Result<Self::Row, String>;
-    /// Runs that a thread takes at once, and rows after which the table is flushed: few where a run takes long.
-    fn at_once(&self) -> [u64; 2] {
-        [BLOCK, FLUSH_EVERY]
-    }
-}
 
 /// A study, whole or a shard of it, and the folder with its rows.
 pub(super) struct Part<'a, R> {

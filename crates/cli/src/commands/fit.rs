@@ -1,0 +1,118 @@
+//! `wetclutch fit`.
+
+use std::path::Path;
+
+use config::{Kind, Source};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use trace::ShownPath as _;
+use wetclutch::fitted::ReportRow;
+use wetclutch::{FitOptions, FitProgress, Fitted, LogInput, VehicleFile, fit as fitted, read_sensors};
+
+use crate::args::Fit;
+use crate::commands::page::{check_page, write_html};
+use crate::commands::written::replaces_only;
+use crate::commands::{channel_map_of_car, check_output, not_an_input, write_text};
+use crate::failure::Failure;
+use crate::output;
+
+pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
+    check_output(Some(&options.output))?;
+    let inputs = || {
+        let files = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]);
+        files.chain(options.mapping.files())
+    };
+    not_an_input(Some(&options.output), inputs())?;
+    check_page(&options.page, inputs())?;
+    replaces_only("vehicle file", &options.output, is_vehicle_file)?;
+    let vehicle = VehicleFile::read(&options.vehicle)?;
+    let how = FitOptions {
+        sensors: options.sensors.as_deref().map(read_sensors).transpose()?,
+        output: Some(options.output.clone()),
+        with_page: options.page.page.is_some(),
+        interrupt: None,
+    };
+    let map = channel_map_of_car(&options.mapping, vehicle.wheel_radius_m())?;
+    let logs: Vec<LogInput<'_>> = options.logs.iter().map(|path| LogInput { path, table: None, map: &map }).collect();
+    let bar = progress();
+    let found = fitted(&vehicle, &logs, &how, &mut |at| show(&bar, at), &mut |note| {
+        bar.suspend(|| output::note(note));
+    });
+    bar.finish_and_clear();
+    let found = found?;
+    // Nobody has to read the report to its end.
+    write_text(&options.output, found.vehicle.text())?;
+    if options.json {
+        print_json(options, &found)?;
+    } else {
+        table(&found.parameters)?;
+        found.channels.iter().chain(&found.statements).try_for_each(|line| output::line(line))?;
+    }
+    report_file(options, &found);
+    found.page.map_or(Ok(()), |page| write_html(&options.page, &page))
+}
+
+fn show(bar: &ProgressBar, at: FitProgress<'_>) {
+    bar.set_message(at.to_string());
+    bar.tick();
+}
+
+/// Prints what was found in JSON: numbers in SI units.
+fn print_json(options: &Fit, found: &Fitted) -> Result<(), Failure> {
+    let parameter = |row: &ReportRow| {
+        json!({
+            "name": row.name,
+            "unit": row.measure.unit(),
+            "value": row.value,
+            "lower": row.interval[0],
+            "upper": row.interval[1],
+            "deviation_after_over_before": row.fraction,
+            "verdict": row.verdict.name(),
+        })
+    };
+    output::json(&json!({
+        "vehicle": options.vehicle.shown().to_string(),
+        "fitted": options.output.shown().to_string(),
+        "shifts": found.shifts,
+        "given_values_kept_because": found.kept,
+        "parameters": found.parameters.iter().map(parameter).collect::<Vec<_>>(),
+        "statements": found.statements,
+    }))
+}
+
+/// Reports what the file has, and of how many shifts, or why it has the given values.
+fn report_file(options: &Fit, found: &Fitted) {
+    let output = options.output.shown();
+    let shifts = if found.shifts == 1 { "1 shift".to_owned() } else { format!("{} shifts", found.shifts) };
+    output::note(&match &found.kept {
+        None => format!("fitted to {shifts}: {output}"),
+        Some(reason) => format!(
+            "warning: the given values are kept: {reason}. {output} is the given file with this reason in its first line; do not use other values \
+             before the reason is known"
+        ),
+    });
+}
+
+fn is_vehicle_file(path: &Path) -> bool {
+    let kind = Source::read(path).and_then(|source| source.kind());
+    kind.is_ok_and(|kind| matches!(kind, Kind::Vehicle | Kind::Car))
+}
+
+fn table(rows: &[ReportRow]) -> Result<(), Failure> {
+    let titles = ["", "value", "95 %", "after / before", ""].map(str::to_owned).to_vec();
+    let cells = rows.iter().map(|row| {
+        let verdict = format!(" {}", row.verdict.name());
+        vec![row.name.clone(), row.value_text(), row.interval_text(), format!("{:.2}", row.fraction), verdict]
+    });
+    Ok(output::table(1, &[titles].into_iter().chain(cells).collect::<Vec<_>>())?)
+}
+
+/// A line on standard error that says what is being done; nothing if standard error is not a terminal.
+fn progress() -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(None, output::progress_target());
+    // The template is a constant.
+    if let Ok(style) = ProgressStyle::with_template("{spinner} fit: {msg}  {elapsed}") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,70 @@
+//! All errors of a file, of any kind.
+
+use std::path::Path;
+
+use config::{
+    CarFile, CarStudy, ConfigError, DriveFile, ExperimentFile, GearboxFile, Kind, Source, Study, VehicleFile,
+    all_errors, check_learnt,
+};
+use logs::ChannelMap;
+use trace::ShownPath as _;
+
+use crate::Error;
+
+/// All errors of a file of any kind, and of those that it names; none if all of them can be used.
+///
+/// # Errors
+/// The file cannot be read at all.
+pub fn check(path: &Path) -> Result<Vec<Error>, Error> {
+    Ok(errors_of(&Source::read(path)?).into_iter().map(Error::from).collect())
+}
+
+/// All errors of a file and of those that it names.
+pub fn errors_of(source: &Source) -> Vec<ConfigError> {
+    all_errors(source, &|source| read(source.kind()?, source))
+}
+
+/// Reads a file of a kind, and the files that it names.
+fn read(kind: Kind, source: Source) -> Result<(), ConfigError> {
+    match kind {
+        Kind::Gearbox => GearboxFile::from_source(source).map(drop),
+        Kind::Car => CarFile::from_source(source).map(drop),
+        Kind::CarStudy => CarStudy::from_source(source).map(drop),
+        Kind::Drive => read_drive(source),
+        Kind::Vehicle => VehicleFile::from_source(source).map(drop),
+        Kind::Experiment => ExperimentFile::from_source(source)?.read_vehicle().map(drop),
+        Kind::Overlay => VehicleFile::check_overlay(&source),
+        Kind::Sensors => config::sensors_of(&source).map(drop),
+        Kind::Study => Study::from_source(source).map(drop),
+        Kind::Learnt => check_learnt(&source),
+        Kind::ChannelMap => read_map(&source),
+    }
+}
+
+/// Reads a drive file, and the vehicle file if it names one.
+fn read_drive(source: Source) -> Result<(), ConfigError> {
+    let drive = DriveFile::from_source(source)?;
+    drive.vehicle.as_ref().map_or(Ok(()), |_| drive.read_vehicle().map(drop))
+}
+
+/// Reads a channel map; its errors have the form of those of the other files.
+fn read_map(source: &Source) -> Result<(), ConfigError> {
+    let Err(error) = ChannelMap::of_text(&source.path, &source.text) else { return Ok(()) };
+    let (path, text) = (source.path.clone(), error.to_string());
+    let placed = text.strip_prefix(&format!("{}:", path.shown())).and_then(|rest| rest.split_once(": "));
+    let (line, message) = placed.and_then(|(line, message)| Some((line.parse().ok()?, message))).unwrap_or((1, &text));
+    let range = || -> Option<ConfigError> {
+        let (key, rest) = message.strip_prefix('`')?.split_once("` is ")?;
+        let (value, allowed) = rest.split_once(", expected ")?;
+        let value = value.parse().ok().filter(|_| allowed.contains(" to "))?;
+        Some(ConfigError::Range {
+            path: path.clone(),
+            line,
+            key: key.to_owned(),
+            value,
+            allowed: allowed.to_owned(),
+            hint: None,
+        })
+    };
+    Err(range().unwrap_or_else(|| ConfigError::Syntax { path: path.clone(), line, message: message.to_owned() }))
+}

@@ -1,0 +1,174 @@
+//! The fit of a car with a whole gearbox.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use car::Car;
+use config::CarFile;
+use fit::gearbox::{HeldOut, Recorded, Recorder, ShiftLog};
+use fit::{FitError, ReadingAges};
+use observer::ShiftTables;
+use report::sheet::Part;
+use study::gearbox::logged::LoggedDrive;
+use trace::ShownPath as _;
+
+use super::{
+    FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, names, nothing_held_out,
+    say_reasons,
+};
+use crate::estimate::gearbox::check_ratios;
+use crate::estimate::gearbox::source::{CarReading, CarSource};
+use crate::{Error, LogInput, Notes, VehicleFile, shell_quoted};
+
+/// Every so many shifts one is held out; of few more often.
+const HELD_OUT_EVERY: usize = 5;
+/// More shifts are thinned evenly.
+const SHIFTS_MAX: usize = 400;
+/// Steps between two reports of progress.
+const STEPS: u64 = 20_000;
+
+pub(super) fn fit(
+    file: &CarFile,
+    logs: &[LogInput<'_>],
+    options: &FitOptions,
+    progress: FitProgressTaker<'_>,
+    say: Notes<'_>,
+) -> Result<(Fitted, Part), Error> {
+    if file.gearbox.has_ratios_alone() {
+        return Err(Error::Input(format!(
+            "{}: the ratios alone are known of its gearbox, and a fit finds values of clutches and valves\n\
+             hint: describe its elements (level = \"stick-diagram\", or \"shares\"); `wetclutch inspect LOG --shifts -o PAGE.html` fits the \
+             converter without them",
+            file.source.path.shown()
+        )));
+    }
+    let sensors = options.sensors.as_ref();
+    let tables = LoggedDrive::tables(file, sensors)?;
+    let recorded = record((file, &tables), logs, options, progress, say)?;
+    say_reasons("not used", &recorded.skipped, say);
+    let Recorded { shifts, driving, .. } = recorded;
+    let (fitted_shifts, held_out) = divided(shifts);
+    if fitted_shifts.is_empty() {
+        return Err(no_shift(file, logs));
+    }
+    let found = fit::gearbox::fit(file, &tables, &fitted_shifts, &driving, &mut |at| {
+        progress(FitProgress::Fitting { shifts: at.shifts, iteration: at.iteration + 1 });
+        if options.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    progress(FitProgress::Validating);
+    let output = options.output.as_deref().unwrap_or(&file.source.path);
+    let fitted_file = |checked: Option<&HeldOut>| found.vehicle_file(file, output, &names(logs), checked);
+    let fitted = fitted_file(None)?;
+    let checked = found.validate((file, &tables), (&fitted, &LoggedDrive::tables(&fitted, sensors)?), &held_out);
+    let fitted = fitted_file(checked.as_ref())?;
+    let kept = found.reason_against(checked.as_ref());
+    let written = match &kept {
+        None => fitted,
+        Some(reason) => found.kept_file(file, output, reason)?,
+    };
+    let [scale, gain] = found.scale_and_gain;
+    let statements = [format!("turbine speed: one-step error {scale:.3} rad/s, g {gain:.2}")].into_iter();
+    let statements = statements.chain(found.statements());
+    let fitted = Fitted {
+        vehicle: VehicleFile::Gearbox(Box::new(written)),
+        parameters: found.report(),
+        channels: Vec::new(),
+        statements: statements.chain([checked.as_ref().map_or_else(nothing_held_out, said_of)]).collect(),
+        shifts: found.shifts,
+        kept,
+        page: None,
+    };
+    Ok((fitted, report::fit_page::gearbox_intervals(&found)))
+}
+
+/// The shifts of all logs.
+fn record(
+    (car, tables): (&CarFile, &ShiftTables<f64>),
+    logs: &[LogInput<'_>],
+    options: &FitOptions,
+    progress: FitProgressTaker<'_>,
+    say: Notes<'_>,
+) -> Result<Recorded, Error> {
+    let ages = options.sensors.as_ref().map(ReadingAges::of).unwrap_or_default();
+    let mut all = Recorded::default();
+    for log in logs {
+        progress(FitProgress::Reading { log: log.path, time_s: None });
+        let recorder = Recorder::new(car, tables, ages);
+        let one = record_one(*log, (car, tables), recorder, options, progress, say)?;
+        check_ratios(one.in_gear, None, Path::new(&car.source.path), log.path)?;
+        all.add(one);
+    }
+    Ok(all)
+}
+
+fn record_one(
+    log: LogInput<'_>,
+    (car, tables): (&Car, &ShiftTables<f64>),
+    mut recorder: Recorder<'_>,
+    options: &FitOptions,
+    progress: FitProgressTaker<'_>,
+    say: Notes<'_>,
+) -> Result<Recorded, Error> {
+    let mut opened = None;
+    let mut steps = CarSource::open(CarReading { car, tables, log, stop: None, threads: 1 }, &mut opened, say)?;
+    let mut count = 0_u64;
+    while let Some(step) = steps.next_step()? {
+        if options.is_interrupted() {
+            return Err(Error::interrupted());
+        }
+        recorder.push_reported(step.reported_n_m);
+        recorder.push(step.time_s, &step.input);
+        recorder.push_pressure(step.time_s, step.shift_pressures(tables));
+        recorder.push_element_pressures(step.time_s, &step.pressures);
+        count += 1;
+        if count.is_multiple_of(STEPS) {
+            progress(FitProgress::Reading { log: log.path, time_s: Some(step.time_s) });
+        }
+    }
+    steps.finish(say)?;
+    Ok(recorder.finish())
+}
+
+/// Shifts to fit, and shifts that are held out: every fifth, and at least [`HELD_OUT_MIN`]. Of more than a fit can use, some are left out evenly.
+fn divided(shifts: Vec<ShiftLog>) -> (Vec<ShiftLog>, Vec<ShiftLog>) {
+    let count = shifts.len();
+    let every = HELD_OUT_EVERY.min(count / HELD_OUT_MIN);
+    let is_held_out = |at: usize| count >= MIN_FOR_HELD_OUT && at % every == every - 1;
+    let some = SHIFTS_MAX.min(count);
+    let chosen = (0..some).map(|i| shifts[i * count / some.max(1)].clone()).enumerate();
+    let (held_out, fitted): (Vec<_>, Vec<_>) = chosen.partition(|(at, _)| is_held_out(*at));
+    let logs = |shifts: Vec<(usize, ShiftLog)>| shifts.into_iter().map(|(_, log)| log).collect();
+    (logs(fitted), logs(held_out))
+}
+
+fn no_shift(car: &CarFile, logs: &[LogInput<'_>]) -> Error {
+    let log = logs.first().map(|log| shell_quoted(log.path)).unwrap_or_default();
+    FitError::Input(format!(
+        "the logs have no shift between two gears that can be fitted\n\
+         hint: `wetclutch inspect {log} --shifts` with the same map and the ratios of {} lists the shifts that it finds; a fit needs \
+         `gear` and `target_gear`, which differ during a shift",
+        car.source.path.shown()
+    ))
+    .into()
+}
+
+/// The result on held-out shifts, in words.
+fn said_of(checked: &HeldOut) -> String {
+    /// Scale of the valves' errors below which the speeds may add nothing to what the valves say, as simulated cars show.
+    const GOOD_VALVES: f64 = 0.7;
+    let [given, fitted] = checked.turbine_rad_s;
+    let scale = checked.valve_error_scale;
+    let [low, high] = checked.valve_error_interval();
+    let mut text = format!(
+        "{} shifts held out: turbine speed while both clutches slip, by the torques of the given file off by {given:.2} rad/s, of the fitted one \
+         by {fitted:.2} rad/s; the fitted file is the better one in {}\n\
+         with this file the torques of these shifts by the valves alone err by {scale:.2} (95 % {low:.2} to {high:.2}) of what its error bounds say of friction and valves; `estimate` \
+         trusts the valves by as much (`error_bounds.valve_error_scale`)",
+        checked.shifts, checked.better
+    );
+    if scale < GOOD_VALVES {
+        text += ". With valves as good as these the speeds add little: in simulated cars the torques of `estimate` were 0.6 to 1.8 times as far off as \
+                 those of the valve model alone, which stand beside them";
+    }
+    text
+}

@@ -1,0 +1,190 @@
+//! Values of a car that fit logs.
+
+mod gearbox;
+mod one_shift;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use car::Sensors;
+use report::sheet::{Part, Sheet};
+use trace::ShownPath as _;
+
+pub use ::fit::{Measure, ReportRow, Verdict};
+
+use crate::{Column, Error, LogInput, Notes, Table, Values, VehicleFile};
+
+/// Fewer shifts are all fitted.
+const MIN_FOR_HELD_OUT: usize = 8;
+/// Minimum number of shifts that are held out.
+const HELD_OUT_MIN: usize = 3;
+/// Reasons that are reported one by one.
+const REASONS_MAX: usize = 10;
+
+/// How a car is fitted.
+#[derive(Debug, Clone, Default)]
+pub struct FitOptions {
+    /// The sensors that the logs were recorded with.
+    pub sensors: Option<Sensors>,
+    /// Where the fitted file will be: it names its gearbox file from there. In the place of the given one if there is none.
+    pub output: Option<PathBuf>,
+    /// Whether to make the page of the fit.
+    pub with_page: bool,
+    /// Set when the fit is to end with an error.
+    pub interrupt: Option<Arc<AtomicBool>>,
+}
+
+impl FitOptions {
+    fn is_interrupted(&self) -> bool {
+        self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+}
+
+/// How far a fit is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FitProgress<'a> {
+    /// A log is read, to this time, s, of its clock.
+    Reading {
+        /// The log.
+        log: &'a Path,
+        /// The time; none before its first row.
+        time_s: Option<f64>,
+    },
+    /// So many shifts are fitted.
+    Fitting {
+        /// How many.
+        shifts: usize,
+        /// Iteration, from 1.
+        iteration: u32,
+    },
+    /// The fitted car is compared with shifts that were held out.
+    Validating,
+}
+
+impl fmt::Display for FitProgress<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Reading { log, time_s: None } => write!(f, "reading {}", log.shown()),
+            Self::Reading { log, time_s: Some(time_s) } => write!(f, "reading {}, {time_s:.0} s", log.shown()),
+            Self::Fitting { shifts, iteration } => write!(f, "{shifts} shifts, iteration {iteration}"),
+            Self::Validating => f.write_str("checking on shifts that were held out"),
+        }
+    }
+}
+
+/// Takes how far a fit is.
+pub type FitProgressTaker<'a> = &'a mut dyn FnMut(FitProgress<'_>);
+
+/// A fitted car.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// Its vehicle file: the given one with the reason in its first line where the given values are kept.
+    pub vehicle: VehicleFile,
+    /// What was fitted: each quantity with its value and its interval of 95 %.
+    pub parameters: Vec<ReportRow>,
+    /// One-step errors of the channels of a vehicle file of one shift, in words.
+    pub channels: Vec<String>,
+    /// What else the logs show, in sentences.
+    pub statements: Vec<String>,
+    /// How many shifts were fitted.
+    pub shifts: usize,
+    /// Why the given values are kept, if they are.
+    pub kept: Option<String>,
+    /// The page of the fit, as HTML, if it was asked for.
+    pub page: Option<String>,
+}
+
+/// Fits the values of a car to logs.
+///
+/// ```
+/// use std::sync::Arc;
+/// use wetclutch::{FitOptions, LogInput, TemplateNumbers, VehicleFile, fit, read_drive, simulate};
+///
+/// let car = VehicleFile::template("8hp", &TemplateNumbers::of_mass(1900.0))?;
+/// let mut drive = read_drive("../../drives/city.toml".as_ref(), None)?;
+/// (drive.repetitions, drive.segments) = (1, drive.segments[..8].to_vec());
+/// let log = Arc::new(simulate(car.car().expect("it has a gearbox"), &drive)?.measured);
+/// let logs = [LogInput::of_table("the drive", &log)];
+/// let fitted = fit(&car, &logs, &FitOptions::default(), &mut |_| (), &mut |_| ())?;
+/// assert!(fitted.shifts > 2 && !fitted.parameters.is_empty());
+/// # Ok::<(), wetclutch::Error>(())
+/// ```
+///
+/// # Errors
+/// A log cannot be read or is not of this car, no shift can be fitted, the fit found no minimum, or it was interrupted.
+pub fn fit(
+    vehicle: &VehicleFile,
+    logs: &[LogInput<'_>],
+    options: &FitOptions,
+    progress: FitProgressTaker<'_>,
+    say: Notes<'_>,
+) -> Result<Fitted, Error> {
+    let (mut fitted, intervals) = match vehicle {
+        VehicleFile::Gearbox(file) => gearbox::fit(file, logs, options, progress, say)?,
+        VehicleFile::OneShift(file) => one_shift::fit(file, logs, options, progress, say)?,
+    };
+    if options.with_page {
+        fitted.page = Some(fitted.page_with(intervals, vehicle, logs)?);
+    }
+    Ok(fitted)
+}
+
+impl Fitted {
+    /// The fitted quantities, a row for each: value and interval of 95 % in the unit of the row; a factor is one on the value of the given file.
+    pub fn intervals(&self) -> Table {
+        let words = |word: fn(&ReportRow) -> &str| Values::Words(self.parameters.iter().map(word).collect());
+        let numbers = |number: fn(&ReportRow) -> f64| Values::Numbers(self.parameters.iter().map(number).collect());
+        let columns = [
+            ("parameter", words(|row| &row.name)),
+            ("unit", words(|row| row.measure.unit())),
+            ("value", numbers(|row| row.value)),
+            ("lower", numbers(|row| row.interval[0])),
+            ("upper", numbers(|row| row.interval[1])),
+            ("deviation_after_over_before", numbers(|row| row.fraction)),
+            ("verdict", words(|row| row.verdict.name())),
+        ];
+        Table { columns: columns.map(|(name, values)| Column { name: name.to_owned(), values }).into() }
+    }
+
+    /// Names of the quantities that the logs do not identify: they are known no better than before.
+    pub fn not_identifiable(&self) -> impl Iterator<Item = &str> {
+        let open = self.parameters.iter().filter(|row| row.verdict == Verdict::NotIdentifiable);
+        open.map(|row| row.name.as_str())
+    }
+
+    /// Intervals, and what was found, as a page.
+    fn page_with(&self, intervals: Part, given: &VehicleFile, logs: &[LogInput<'_>]) -> Result<String, Error> {
+        let kept = self.kept.as_ref().map(|reason| format!("warning: the given values are kept: {reason}"));
+        Ok(Sheet {
+            name: given.name(),
+            title: "fit",
+            lead: format!("fitted to {}", names(logs)),
+            sentences: self.statements.iter().cloned().chain(kept).collect(),
+            parts: vec![intervals],
+            sources: vec![given.source(), self.vehicle.source()],
+        }
+        .html()?)
+    }
+}
+
+/// The names of the logs.
+fn names(logs: &[LogInput<'_>]) -> String {
+    logs.iter().map(|log| log.path.shown().to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// What is said where nothing is held out.
+fn nothing_held_out() -> String {
+    format!("no shift is held out: fewer than {MIN_FOR_HELD_OUT} can be used, so nothing checks this fit")
+}
+
+/// Reports reasons, and how many more there are of many.
+fn say_reasons(what: &str, reasons: &[String], say: Notes<'_>) {
+    for reason in reasons.iter().take(REASONS_MAX) {
+        say(&format!("{what}: {reason}"));
+    }
+    if let Some(more @ 1..) = reasons.len().checked_sub(REASONS_MAX) {
+        say(&format!("{what}: {more} more"));
+    }
+}

@@ -1,0 +1,128 @@
+//! The fit of a car of one shift.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use car::Vehicle;
+use config::VehicleFile as OneShiftFile;
+use fit::{Channel, Collected, FitError, HeldOut, LogSource, ReadingAges, SHIFTS_MAX, ShiftRecord};
+use logs::{Log, LogError};
+use report::sheet::Part;
+use trace::ShownPath as _;
+
+use super::{
+    FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, names, nothing_held_out,
+    say_reasons,
+};
+use crate::table_text::TableText;
+use crate::{Error, LogInput, Notes, VehicleFile, shell_quoted};
+
+pub(super) fn fit(
+    file: &OneShiftFile,
+    logs: &[LogInput<'_>],
+    options: &FitOptions,
+    progress: FitProgressTaker<'_>,
+    say: Notes<'_>,
+) -> Result<(Fitted, Part), Error> {
+    let ages = options.sensors.as_ref().map(ReadingAges::of).unwrap_or_default();
+    let collected = collect(file, logs, options, progress)?;
+    collected.notes.iter().for_each(|note| say(&format!("warning: {note}")));
+    say_reasons("not used", &collected.skipped, say);
+    let kinds = collected.kinds.statement();
+    let (fitted_shifts, held_out) = divided(collected.shifts);
+    if fitted_shifts.is_empty() {
+        return Err(no_shift(file, logs, &kinds));
+    }
+    let found = fit::fit(file, &fitted_shifts, &collected.driving, ages, &mut |at| {
+        progress(FitProgress::Fitting { shifts: at.shifts, iteration: at.iteration + 1 });
+        if options.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    progress(FitProgress::Validating);
+    say_reasons("not fitted", &found.unusable, say);
+    let fitted = found.vehicle_file(file, &names(logs))?;
+    let checked = found.validate(file, &fitted, &held_out, ages)?;
+    let kept = found.reason_against(checked.as_ref());
+    let written = match &kept {
+        None => fitted,
+        Some(reason) => found.kept_file(file, reason)?,
+    };
+    let fitted = Fitted {
+        vehicle: VehicleFile::OneShift(Box::new(written)),
+        parameters: found.report(),
+        channels: found.channels.iter().map(channel_error).collect(),
+        statements: [found.statements(), vec![kinds, said_of(checked.as_ref())]].concat(),
+        shifts: found.shifts,
+        kept,
+        page: None,
+    };
+    Ok((fitted, report::fit_page::intervals(&found)))
+}
+
+/// One-step error and gain of a channel, in words.
+fn channel_error((channel, scale, gain): &(Channel, f64, f64)) -> String {
+    let (scale, unit) = if *channel == Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
+    format!("{}: one-step error {scale:.3} {unit}, g {gain:.2}", channel.name())
+}
+
+/// The shifts of all logs.
+fn collect(
+    file: &OneShiftFile,
+    logs: &[LogInput<'_>],
+    options: &FitOptions,
+    progress: FitProgressTaker<'_>,
+) -> Result<Collected, FitError> {
+    let is_stopped = || options.is_interrupted();
+    let mut all = Collected::default();
+    for log in logs {
+        progress(FitProgress::Reading { log: log.path, time_s: None });
+        let open = || opened(*log);
+        let source = LogSource { path: log.path, map: log.map, open: &open, is_stopped: &is_stopped };
+        let mut one = fit::collect(source, file)?;
+        one.notes.iter_mut().for_each(|note| *note = format!("{}: {note}", log.path.shown()));
+        all.add(one);
+    }
+    Ok(all)
+}
+
+fn opened(log: LogInput<'_>) -> Result<Log, LogError> {
+    let Some(table) = log.table else { return Log::open(log.path, &log.map.open) };
+    let text = TableText::new(Arc::clone(table));
+    let text = text.map_err(|source| LogError::Io { path: log.path.to_owned(), source })?;
+    Log::of_text(log.path, &log.map.open, Box::new(text))
+}
+
+/// Shifts to fit, and shifts that are held out: the last fifth. Of more than a fit can use, some are left out evenly.
+fn divided(mut shifts: Vec<ShiftRecord>) -> (Vec<ShiftRecord>, Vec<ShiftRecord>) {
+    let count = shifts.len();
+    let held_out =
+        if count < MIN_FOR_HELD_OUT { Vec::new() } else { shifts.split_off(count - HELD_OUT_MIN.max(count / 5)) };
+    let some = SHIFTS_MAX.min(shifts.len());
+    ((0..some).map(|i| shifts[i * shifts.len() / some].clone()).collect(), held_out)
+}
+
+fn no_shift(vehicle: &Vehicle, logs: &[LogInput<'_>], kinds: &str) -> Error {
+    let [from, to] = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
+    FitError::Input(format!(
+        "the logs have no power-on upshift from ratio {from:.3} to {to:.3} that can be fitted; {kinds}\n\
+         hint: `wetclutch inspect {} --shifts --ratios {from:.3},{to:.3}` with the same map lists the shifts that it finds",
+        logs.first().map(|log| shell_quoted(log.path)).unwrap_or_default()
+    ))
+    .into()
+}
+
+/// The result on held-out shifts, in words.
+fn said_of(checked: Option<&HeldOut>) -> String {
+    let Some(checked) = checked else { return nothing_held_out() };
+    let [given, fitted] = checked.turbine_rad_s;
+    let mut text = format!(
+        "{} shifts held out: one-step error of the turbine speed {given:.3} rad/s with the given file, {fitted:.3} with the fitted one",
+        checked.shifts
+    );
+    if let Some([given, fitted]) = checked.pressure_pa.map(|errors| errors.map(|error| 1e-3 * error)) {
+        text += &format!("; pressure of the valve maps against the measured one {given:.2} kPa, {fitted:.2} kPa");
+        if fitted > given {
+            text += " (worse with the fitted file: check scale, unit and place of the pressure sensor)";
+        }
+    }
+    text
+}
