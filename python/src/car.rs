@@ -8,9 +8,9 @@ use wetclutch::{TemplateNumbers, VehicleFile};
 use crate::error::exception;
 
 /// Name, kind, text, text of the gearbox, names of the gears and of the elements.
-type Described = (String, &'static str, String, Option<String>, Vec<String>, Vec<String>);
+pub(crate) type Described = (String, &'static str, String, Option<String>, Vec<String>, Vec<String>);
 
-fn described(vehicle: &VehicleFile) -> Described {
+pub(crate) fn described(vehicle: &VehicleFile) -> Described {
     let (gears, elements) = match vehicle {
         VehicleFile::Gearbox(file) => (
             file.car.gearbox.gears.iter().map(|gear| gear.name.clone()).collect(),

@@ -36,20 +36,21 @@ impl Given {
     }
 }
 
-/// Designs gains: the object that the command prints as JSON, and required offsets that are not reached, in words.
+/// Designs gains: the object that the command prints as JSON, required offsets that are not reached, in words, and the error systems by phase as JSON.
 #[pyfunction]
 pub(crate) fn design(
     py: Python<'_>,
     car: (String, String, Option<String>),
     shift: Option<String>,
     given: &Bound<'_, PyAny>,
-) -> PyResult<(String, Vec<String>)> {
+) -> PyResult<(String, Vec<String>, String)> {
     let (name, text, gearbox) = car;
     let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
     let given: Given = given.extract()?;
-    work::done(py, move |_| {
+    work::done(py, None, move |_| {
         let found = designed(&vehicle, shift.as_deref(), &given.options()?)?;
         let missed = found.missed.iter().map(ToString::to_string).collect();
-        Ok((serde_json::to_string(&found.json(vehicle.source())?)?, missed))
+        let models: Vec<_> = found.error_models.iter().map(|(phase, model)| (phase.name(), model)).collect();
+        Ok((serde_json::to_string(&found.json(vehicle.source())?)?, missed, serde_json::to_string(&models)?))
     })
 }

@@ -38,13 +38,14 @@ pub(crate) struct Mapping {
 }
 
 impl Mapping {
-    fn read(self, vehicle: &VehicleFile) -> Result<ChannelMap, Error> {
+    /// The map of a log, with the wheel radius of its car where that is known and the map has none.
+    pub(crate) fn read(self, vehicle: Option<&VehicleFile>) -> Result<ChannelMap, Error> {
         let mut map = self.map.as_deref().map(ChannelMap::read).transpose()?.unwrap_or_default();
         self.channels.iter().try_for_each(|channel| map.set(channel))?;
         if self.dbc.is_some() {
             map.open.dbc = self.dbc;
         }
-        map.gearbox.wheel_radius_m.get_or_insert(vehicle.wheel_radius_m());
+        map.gearbox.wheel_radius_m = map.gearbox.wheel_radius_m.or(vehicle.map(VehicleFile::wheel_radius_m));
         Ok(map)
     }
 }
@@ -94,9 +95,9 @@ pub(crate) fn estimate(
     let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
     let given: Given = given.extract()?;
     let table = table.map(|table| Arc::clone(&table.get().table));
-    let (vehicle, found) = work::done(py, move |stop| {
-        let map = mapping.read(&vehicle)?;
-        let options = EstimateOptions { interrupt: Some(stop), ..given.options(&vehicle)? };
+    let (vehicle, found) = work::done(py, None, move |work| {
+        let map = mapping.read(Some(&vehicle))?;
+        let options = EstimateOptions { interrupt: Some(work.stop()), ..given.options(&vehicle)? };
         let path: &Path = &path;
         let found = wetclutch::estimate(&vehicle, LogInput { path, table: table.as_ref(), map: &map }, &options)?;
         Ok((vehicle, found))

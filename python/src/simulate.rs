@@ -1,7 +1,6 @@
 //! Simulated drives.
 
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 use pyo3::prelude::*;
 use wetclutch::{Error, VehicleFile};
@@ -24,9 +23,9 @@ pub(crate) fn simulate(
         let message = "car: a drive needs a car with a gearbox, and this is one of a single shift".to_owned();
         return Err(exception(py, &Error::Input(message)));
     };
-    let run = work::done(py, move |stop| {
+    let run = work::done(py, None, move |work| {
         let drive = wetclutch::read_drive(&drive, seed)?;
-        let is_stopped = || stop.load(Ordering::Relaxed);
+        let is_stopped = || work.is_stopped();
         wetclutch::simulate::simulate_until(&file.car, &drive, &is_stopped)
     })?;
     let summary = (run.summary.distance_m, run.summary.shifts, run.summary.fastest_m_s);

@@ -60,3 +60,23 @@ def test_what_cannot_be_designed_is_refused() -> None:
         with pytest.raises(wc.InputError, match="expected 0.0001 to 0.2") as out:
             wc.design(car, shift="1-2", method="interval", sample_time_s=value)
         assert out.value.key == "sample_time_s"
+
+
+def test_the_error_system_is_one_of_python_control() -> None:
+    control, np = pytest.importorskip("control"), pytest.importorskip("numpy")
+    gains, certificate = wc.design(wc.Car.read(EIGHT_SPEED), shift="1-2", method="peak-to-peak")
+    for phase, certified in (("torque_phase", certificate.torque_phase), ("inertia_phase", certificate.inertia_phase)):
+        systems = [system for system in gains.error_systems if system.phase == phase]
+        assert certified is not None and len(systems) == len(certified.vertices)
+        for corner in range(len(systems)):
+            system = gains.to_control(phase, corner)
+            assert isinstance(system, control.StateSpace) and system.dt == 0.01
+            assert system.output_labels == ["pressure_pa_error"] and "mass" in system.input_labels
+            # The largest error of causes at their bounds, with any signs.
+            worst_pa, response = np.abs(system.D).sum(), system.C
+            for _ in range(3000):
+                worst_pa += np.abs(response @ system.B).sum()
+                response = response @ system.A
+            assert 0.0 < worst_pa <= 1.001 * certified.bound_pa
+    with pytest.raises(wc.InputError, match="no corner"):
+        wc.design(wc.Car.read(EIGHT_SPEED), shift="1-2")[0].to_control()

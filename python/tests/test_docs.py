@@ -29,7 +29,7 @@ def test_the_examples_of_the_docstrings_run(module: object) -> None:
 def test_the_page_on_python_runs(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "how-to" / "use-from-python.md").read_text(encoding="utf-8")
     code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.S))
-    for folder in ("vehicles", "gearboxes", "drives"):
+    for folder in ("vehicles", "gearboxes", "drives", "experiments"):
         (tmp_path / folder).symlink_to(ROOT / folder)
     begin = "import matplotlib\nmatplotlib.use('Agg')\n"
     done = subprocess.run([sys.executable, "-c", begin + code], cwd=tmp_path, capture_output=True, text=True)

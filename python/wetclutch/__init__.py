@@ -11,10 +11,13 @@ Quantities are in SI units, and names end in their unit. Tables are Arrow data: 
 from __future__ import annotations
 
 from ._car import Car, gearboxes
-from ._design import Certificate, Gains, PhaseCertificate, design
+from ._check import check
+from ._design import Certificate, ErrorSystem, Gains, PhaseCertificate, design
 from ._errors import InputError, WetclutchError, WorkError
 from ._estimate import Estimates, Log, estimate, read
+from ._fit import Fit, fit
 from ._simulate import Simulation, simulate
+from ._study import Study, study
 from ._table import Table
 from ._wetclutch import ClutchStep, Observer, StepEstimate, __version__
 
@@ -22,7 +25,9 @@ __all__ = [
     "Car",
     "Certificate",
     "ClutchStep",
+    "ErrorSystem",
     "Estimates",
+    "Fit",
     "Gains",
     "InputError",
     "Log",
@@ -30,13 +35,17 @@ __all__ = [
     "PhaseCertificate",
     "Simulation",
     "StepEstimate",
+    "Study",
     "Table",
     "WetclutchError",
     "WorkError",
     "__version__",
+    "check",
     "design",
     "estimate",
+    "fit",
     "gearboxes",
     "read",
     "simulate",
+    "study",
 ]

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import os
-import re
-import tomllib
 from typing import Any, Self
 
 from . import _wetclutch as native
 from ._errors import InputError
-
-_PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def gearboxes() -> tuple[str, ...]:
@@ -123,6 +119,8 @@ class Car:
         """
         path = os.fspath(path)
         if self._gearbox is not None:
+            import tomllib
+
             named = os.path.join(os.path.dirname(path), tomllib.loads(self._text)["gearbox"])
             if os.path.exists(named):
                 with open(named, encoding="utf-8") as there:
@@ -146,6 +144,8 @@ class Car:
         >>> car.replace(vehicle__mass_kg=2000.0) == car
         False
         """
+        import tomllib
+
         table = tomllib.loads(self._text)
         for key, value in {**(values or {}), **{key.replace("__", "."): value for key, value in keys.items()}}.items():
             parts = key.split(".")
@@ -187,7 +187,8 @@ def _write_whole(path: str, text: str) -> None:
 
 
 def _key(key: str) -> str:
-    return key if _PLAIN_KEY.fullmatch(key) else _value(key)
+    is_plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if is_plain else _value(key)
 
 
 def _value(value: Any) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 from . import _wetclutch as native
 from ._car import Car
+from ._errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,60 @@ class Certificate:
 
 
 @dataclass(frozen=True, slots=True)
+class ErrorSystem:
+    """How the error of an estimate follows from its causes at a corner of the polytope, from sample to sample: ``x+ = A x + B w``, ``e = C x + D w``.
+
+    Each cause ``w`` is -1 to 1 times its bound of the error budget; ``e`` is the error of the estimate.
+
+    Attributes:
+        phase: ``"torque_phase"`` or ``"inertia_phase"``.
+        label: The corner: friction coefficient and lag of the valve.
+        sample_time_s: Sample time, s.
+        states: Names of the states and of the errors with their units; the pressure is the last.
+        causes: Names of the causes; one that acts in several ways is there for each.
+        a: ``A`` by rows.
+        b: ``B`` by rows, in the units of the states.
+        c: ``C`` by rows.
+        d: ``D`` by rows, in the units of the states.
+    """
+
+    phase: str
+    label: str
+    sample_time_s: float
+    states: tuple[str, ...]
+    causes: tuple[str, ...]
+    a: tuple[tuple[float, ...], ...]
+    b: tuple[tuple[float, ...], ...]
+    c: tuple[tuple[float, ...], ...]
+    d: tuple[tuple[float, ...], ...]
+
+    def to_control(self) -> Any:
+        """The same as a ``control.StateSpace`` with these names; needs python-control."""
+        import control
+
+        # A name may be there once.
+        numbers: dict[str, int] = {}
+        inputs = []
+        for cause in self.causes:
+            numbers[cause] = numbers.get(cause, 0) + 1
+            inputs.append(cause if numbers[cause] == 1 else f"{cause} {numbers[cause]}")
+        return control.ss(
+            self.a,
+            self.b,
+            self.c,
+            self.d,
+            self.sample_time_s,
+            states=list(self.states),
+            inputs=inputs,
+            outputs=[f"{state}_error" for state in self.states],
+            name=self.phase,
+        )
+
+    def __repr__(self) -> str:
+        return f"ErrorSystem({self.phase}, {self.label}, {len(self.causes)} causes)"
+
+
+@dataclass(frozen=True, slots=True)
 class Gains:
     """Gains of an observer, by phase: their numbers by the names of ``wetclutch design --json``.
 
@@ -60,11 +115,25 @@ class Gains:
         observer: The observer that they are for.
         torque_phase: Gains of the phase in which the load moves from the offgoing to the oncoming clutch.
         inertia_phase: Gains of the phase in which both clutches slip.
+        error_systems: The error systems of gains for a sample time, of each phase at each corner; none of others.
     """
 
     observer: str
     torque_phase: Mapping[str, Any]
     inertia_phase: Mapping[str, Any]
+    error_systems: tuple[ErrorSystem, ...] = ()
+
+    def to_control(self, phase: str = "inertia_phase", corner: int = 0) -> Any:
+        """The error system of a phase at a corner as a ``control.StateSpace``; needs python-control.
+
+        Raises:
+            InputError: There is none: the gains are not for a sample time.
+        """
+        systems = [system for system in self.error_systems if system.phase == phase]
+        if not 0 <= corner < len(systems):
+            hint = "design with a method for a sample time, such as peak-to-peak" if not systems else None
+            raise InputError(f"there is no corner {corner} of {phase!r}: there are {len(systems)}", hint=hint)
+        return systems[corner].to_control()
 
     def to_hex(self) -> dict[str, Any]:
         """The gains with each number in hexadecimal, in which it is exact."""
@@ -123,10 +192,11 @@ def design(
         "error_bound": error_bound,
         "offset_max_pa": offset_max_pa,
     }
-    text, not_met = native.design(car._native, shift, options)
+    text, not_met, models = native.design(car._native, shift, options)
     torque, inertia = (json.loads(text)[phase] for phase in ("torque_phase", "inertia_phase"))
     certificate = Certificate(_certificate(torque), _certificate(inertia), tuple(not_met), text)
-    return Gains(observer, _gains(torque), _gains(inertia)), certificate
+    systems = tuple(_error_system(phase, model, inertia["sample_time_s"]) for phase, model in json.loads(models))
+    return Gains(observer, _gains(torque), _gains(inertia), systems), certificate
 
 
 #: What of the object of a phase is a gain.
@@ -135,6 +205,12 @@ _GAINS = ("gain_pa_s_rad", "gain_normalised", "gains", "speed_rad_s2", "pressure
 
 def _gains(phase: Mapping[str, Any]) -> dict[str, Any]:
     return {name: phase[name] for name in _GAINS if name in phase}
+
+
+def _error_system(phase: str, model: Mapping[str, Any], sample_time_s: float) -> ErrorSystem:
+    a, b, c, d = (tuple(tuple(row) for row in model[name]) for name in "abcd")
+    states, causes = tuple(model["states"]), tuple(model["causes"])
+    return ErrorSystem(phase, model["label"], sample_time_s, states, causes, a, b, c, d)
 
 
 def _certificate(phase: Mapping[str, Any]) -> PhaseCertificate | None:

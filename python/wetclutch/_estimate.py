@@ -21,14 +21,46 @@ class Log:
         table: The table in memory, or None.
         map: Channel map, a file as ``wetclutch inspect --suggest`` writes it.
         dbc: Messages and signals of a CAN log.
-        channels: Channels by signals, such as ``{"engine_speed": "N_Eng [rpm]"}``; they replace those of the map.
+        mapped: Channels by signals, such as ``{"engine_speed": "N_Eng [rpm]"}``; they replace those of the map.
     """
 
     path: str | None = None
     table: Table | None = None
     map: str | None = None
     dbc: str | None = None
-    channels: Mapping[str, str] = field(default_factory=dict)
+    mapped: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def channels(self) -> Table:
+        """The channels of the log, a row for each: unit, samples, period, span, values and gaps. Reads the whole log.
+
+        >>> log = read({"time_s": [0.0, 0.01, 0.02], "nTurbine": [900.0, 905.0, 910.0]})
+        >>> log.channels["channel"], float(log.channels["maximum"][0])
+        (['nTurbine'], 910.0)
+        """
+        return Table(native.log_channels(self._native))
+
+    def suggest(self) -> str:
+        """A first channel map by the names and units of the channels, as text for a file that goes after ``map``; check every line of it."""
+        return native.log_map(self._native)
+
+    def shifts(self, ratios: Sequence[float] = ()) -> Table:
+        """The shifts that the speeds of the log show, a row for each: gears, kind, times, flare and jerk. They need no car.
+
+        Args:
+            ratios: Ratios of the forward gears, the first one first, in place of those of the map; needed where no gear is mapped.
+
+        Raises:
+            InputError: The log cannot be read, or nothing in it tells a shift.
+        """
+        return Table(native.shifts_of_log(self._native, list(ratios)))
+
+    @property
+    def _native(self) -> tuple[str, native.Table | None, dict[str, Any]]:
+        """Its name, its table if it is one in memory, and how its channels are mapped."""
+        channels = [f"{signal}={channel}" for signal, channel in self.mapped.items()]
+        mapping = {"map": self.map, "dbc": self.dbc, "channels": channels}
+        return self.path or "the table", None if self.table is None else self.table._table, mapping
 
 
 def read(
@@ -57,7 +89,7 @@ def read(
         table=None if is_file else Table(log),
         map=None if map is None else os.fspath(map),
         dbc=None if dbc is None else os.fspath(dbc),
-        channels=dict(channels or {}),
+        mapped=dict(channels or {}),
     )
 
 
@@ -80,11 +112,7 @@ class Estimates:
     page: str | None
 
     def _repr_html_(self) -> str | None:
-        if self.page is None:
-            return None
-        from html import escape
-
-        return f'<iframe srcdoc="{escape(self.page)}" style="width:100%;height:640px;border:0"></iframe>'
+        return framed(self.page)
 
     def __repr__(self) -> str:
         return f"Estimates({self.rows.rows} rows, {self.shifts.rows} shifts)"
@@ -104,6 +132,15 @@ class Estimates:
         from ._plot import plot_shift
 
         return plot_shift(self, shift)
+
+
+def framed(page: str | None) -> str | None:
+    """A page in a frame of a notebook."""
+    if page is None:
+        return None
+    from html import escape
+
+    return f'<iframe srcdoc="{escape(page)}" style="width:100%;height:640px;border:0"></iframe>'
 
 
 def estimate(
@@ -144,11 +181,6 @@ def estimate(
         log = read(log)
     if not 1 <= threads <= 1024:
         raise ValueError(f"threads is {threads}, expected 1 to 1024")
-    mapping = {
-        "map": log.map,
-        "dbc": log.dbc,
-        "channels": [f"{signal}={channel}" for signal, channel in log.channels.items()],
-    }
     options = {
         "observer": observer,
         "method": method,
@@ -160,7 +192,6 @@ def estimate(
         "threads": threads,
         "with_page": page,
     }
-    table = None if log.table is None else log.table._table
-    name = "the table" if log.path is None else log.path
+    name, table, mapping = log._native
     rows, found, findings, learnt_now, html = native.estimate(car._native, name, table, mapping, options)
     return Estimates(Table(rows), Table(found), tuple(findings), learnt_now, html)

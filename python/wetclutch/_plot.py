@@ -1,4 +1,4 @@
-"""Figures of estimates; they need matplotlib."""
+"""Figures of estimates, fits and studies; they need matplotlib."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ._estimate import Estimates
+    from ._fit import Fit
+    from ._study import Study
 
 #: Time before and after a shift that is drawn, s.
 _AROUND_S = (0.4, 0.6)
 _COLOURS = {"offgoing": "#b5541c", "oncoming": "#1f6fb4"}
+#: Ratio of the standard deviations after and before a fit below which logs identify a quantity, and its colours.
+_IDENTIFIED, _PARTLY = (1.0 / 3.0, "#2e7d32"), (0.7, "#d98200")
 
 
 def plot_shift(estimates: Estimates, number: int) -> Any:
@@ -46,3 +50,53 @@ def plot_shift(estimates: Estimates, number: int) -> Any:
     axes[1].set_xlabel("time, s")
     del figure
     return axes
+
+
+def plot_fit(fit: Fit) -> Any:
+    """The intervals of a fit on those before it, in halves of these: the given car is at zero."""
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    table = fit.intervals
+    values, lower, upper, ratio = (
+        np.asarray(table[name]) for name in ("value", "lower", "upper", "deviation_after_over_before")
+    )
+    # A factor is one of the given value, and its interval is one of its logarithm.
+    is_factor = (np.asarray(table["unit"]) == "1") & (lower > 0.0)
+    middle, low, high = (np.where(is_factor, np.log(np.where(is_factor, of, 1.0)), of) for of in (values, lower, upper))
+    after = np.minimum(np.where(np.isfinite(ratio), ratio, 1.0), 1.0)
+    half = np.maximum(0.5 * (high - low), np.finfo(float).tiny)
+    middle = middle * after / half
+    limits = (_IDENTIFIED, _PARTLY, (np.inf, "#8a8a8a"))
+    colours = [next(colour for limit, colour in limits if of < limit) for of in after]
+    figure, axis = plt.subplots(figsize=(8, 0.28 * table.rows + 1.0), layout="constrained")
+    rows = np.arange(table.rows)
+    axis.barh(rows, np.full(table.rows, 2.0), left=-1.0, color="#e6e6e6", height=0.7)
+    axis.barh(rows, 2.0 * after, left=middle - after, color=colours, height=0.45)
+    axis.plot(middle, rows, "k|")
+    axis.set_yticks(rows, table["parameter"])
+    axis.invert_yaxis()
+    axis.set_xlabel("interval of 95 % after the fit, in halves of that before it (grey)")
+    axis.set_title(f"fit to {fit.shifts} shifts")
+    axis.grid(axis="x", alpha=0.3)
+    del figure
+    return axis
+
+
+def plot_distribution(study: Study, column: str) -> Any:
+    """The cumulative distribution of a column over the runs that have it."""
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    values = np.asarray(study.rows[column])
+    if values.dtype != np.float64:
+        raise TypeError(f"column `{column}` has words")
+    values = np.sort(values[np.isfinite(values)])
+    figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
+    axis.step(values, np.arange(1, len(values) + 1) / max(1, len(values)), where="post", color=_COLOURS["oncoming"])
+    axis.set_xlabel(column)
+    axis.set_ylabel("fraction of the runs")
+    axis.set_title(f"{study.name}: {len(values)} of {study.rows.rows} runs")
+    axis.grid(alpha=0.3)
+    del figure
+    return axis

@@ -1,4 +1,4 @@
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import Any, TypeAlias, final
 
@@ -13,10 +13,18 @@ __all__ = [
     "__version__",
     "check_car",
     "design",
+    "errors_of_file",
     "estimate",
+    "fit",
     "gearboxes",
+    "log_channels",
+    "log_map",
     "read_car",
+    "shifts_of_log",
     "simulate",
+    "study_files",
+    "study_rows",
+    "study_table",
     "template_car",
 ]
 
@@ -142,7 +150,7 @@ def simulate(
 ) -> tuple[Table, Table, tuple[float, int, float]]: ...
 def design(
     car: tuple[str, str, str | None], shift: str | None, given: Mapping[str, Any]
-) -> tuple[str, list[str]]: ...
+) -> tuple[str, list[str], str]: ...
 def estimate(
     car: tuple[str, str, str | None],
     path: str,
@@ -150,3 +158,26 @@ def estimate(
     mapping: Mapping[str, Any],
     given: Mapping[str, Any],
 ) -> tuple[Table, Table, list[str], str | None, str | None]: ...
+def fit(
+    car: tuple[str, str, str | None],
+    logs: Sequence[tuple[str, Table | None, Mapping[str, Any]]],
+    sensors: str | None,
+    with_page: bool,
+    progress: Callable[[str, float | None], object] | None,
+) -> tuple[
+    tuple[str, str, str, str | None, list[str], list[str]],
+    Table,
+    list[str],
+    list[str],
+    list[str],
+    int,
+    str | None,
+    str | None,
+]: ...
+def study_files(path: str, text: str | None) -> tuple[list[tuple[str, str]], str, str, int, str, int]: ...
+def study_rows(path: str, first: int, end: int, threads: int) -> bytes: ...
+def study_table(path: str, lines: bytes, shown: str | None) -> tuple[Table, str | None]: ...
+def log_channels(log: tuple[str, Table | None, Mapping[str, Any]]) -> Table: ...
+def log_map(log: tuple[str, Table | None, Mapping[str, Any]]) -> str: ...
+def shifts_of_log(log: tuple[str, Table | None, Mapping[str, Any]], ratios: Sequence[float]) -> Table: ...
+def errors_of_file(path: str) -> list[Exception]: ...

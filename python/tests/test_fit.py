@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+import wetclutch as wc
+
+from conftest import ROOT
+
+np = pytest.importorskip("numpy")
+pa = pytest.importorskip("pyarrow")
+
+
+@pytest.fixture(scope="module")
+def fitted(car: wc.Car, measured: wc.Table) -> wc.Fit:
+    return wc.fit(car, measured, page=True)
+
+
+def test_a_fitted_car_is_used_at_once(car: wc.Car, measured: wc.Table, fitted: wc.Fit) -> None:
+    assert fitted.shifts > 3 and fitted.car.gears == car.gears and fitted.car != car
+    assert wc.estimate(fitted.car, measured).shifts.rows > 3
+    table = pa.table(fitted.intervals)
+    assert table.num_rows > 10 and set(table["unit"].to_pylist()) <= {"1", "s", "Pa", "N m"}
+    assert all(low <= at <= high for low, at, high in zip(*(fitted.intervals[name] for name in ("lower", "value", "upper"))))
+    assert set(fitted.not_identifiable) < set(fitted.intervals["parameter"])
+    assert fitted.page and "<html" in fitted.page and fitted._repr_html_()
+    assert len(repr(fitted)) < 120 and pickle.loads(pickle.dumps(fitted)) == fitted
+
+
+def test_the_command_gives_the_same_fit(measured: wc.Table, fitted: wc.Fit, tmp_path: Path) -> None:
+    command = os.environ.get("WETCLUTCH")
+    if not command:
+        pytest.skip("WETCLUTCH names no binary")
+    log, vehicle, out = tmp_path / "log.csv", ROOT / "vehicles" / "six_speed.toml", tmp_path / "fitted.toml"
+    measured.to_pandas().to_csv(log, index=False)
+    subprocess.run([command, "fit", log, "--vehicle", vehicle, "-o", out], check=True, capture_output=True)
+    values = [line for line in out.read_text().splitlines() if not line.startswith(("#", "gearbox"))]
+    assert values == [line for line in fitted.car.to_toml().splitlines() if not line.startswith(("#", "gearbox"))]
+
+
+def test_several_logs_are_fitted_together(car: wc.Car, measured: wc.Table, fitted: wc.Fit) -> None:
+    half = measured.rows // 2
+    parts = [{name: measured[name][part] for name in measured} for part in (slice(0, half), slice(half, None))]
+    both = wc.fit(car, parts)
+    assert abs(both.shifts - fitted.shifts) <= 1
+    copied = wc.fit(car, [measured, measured])
+    assert copied.shifts == fitted.shifts and any("the same readings" in finding for finding in copied.findings)
+
+
+def test_a_shift_of_a_one_shift_car_is_fitted() -> None:
+    two_speed = wc.Car.read(ROOT / "vehicles" / "two_speed_at.toml")
+    with pytest.raises(wc.InputError):
+        wc.fit(two_speed, {"time_s": [0.0, 0.01], "turbine_speed_rad_s": [100.0, 100.0]})
+
+
+def test_intervals_are_drawn(fitted: wc.Fit) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    axis = fitted.plot()
+    assert [label.get_text() for label in axis.get_yticklabels()] == fitted.intervals["parameter"]
+
+
+def test_progress_comes_at_most_ten_times_a_second_and_may_end_the_fit(car: wc.Car, measured: wc.Table) -> None:
+    times: list[float] = []
+
+    def progress(words: str, fraction: float | None) -> None:
+        assert words and fraction is None
+        times.append(time.monotonic())
+
+    wc.fit(car, measured, progress=progress)
+    assert all(later - before > 0.09 for before, later in zip(times, times[1:]))
+
+    def failing(words: str, fraction: float | None) -> None:
+        raise LookupError(words)
+
+    if times:
+        with pytest.raises(LookupError):
+            wc.fit(car, measured, progress=failing)
+
+
+def test_ctrl_c_ends_a_fit(car: wc.Car, run: wc.Simulation) -> None:
+    threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        wc.fit(car, [run.measured] * 20)
+    assert time.monotonic() - begin < 10.0
+
+
+def test_what_cannot_be_fitted_is_refused(car: wc.Car, measured: wc.Table) -> None:
+    with pytest.raises(wc.InputError, match="no shift") as raised:
+        wc.fit(car, {name: measured[name][:50] for name in measured})
+    assert raised.value.hint
+    for wrong in ([], {"time_s": []}, ROOT / "no_such.csv"):
+        with pytest.raises(wc.InputError):
+            wc.fit(car, wrong)

@@ -1,0 +1,99 @@
+"""Fits of cars to logs."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from . import _wetclutch as native
+from ._car import Car
+from ._estimate import Log, framed, read
+from ._progress import Progress, reported
+from ._table import Table
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A car that was fitted to logs.
+
+    Attributes:
+        car: The fitted car, for :func:`estimate` at once; the given one with the reason in its first line if ``kept`` is not None.
+        intervals: A row for each fitted quantity: ``value`` and ``lower`` to ``upper``, the interval that contains it in 95 %, in ``unit``;
+            a value with the unit 1 is a factor on that of the given car. ``deviation_after_over_before`` is the ratio of its standard
+            deviations, and ``verdict`` says whether these logs identify it.
+        not_identifiable: Names of the quantities that these logs do not identify: they are known no better than before.
+        statements: What else the logs show, in sentences.
+        findings: What was found in the logs, in sentences.
+        shifts: How many shifts were fitted.
+        kept: Why the given values are kept, or None.
+        page: The page of the fit as HTML, if it was asked for.
+    """
+
+    car: Car
+    intervals: Table
+    not_identifiable: tuple[str, ...]
+    statements: tuple[str, ...]
+    findings: tuple[str, ...]
+    shifts: int
+    kept: str | None
+    page: str | None
+
+    def plot(self) -> Any:
+        """Draws each interval on what was known before; needs matplotlib.
+
+        Returns:
+            The axes of the figure.
+        """
+        from ._plot import plot_fit
+
+        return plot_fit(self)
+
+    def _repr_html_(self) -> str | None:
+        return framed(self.page)
+
+    def __repr__(self) -> str:
+        kept = ", given values kept" if self.kept is not None else ""
+        identified = self.intervals.rows - len(self.not_identifiable)
+        return f"Fit({self.shifts} shifts, {identified} of {self.intervals.rows} quantities identifiable{kept})"
+
+
+def fit(
+    car: Car,
+    logs: Any,
+    *,
+    sensors: str | os.PathLike[str] | None = None,
+    page: bool = False,
+    progress: Progress = False,
+) -> Fit:
+    """Fits the values of a car to logs. The results are those of ``wetclutch fit``.
+
+    Ends soon after Ctrl-C; other threads of Python run meanwhile.
+
+    Args:
+        car: The car to start from; its error budget says how far off its values may be.
+        logs: A log, or a list or tuple of logs: each a :class:`Log`, or what :func:`read` makes one of.
+        sensors: File whose table ``sensors`` describes the sensors of the logs.
+        page: Whether to make the page of the fit.
+        progress: True for a bar, or a function that takes words and the done fraction or None, at most ten times a second.
+
+    Raises:
+        InputError: A log cannot be read or is not of this car, or no shift can be fitted.
+        WorkError: The fit found no minimum.
+    """
+    many = list(logs) if isinstance(logs, (list, tuple)) else [logs]
+    given = [(log if isinstance(log, Log) else read(log))._native for log in many]
+    with reported(progress) as report:
+        fitted, intervals, not_identifiable, statements, findings, shifts, kept, html = native.fit(
+            car._native, given, None if sensors is None else os.fspath(sensors), page, report
+        )
+    return Fit(
+        car=Car._of(fitted),
+        intervals=Table(intervals),
+        not_identifiable=tuple(not_identifiable),
+        statements=tuple(statements),
+        findings=tuple(findings),
+        shifts=shifts,
+        kept=kept,
+        page=html,
+    )
