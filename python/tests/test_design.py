@@ -3,7 +3,10 @@ from __future__ import annotations
 import json
 import os
 import pickle
+import shutil
 import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -80,3 +83,24 @@ def test_the_error_system_is_one_of_python_control() -> None:
             assert 0.0 < worst_pa <= 1.001 * certified.bound_pa
     with pytest.raises(wc.InputError, match="no corner"):
         wc.design(wc.Car.read(EIGHT_SPEED), shift="1-2")[0].to_control()
+
+
+def test_a_design_uses_its_own_routines_beside_others_of_the_same_names(tmp_path: Path) -> None:
+    compiler = shutil.which("cc")
+    if compiler is None or sys.platform != "linux":
+        pytest.skip("there is no C compiler")
+    names = ("dgemm_", "dgemv_", "dsyrk_", "dsymv_", "dpotrf_", "dpotrs_", "dgesv_", "dsyevr_", "dgesdd_", "dgesvd_")
+    source, library = tmp_path / "other.c", tmp_path / "other.so"
+    source.write_text("#include <stdlib.h>\n" + "".join(f"void {name}(void) {{ abort(); }}\n" for name in names))
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
+    code = (
+        "import ctypes, sys, wetclutch as wc\n"
+        "others = len(sys.argv) > 2 and ctypes.CDLL(None).dgemm_\n"
+        "print(wc.design(wc.Car.read(sys.argv[1]), shift='1-2', method='peak-to-peak')[1].text)"
+    )
+    alone = subprocess.run([sys.executable, "-c", code, EIGHT_SPEED], check=True, capture_output=True)
+    environment = {**os.environ, "LD_PRELOAD": str(library)}
+    beside = subprocess.run(
+        [sys.executable, "-c", code, EIGHT_SPEED, "others"], check=True, capture_output=True, env=environment
+    )
+    assert alone.stdout == beside.stdout and alone.stdout

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import wetclutch as wc
 
@@ -96,6 +98,35 @@ def test_wrong_readings_end_in_an_estimate_or_an_error(car: wc.Car, measured: wc
         except wc.InputError:
             continue
         assert found.rows.rows == rows
+
+
+NUMBERS = st.one_of(st.floats(width=64), st.none(), st.integers(-(10**6), 10**6))
+COLUMN = st.lists(NUMBERS, max_size=30)
+
+
+@settings(max_examples=40, deadline=None)
+@given(times=COLUMN, speeds=COLUMN, kind=st.sampled_from(["list", "numpy", "strided", "chunked", "float32"]))
+def test_whatever_comes_in_ends_in_an_estimate_or_an_error(times: list[Any], speeds: list[Any], kind: str) -> None:
+    car, rows = wc.Car.template("8hp", mass_kg=1900.0), min(len(times), len(speeds))
+    names = ["engine_speed_rad_s", "turbine_speed_rad_s", "output_speed_rad_s", "wheel_speed_rad_s"]
+    names += [f"element_{name.lower()}_current_a" for name in car.elements]
+    columns: dict[str, Any] = {"time_s": times[:rows], **{name: speeds[:rows] for name in names}}
+    if kind != "list":
+        dtype = np.float32 if kind == "float32" else np.float64
+        with np.errstate(over="ignore"):
+            columns = {name: np.array(of, dtype=np.float64).astype(dtype) for name, of in columns.items()}
+    if kind == "strided":
+        columns = {name: np.repeat(of, 2)[::2] for name, of in columns.items()}
+    columns |= {"gear": ["1"] * rows, "target_gear": ["2"] * rows}
+    data: Any = columns
+    if kind == "chunked":
+        whole = pl.DataFrame(columns)
+        data = pl.concat([whole[: rows // 2], whole[rows // 2 :]], rechunk=False)
+    try:
+        found = wc.estimate(car, data)
+    except wc.InputError:
+        return
+    assert found.rows.rows == rows
 
 
 def test_the_same_seed_gives_the_same_drive(car: wc.Car, drive_file: str, run: wc.Simulation) -> None:
