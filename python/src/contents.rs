@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use wetclutch::contents::{channels, log_shifts, suggested_map};
-use wetclutch::{Error, LogInput};
+use wetclutch::{Error, InMemory, LogInput};
 
 use crate::estimate::Mapping;
 use crate::table::Table;
@@ -44,6 +44,6 @@ fn of_log<T: Send>(
         if !ratios.is_empty() {
             map.gearbox.ratios = ratios;
         }
-        find(LogInput { path: &path, table: table.as_ref(), map: &map })
+        find(LogInput { path: &path, memory: table.as_ref().map(InMemory::Table), map: &map })
     })
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use logs::ChannelMap;
 use pyo3::prelude::*;
 use wetclutch::estimate::{GearPair, ShiftChoice};
-use wetclutch::{Error, EstimateOptions, LogInput, VehicleFile};
+use wetclutch::{Error, EstimateOptions, InMemory, LogInput, VehicleFile};
 
 use crate::car::parsed;
 use crate::error::exception;
@@ -99,7 +99,8 @@ pub(crate) fn estimate(
         let map = mapping.read(Some(&vehicle))?;
         let options = EstimateOptions { interrupt: Some(work.stop()), ..given.options(&vehicle)? };
         let path: &Path = &path;
-        let found = wetclutch::estimate(&vehicle, LogInput { path, table: table.as_ref(), map: &map }, &options)?;
+        let memory = table.as_ref().map(InMemory::Table);
+        let found = wetclutch::estimate(&vehicle, LogInput { path, memory, map: &map }, &options)?;
         Ok((vehicle, found))
     })?;
     let learnt = found.learnt.as_ref().map(|learnt| vehicle.text_of_learnt(learnt)).transpose();

@@ -26,8 +26,6 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
-use lapack_nalgebra as _;
-
 pub mod budget;
 pub mod certificate;
 pub mod compliant;
@@ -36,6 +34,10 @@ pub mod enclosing;
 pub mod iss;
 pub mod kalman;
 pub mod lmi;
+#[cfg(not(target_family = "wasm"))]
+mod lmi_solver;
+#[cfg(target_family = "wasm")]
+mod no_solver;
 pub mod open_loop;
 pub mod polytope;
 pub mod rigid;

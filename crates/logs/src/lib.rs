@@ -8,9 +8,12 @@
 //! **Architecture invariant:** this is the only crate that reads the formats of recorders.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+// What only the readers of MDF, Parquet and CAN logs call.
+#![cfg_attr(target_family = "wasm", allow(dead_code))]
 
 mod ahead;
 pub mod arrays;
+#[cfg(not(target_family = "wasm"))]
 pub mod can;
 pub mod columns;
 mod copies;
@@ -25,8 +28,12 @@ pub mod inspect;
 pub mod log;
 pub mod look_ahead;
 pub mod map;
+#[cfg(not(target_family = "wasm"))]
 mod mdf;
+#[cfg(target_family = "wasm")]
+mod not_in_browser;
 pub mod on_change;
+#[cfg(not(target_family = "wasm"))]
 mod parquet_log;
 pub mod plausibility;
 pub mod readings;

@@ -12,10 +12,15 @@ use trace::{Following, ShownPath as _};
 
 use crate::ahead::Crew;
 use crate::arrays::Arrays;
+#[cfg(not(target_family = "wasm"))]
 use crate::can::{CanLog, Database};
 use crate::columns::{Columns, Stream};
 use crate::csv_log::CsvLog;
+#[cfg(not(target_family = "wasm"))]
 use crate::mdf::MdfLog;
+#[cfg(target_family = "wasm")]
+use crate::not_in_browser::{CanLog, Database, MdfLog, ParquetLog};
+#[cfg(not(target_family = "wasm"))]
 use crate::parquet_log::ParquetLog;
 use crate::samples::Samples;
 use crate::{Format, LogError, csv_log, error};

@@ -112,10 +112,15 @@ impl Figure {
         Value::from_safe_string(self.markup(true))
     }
 
+    /// The figure as JSON, as the script of the pages reads it.
+    pub(crate) fn json(&self) -> String {
+        serde_json::to_string(&self.data()).unwrap_or_default()
+    }
+
     /// The text of a figure for a page, with its drawing for readers without scripts if that is `drawn`.
     fn markup(&self, drawn: bool) -> String {
         // A name may hold the end of a script.
-        let data = serde_json::to_string(&self.data()).unwrap_or_default().replace('<', "\\u003c");
+        let data = self.json().replace('<', "\\u003c");
         let drawing = if drawn {
             compact(&self.svg())
         } else {

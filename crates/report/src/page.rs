@@ -28,6 +28,7 @@ pub struct Page {
 fn templates() -> Result<Environment<'static>, minijinja::Error> {
     let mut environment = Environment::new();
     environment.add_template("base.html", include_str!("../templates/base.html"))?;
+    environment.add_template("style.css", include_str!("../templates/style.css"))?;
     environment.add_template("found.html", include_str!("../templates/found.html"))?;
     environment.add_template("origin.html", include_str!("../templates/origin.html"))?;
     environment.add_template("scores.html", include_str!("../templates/scores.html"))?;

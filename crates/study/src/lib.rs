@@ -28,6 +28,7 @@ pub mod sensitivity;
 pub mod shift_estimates;
 pub mod shift_learning;
 pub mod statements;
+#[cfg(not(target_family = "wasm"))]
 pub mod worst_case;
 
 pub use bench::{Bench, bench};
@@ -47,4 +48,5 @@ pub use score::{ErrorScore, PhaseScore, RangeScore, ShiftQuality, ShiftRating, S
 pub use sensitivity::{PhaseSensitivity, sensitivity};
 pub use shift_estimates::{LogSample, RecentSamples, ShiftEstimate};
 pub use statements::{Chapter, Statement, reproduce};
+#[cfg(not(target_family = "wasm"))]
 pub use worst_case::{Target, WorstCase, worst_case};

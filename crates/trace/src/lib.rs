@@ -11,7 +11,11 @@ pub mod csv_file;
 mod early_sync;
 pub mod error;
 pub mod follow;
+#[cfg(not(target_family = "wasm"))]
 pub mod mdf_file;
+#[cfg(target_family = "wasm")]
+mod not_in_browser;
+#[cfg(not(target_family = "wasm"))]
 pub mod parquet_file;
 pub mod rows;
 #[cfg(test)]
@@ -32,11 +36,15 @@ pub use atomic::{WholeFile, check_writable, left_by_killed, remove_unfinished, w
 pub use csv_file::{Cell, CsvRows, CsvWriter, RecordError, Records, csv_written, read_csv, write_csv};
 pub use error::TraceError;
 pub use follow::Following;
+#[cfg(not(target_family = "wasm"))]
 pub use mdf_file::MdfWriter;
-pub use parquet_file::{ColumnKind, ParquetWriter, write_parquet};
+#[cfg(target_family = "wasm")]
+pub use not_in_browser::{MdfWriter, ParquetWriter};
+#[cfg(not(target_family = "wasm"))]
+pub use parquet_file::{ParquetWriter, write_parquet};
 pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
 pub use shown::{ShownPath, is_unprintable, printable, toml_string};
-pub use table::{TableFormat, TableWriter};
+pub use table::{ColumnKind, TableFormat, TableWriter};
 pub use text_file::{read_small, read_text};
 pub use units::{Quantity, Unit};
 

@@ -3,8 +3,18 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use crate::mdf_file::MdfWriter;
-use crate::{Cell, ColumnKind, CsvWriter, ParquetWriter, WholeFile, signal};
+use crate::{Cell, CsvWriter, MdfWriter, ParquetWriter, WholeFile, signal};
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColumnKind {
+    /// Whole numbers from 0, 64 bits.
+    Whole,
+    /// Numbers; an empty cell is none.
+    Number,
+    /// Words.
+    Word,
+}
 
 /// Formats of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,33 +2,51 @@
 
 use std::io::{self, Read};
 
-use encoding_rs::{Decoder, Encoding, UTF_16BE, UTF_16LE};
-
 /// Bytes that are read at once.
 const AT_ONCE: usize = 8 << 10;
 /// Bytes that show UTF-16 without a mark: four letters of ASCII, each with a zero.
 const WITHOUT_MARK: usize = 8;
 /// The byte order mark of UTF-8.
 pub const BYTE_ORDER_MARK: &[u8] = &[0xef, 0xbb, 0xbf];
+/// The same as a letter.
+const MARK: char = '\u{feff}';
 
 /// Whether a text is UTF-16, by its first bytes: it begins with a mark, or with four letters of ASCII.
 pub fn is_utf16(head: &[u8]) -> bool {
     utf16(head).is_some()
 }
 
-/// The order of the bytes of a text in UTF-16.
-fn utf16(head: &[u8]) -> Option<&'static Encoding> {
+/// The order of both bytes of a unit of UTF-16.
+#[derive(Debug, Clone, Copy)]
+enum ByteOrder {
+    LowFirst,
+    HighFirst,
+}
+
+impl ByteOrder {
+    /// The units in these bytes, without half a one at their end.
+    fn units(self, bytes: &[u8]) -> impl DoubleEndedIterator<Item = u16> {
+        let pairs = bytes.as_chunks::<2>().0.iter();
+        pairs.map(move |pair| match self {
+            Self::LowFirst => u16::from_le_bytes(*pair),
+            Self::HighFirst => u16::from_be_bytes(*pair),
+        })
+    }
+}
+
+/// The order of the bytes of a text in UTF-16; none if it is no such text.
+fn utf16(head: &[u8]) -> Option<ByteOrder> {
     if head.starts_with(&[0xff, 0xfe]) {
-        return Some(UTF_16LE);
+        return Some(ByteOrder::LowFirst);
     }
     if head.starts_with(&[0xfe, 0xff]) {
-        return Some(UTF_16BE);
+        return Some(ByteOrder::HighFirst);
     }
     let letters = head.get(..WITHOUT_MARK)?.as_chunks::<2>().0;
     let is_ascii = |byte: u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
     match () {
-        () if letters.iter().all(|[low, high]| is_ascii(*low) && *high == 0) => Some(UTF_16LE),
-        () if letters.iter().all(|[high, low]| is_ascii(*low) && *high == 0) => Some(UTF_16BE),
+        () if letters.iter().all(|[low, high]| is_ascii(*low) && *high == 0) => Some(ByteOrder::LowFirst),
+        () if letters.iter().all(|[high, low]| is_ascii(*low) && *high == 0) => Some(ByteOrder::HighFirst),
         () => None,
     }
 }
@@ -36,9 +54,10 @@ fn utf16(head: &[u8]) -> Option<&'static Encoding> {
 /// The text in the bytes of a whole file in UTF-8 or UTF-16, without its mark; none if it is neither.
 pub fn unicode_of(bytes: &[u8]) -> Option<String> {
     match utf16(bytes) {
-        Some(encoding) => {
-            let text = encoding.decode_without_bom_handling_and_without_replacement(bytes)?;
-            Some(text.strip_prefix('\u{feff}').unwrap_or(&text).to_owned())
+        Some(order) => {
+            let letters = char::decode_utf16(order.units(bytes)).collect::<Result<String, _>>();
+            let text = letters.ok().filter(|_| bytes.len().is_multiple_of(2))?;
+            Some(text.strip_prefix(MARK).unwrap_or(&text).to_owned())
         }
         None => std::str::from_utf8(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes)).ok().map(str::to_owned),
     }
@@ -69,40 +88,60 @@ pub fn as_utf8(mut input: Box<dyn Read>) -> io::Result<Box<dyn Read>> {
 /// Reads a text in UTF-16, without its mark, as UTF-8. What is no letter becomes U+FFFD.
 pub struct Utf16 {
     input: Box<dyn Read>,
-    decoder: Decoder,
-    /// What was decoded: up to `filled`, of which `given` bytes were given.
-    text: Vec<u8>,
-    filled: usize,
+    order: ByteOrder,
+    /// What was read and not decoded yet: parts of a letter.
+    bytes: Vec<u8>,
+    /// What was decoded, of which `given` bytes were given.
+    text: String,
     given: usize,
+    has_begun: bool,
     has_ended: bool,
 }
 
 impl Utf16 {
     /// The text of an input that begins with this head, of which [`is_utf16`] holds.
     pub fn new(head: Vec<u8>, rest: Box<dyn Read>) -> Self {
-        let encoding = utf16(&head).unwrap_or(UTF_16LE);
         Self {
+            order: utf16(&head).unwrap_or(ByteOrder::LowFirst),
             input: Box::new(io::Cursor::new(head).chain(rest)),
-            decoder: encoding.new_decoder_with_bom_removal(),
-            // Two bytes make at most three, and what the decoder holds back comes with them.
-            text: vec![0; 2 * AT_ONCE],
-            filled: 0,
+            bytes: Vec::new(),
+            text: String::new(),
             given: 0,
+            has_begun: false,
             has_ended: false,
+        }
+    }
+
+    /// Decodes the whole letters in the bytes, at the end of the input all.
+    fn decode(&mut self) {
+        let units = || self.order.units(&self.bytes);
+        let is_cut = !self.has_ended && units().next_back().is_some_and(|unit| (0xd800..0xdc00).contains(&unit));
+        let whole = self.bytes.len() / 2 - usize::from(is_cut);
+        self.text.clear();
+        self.given = 0;
+        let letters = char::decode_utf16(units().take(whole));
+        self.text.extend(letters.map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER)));
+        if !self.has_begun && self.text.starts_with(MARK) {
+            self.given = MARK.len_utf8();
+        }
+        self.has_begun |= whole > 0;
+        self.bytes.drain(..2 * whole);
+        if self.has_ended && !self.bytes.is_empty() {
+            self.text.push(char::REPLACEMENT_CHARACTER);
         }
     }
 }
 
 impl Read for Utf16 {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        while self.given == self.filled && !self.has_ended {
+        while self.given == self.text.len() && !self.has_ended {
             let mut read = [0; AT_ONCE];
             let count = self.input.read(&mut read)?;
             self.has_ended = count == 0;
-            let (_, _, written, _) = self.decoder.decode_to_utf8(&read[..count], &mut self.text, self.has_ended);
-            (self.filled, self.given) = (written, 0);
+            self.bytes.extend_from_slice(&read[..count]);
+            self.decode();
         }
-        let left = &self.text[self.given..self.filled];
+        let left = &self.text.as_bytes()[self.given..];
         let count = left.len().min(bytes.len());
         bytes[..count].copy_from_slice(&left[..count]);
         self.given += count;

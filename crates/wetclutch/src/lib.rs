@@ -23,7 +23,7 @@ mod vehicle;
 
 pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors, ShiftCommand, ShiftId, Step};
 pub use error::Error;
-pub use estimate::{Destination, EstimateOptions, Estimates, LogInput, estimate};
+pub use estimate::{Destination, EstimateOptions, Estimates, InMemory, LogInput, estimate};
 pub use evaluate::Estimator;
 pub use fitted::{FitOptions, FitProgress, Fitted, fit};
 pub use gains::{DesignObserver, DesignOptions, Designed, design};

@@ -1,8 +1,13 @@
 //! Tables in memory: columns of numbers and of words.
 
 use std::collections::HashMap;
+use std::io::Read as _;
+use std::sync::Arc;
 
 use trace::{Cell, ColumnKind, Unit, signal};
+
+use crate::Error;
+use crate::table_text::TableText;
 
 /// Columns of the same length.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -141,6 +146,17 @@ impl Table {
     /// Appends a row of numbers, and behind them the words of the row before.
     pub(crate) fn push_numbers(&mut self, time_s: f64, numbers: &[f64]) {
         self.push(time_s, numbers.iter().map(|number| Cell::Number(*number)).chain([Cell::SameWords]));
+    }
+
+    /// The table as CSV, in the form in which a command writes it.
+    ///
+    /// # Errors
+    /// None in memory.
+    pub fn csv(self) -> Result<Vec<u8>, Error> {
+        let mut text = Vec::new();
+        let read = TableText::new(Arc::new(self)).and_then(|mut table| table.read_to_end(&mut text));
+        read.map_err(|error| Error::Work(error.to_string()))?;
+        Ok(text)
     }
 
     /// How many rows it has.

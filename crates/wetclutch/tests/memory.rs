@@ -52,7 +52,7 @@ fn a_table_in_memory_and_a_file_of_it_give_the_same_estimate() {
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("log.csv");
     std::fs::write(&path, text_of(&measured)).unwrap();
-    let input = LogInput { path: &path, table: None, map: &logs::ChannelMap::default() };
+    let input = LogInput { path: &path, memory: None, map: &logs::ChannelMap::default() };
     let from_file = estimate(&vehicle, input, &options).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     assert_same(&in_memory.rows, &from_file.rows);

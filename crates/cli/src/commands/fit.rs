@@ -33,7 +33,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
         interrupt: None,
     };
     let map = channel_map_of_car(&options.mapping, vehicle.wheel_radius_m())?;
-    let logs: Vec<LogInput<'_>> = options.logs.iter().map(|path| LogInput { path, table: None, map: &map }).collect();
+    let logs: Vec<LogInput<'_>> = options.logs.iter().map(|path| LogInput { path, memory: None, map: &map }).collect();
     let bar = progress();
     let found = fitted(&vehicle, &logs, &how, &mut |at| show(&bar, at), &mut |note| {
         bar.suspend(|| output::note(note));

@@ -69,7 +69,11 @@ fn unstable_at(
         let corners = corners(vehicle, gains.model, phase, sample_time_s, discretisation);
         corners.into_iter().filter_map(move |corner| {
             let closed_loop = corner.error_dynamics(&gain);
-            let factor = closed_loop.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max);
+            let factor = closed_loop
+                .complex_eigenvalues()
+                .iter()
+                .map(|value| Real::hypot(value.re, value.im))
+                .fold(0.0, f64::max);
             (factor >= 1.0).then_some(UnstableCorner { phase, label: corner.label, factor })
         })
     };

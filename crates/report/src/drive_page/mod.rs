@@ -1,5 +1,6 @@
 //! The page of a simulated drive of a car with any gearbox: the drive, the table of its shifts, shifts drawn.
 
+mod drawn;
 mod figures;
 mod shifts;
 
@@ -19,6 +20,7 @@ use crate::matrix_page::kind_rows;
 use crate::page::{PageError, origin, render};
 use crate::tables::{health_meaning, number};
 use crate::words::found;
+pub use drawn::{Drawn, DrawnShift, drawn};
 use figures::{overview_figure, shift_figure};
 use shifts::filled_columns;
 pub use shifts::{shift_cells, shift_rows, shift_words};

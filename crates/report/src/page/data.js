@@ -20,8 +20,8 @@ function valuesOf({ low, step, data }) {
 
 // The figure with its numbers decoded: `lines` of a panel in the order of the legend, `drawn` from the lowest to the uppermost, `ends` of
 // its range.
-function decoded(element) {
-  const figure = JSON.parse(element.querySelector("script").textContent);
+function decoded(text) {
+  const figure = JSON.parse(text);
   const times = figure.times.map(timesOf);
   const line = (values, rest) => ({ ...rest, time: values.time, times: times[values.time], values: valuesOf(values) });
   for (const panel of figure.panels) {

@@ -16,9 +16,9 @@ const LEFT = 58;
 const LEAST_VIEW = 1e-4;
 
 class Figure {
-  constructor(element) {
+  constructor(element, text = element.querySelector("script").textContent) {
     this.element = element;
-    this.data = decoded(element);
+    this.data = decoded(text);
     this.whole = [this.data.from, this.data.to];
     this.view = [...this.whole];
     this.hidden = new Set();
@@ -246,6 +246,26 @@ class Figure {
     if (this.time !== null) this.setTime(this.time);
     clearTimeout(this.later);
     this.later = setTimeout(() => this.table.replaceChildren(tableOf(this)), 200);
+  }
+
+  // Takes another figure with the same curves, such as that of another run, and draws it in the same view; false where its curves differ.
+  take(text) {
+    const next = decoded(text);
+    const curvesOf = ({ panels }) => JSON.stringify(panels.map(({ name, lines, ends }) => [name, lines.map((line) => line.name), !ends]));
+    if (curvesOf(next) !== curvesOf(this.data)) return false;
+    const isWhole = this.view[0] === this.whole[0] && this.view[1] === this.whole[1];
+    this.whole = [next.from, next.to];
+    this.view = isWhole ? [...this.whole] : this.view;
+    Object.assign(this.data, { from: next.from, to: next.to, spans: next.spans });
+    this.data.panels.forEach((panel, n) => {
+      const { low, high, lines, ends } = next.panels[n];
+      Object.assign(panel, { low, high });
+      panel.lines.forEach((line, at) => Object.assign(line, lines[at]));
+      panel.ends?.forEach((line, at) => Object.assign(line, ends[at]));
+      this.plots[n].setData(joined([...panel.drawn, ...(panel.ends ?? [])]), false);
+    });
+    this.setView(...this.view);
+    return true;
   }
 
   // Zooms by a factor about a time, else about the cursor or the middle.

@@ -130,7 +130,11 @@ function tableOf(figure) {
 // Gives the reader a file, named after the page.
 function save(text, type, ending) {
   const name = document.title.replace(/[^\p{L}\p{N}]+/gu, "_").replace(/^_|_$/g, "").slice(0, 60) || "figure";
-  const link = make("a", { download: `${name}.${ending}`, href: URL.createObjectURL(new Blob([text], { type })) });
+  saveAs(text, type, `${name}.${ending}`);
+}
+
+function saveAs(text, type, name) {
+  const link = make("a", { download: name, href: URL.createObjectURL(new Blob([text], { type })) });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }

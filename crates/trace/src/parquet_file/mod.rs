@@ -15,19 +15,8 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnDescPtr, ColumnPath, Type};
 
 use crate::csv_file::number;
-use crate::{Cell, RecordError, Records, write_whole};
+use crate::{Cell, ColumnKind, RecordError, Records, write_whole};
 use words::Words;
-
-/// What a column holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ColumnKind {
-    /// Whole numbers from 0, 64 bits.
-    Whole,
-    /// Numbers; an empty cell is none.
-    Number,
-    /// Words.
-    Word,
-}
 
 /// Rows that are held in memory before they are written.
 const GROUP: usize = 1 << 16;

@@ -8,7 +8,7 @@ pub mod selection;
 pub(crate) mod watched;
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Cursor, Read};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
@@ -64,13 +64,22 @@ impl EstimateOptions {
     }
 }
 
+/// A log in memory.
+#[derive(Debug, Clone, Copy)]
+pub enum InMemory<'a> {
+    /// A table.
+    Table(&'a Arc<Table>),
+    /// The text of a file.
+    Text(&'a Arc<[u8]>),
+}
+
 /// A log and how its channels are mapped to signals.
 #[derive(Debug, Clone, Copy)]
 pub struct LogInput<'a> {
-    /// The file; `-` is standard input. For a table in memory, what messages call it.
+    /// The file; `-` is standard input. For a log in memory, what messages call it.
     pub path: &'a Path,
-    /// The table, if the log is one in memory.
-    pub table: Option<&'a Arc<Table>>,
+    /// The log, if it is in memory.
+    pub memory: Option<InMemory<'a>>,
     /// The channel map; an empty one for a table with the names of the program.
     pub map: &'a ChannelMap,
 }
@@ -79,27 +88,29 @@ impl<'a> LogInput<'a> {
     /// A table in memory, with the names of the program; messages call it so.
     pub fn of_table(name: &'a str, table: &'a Arc<Table>) -> Self {
         static NO_MAP: LazyLock<ChannelMap> = LazyLock::new(ChannelMap::default);
-        Self { path: Path::new(name), table: Some(table), map: &NO_MAP }
+        Self { path: Path::new(name), memory: Some(InMemory::Table(table)), map: &NO_MAP }
     }
 }
 
 impl LogInput<'_> {
-    /// The text of the table in memory, if it is one.
-    pub(crate) fn text(&self) -> Result<Option<Box<dyn Read>>, Error> {
-        let Some(table) = self.table else { return Ok(None) };
-        let text = TableText::new(Arc::clone(table)).map_err(|error| Error::Work(error.to_string()))?;
-        Ok(Some(Box::new(text)))
+    /// The text of the log in memory, if it is there.
+    pub(crate) fn text(&self) -> io::Result<Option<Box<dyn Read>>> {
+        Ok(match self.memory {
+            None => None,
+            Some(InMemory::Text(text)) => Some(Box::new(Cursor::new(Arc::clone(text)))),
+            Some(InMemory::Table(table)) => Some(Box::new(TableText::new(Arc::clone(table))?)),
+        })
     }
 
     /// Whether its text comes from a pipe or from memory, and not from a file.
     pub(crate) fn is_stream(&self) -> bool {
-        self.table.is_some() || self.path == Path::new("-")
+        self.memory.is_some() || self.path == Path::new("-")
     }
 
     /// Opens its text.
     pub(crate) fn reader(&self, stop: Option<&Arc<AtomicBool>>) -> Result<Box<dyn Read>, Error> {
         let opening = |source| LogError::Io { path: self.path.to_owned(), source };
-        Ok(match (self.text()?, stop) {
+        Ok(match (self.text().map_err(opening)?, stop) {
             (Some(text), _) => text,
             (None, Some(stop)) => Box::new(Following::open(self.path, Arc::clone(stop)).map_err(opening)?),
             (None, None) if self.is_stream() => Box::new(io::stdin()),
@@ -109,7 +120,8 @@ impl LogInput<'_> {
 
     /// Opens its channels.
     pub(crate) fn open(&self, stop: Option<&Arc<AtomicBool>>, threads: usize) -> Result<Log, Error> {
-        Ok(match (self.text()?, stop) {
+        let opening = |source| LogError::Io { path: self.path.to_owned(), source };
+        Ok(match (self.text().map_err(opening)?, stop) {
             (Some(text), _) => Log::of_text(self.path, &self.map.open, text)?,
             (None, Some(stop)) => Log::follow(self.path, &self.map.open, Arc::clone(stop))?,
             (None, None) => Log::open(self.path, &self.map.open)?.on_threads(threads.max(1)),

@@ -1,7 +1,6 @@
 //! The fit of a car of one shift.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 use car::Vehicle;
 use config::VehicleFile as OneShiftFile;
@@ -14,7 +13,6 @@ use super::{
     FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, names, nothing_held_out,
     say_reasons,
 };
-use crate::table_text::TableText;
 use crate::{Error, LogInput, Notes, VehicleFile, shell_quoted};
 
 pub(super) fn fit(
@@ -85,10 +83,11 @@ fn collect(
 }
 
 fn opened(log: LogInput<'_>) -> Result<Log, LogError> {
-    let Some(table) = log.table else { return Log::open(log.path, &log.map.open) };
-    let text = TableText::new(Arc::clone(table));
-    let text = text.map_err(|source| LogError::Io { path: log.path.to_owned(), source })?;
-    Log::of_text(log.path, &log.map.open, Box::new(text))
+    let text = log.text().map_err(|source| LogError::Io { path: log.path.to_owned(), source })?;
+    match text {
+        Some(text) => Log::of_text(log.path, &log.map.open, text),
+        None => Log::open(log.path, &log.map.open),
+    }
 }
 
 /// Shifts to fit, and shifts that are held out: the last fifth. Of more than a fit can use, some are left out evenly.

@@ -41,7 +41,7 @@ struct Setup<'a> {
 
 impl Setup<'_> {
     fn log<'l>(&'l self, path: &'l Path) -> LogInput<'l> {
-        LogInput { path, table: None, map: &self.map }
+        LogInput { path, memory: None, map: &self.map }
     }
 
     /// Whether the table of shifts goes to standard output.

@@ -1,0 +1,100 @@
+//! Formats that are not read in a browser: MDF and Parquet need a file in which a reader can seek, and unpackers in C; a CAN log needs the
+//! file of its DBC.
+
+use std::convert::Infallible;
+use std::io::Read;
+use std::path::Path;
+
+use crate::LogError;
+use crate::ahead::Crew;
+use crate::columns::Stream;
+use crate::log::{CanKind, Channel, TimeColumn};
+
+/// What to do with a log of such a format.
+const NOT_READ: &str = "MDF, Parquet and CAN logs are not read in a browser\nhint: save the channels as CSV, or use the program `wetclutch`";
+
+/// An MDF log: there is none.
+pub(crate) struct MdfLog(Infallible);
+
+/// A Parquet log: there is none.
+pub(crate) struct ParquetLog(Infallible);
+
+/// A CAN log: there is none.
+pub(crate) struct CanLog(Infallible);
+
+/// The messages of a bus: there are none.
+pub(crate) struct Database(Infallible);
+
+type Opened<L> = Result<(L, Vec<Channel>), LogError>;
+
+impl Database {
+    pub(crate) fn read(path: &Path) -> Result<Self, LogError> {
+        Err(LogError::file(path, NOT_READ))
+    }
+
+    pub(crate) fn channels(&self) -> &[Channel] {
+        match self.0 {}
+    }
+}
+
+impl MdfLog {
+    pub(crate) fn open(path: &Path, _: Option<Database>, _: Option<&TimeColumn>) -> Opened<Self> {
+        Err(LogError::file(path, NOT_READ))
+    }
+
+    pub(crate) fn has_frames(&self) -> bool {
+        match self.0 {}
+    }
+
+    pub(crate) fn lacks_dbc(&self) -> bool {
+        match self.0 {}
+    }
+
+    pub(crate) fn note(&mut self, _: &str) {
+        match self.0 {}
+    }
+
+    pub(crate) fn format(&self) -> String {
+        match self.0 {}
+    }
+
+    pub(crate) fn crew(&self) -> &Crew {
+        match self.0 {}
+    }
+
+    pub(crate) fn unpack_with(&mut self, _: Crew) {
+        match self.0 {}
+    }
+
+    pub(crate) fn streams(&self, _: &[bool]) -> Result<Vec<Box<dyn Stream + Send + '_>>, LogError> {
+        match self.0 {}
+    }
+}
+
+impl ParquetLog {
+    pub(crate) fn open(path: &Path, _: Option<&TimeColumn>) -> Opened<Self> {
+        Err(LogError::file(path, NOT_READ))
+    }
+
+    pub(crate) fn note(&mut self, _: &str) {
+        match self.0 {}
+    }
+
+    pub(crate) fn stream(&mut self, _: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
+        match self.0 {}
+    }
+}
+
+impl CanLog {
+    pub(crate) fn new(_: &Path, _: CanKind, _: Vec<u8>, _: Box<dyn Read>, database: Database, _: bool) -> Self {
+        match database.0 {}
+    }
+
+    pub(crate) fn format(&self) -> &'static str {
+        match self.0 {}
+    }
+
+    pub(crate) fn stream(&mut self, _: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
+        match self.0 {}
+    }
+}

@@ -1,0 +1,76 @@
+//! A log of the reader's own: mapped, estimated, drawn.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use config::CarFile;
+use logs::{ChannelMap, Log, OpenOptions};
+use serde_json::{Value, json};
+use wetclutch::estimate::gearbox::{DriveEstimates, Setup, estimate};
+use wetclutch::{Destination, Error, EstimateOptions, InMemory, LogInput, Table};
+
+use crate::cars::ShippedCar;
+use crate::page::page;
+
+/// What a page asks of a log.
+pub(crate) struct Asked<'a> {
+    /// The vehicle file, by its name.
+    pub(crate) car: &'a str,
+    /// What messages call the log.
+    pub(crate) name: &'a str,
+    /// The channel map; none for a log with the names of the program.
+    pub(crate) map: Option<&'a str>,
+    /// The log.
+    pub(crate) text: &'a [u8],
+}
+
+/// The log of a page, ready to be estimated.
+struct Given<'a> {
+    car: CarFile,
+    name: &'a Path,
+    map: ChannelMap,
+    text: Arc<[u8]>,
+}
+
+impl<'a> Given<'a> {
+    fn of(asked: &Asked<'a>) -> Result<Self, Error> {
+        let car = ShippedCar::named(asked.car)?;
+        let map = match asked.map {
+            Some(map) => ChannelMap::of_text(Path::new("map.toml"), map)?,
+            None => ChannelMap::default(),
+        };
+        let file = car.read(&car.file(), car.text)?;
+        Ok(Self { car: file, name: Path::new(asked.name), map, text: asked.text.into() })
+    }
+
+    fn estimated(&self, columns: &[&str]) -> Result<(DriveEstimates, Vec<String>), Error> {
+        let columns = columns.iter().map(|&column| column.to_owned()).collect();
+        let options = EstimateOptions { with_page: true, columns, ..EstimateOptions::default() };
+        let setup = Setup::new(&self.car, &options)?;
+        let mut notes = Vec::new();
+        let log = LogInput { path: self.name, memory: Some(InMemory::Text(&self.text)), map: &self.map };
+        let found = estimate(&setup, log, Destination::Memory, &mut |note| notes.push(note.to_owned()))?;
+        Ok((found.with_times_from_origin(), notes))
+    }
+}
+
+/// Figures, table and findings of a log.
+pub(crate) fn drawn(asked: &Asked<'_>) -> Result<Value, Error> {
+    let given = Given::of(asked)?;
+    // A million rows of all columns would not fit into the memory of a page.
+    let (found, notes) = given.estimated(&["health"])?;
+    Ok(page(&given.car, &found, notes))
+}
+
+/// The estimates of a log, as `wetclutch estimate` writes them.
+pub(crate) fn estimates(asked: &Asked<'_>) -> Result<Table, Error> {
+    let (found, _) = Given::of(asked)?.estimated(&[])?;
+    Ok(found.rows.unwrap_or_default())
+}
+
+/// A first channel map for a log, as `wetclutch inspect --suggest` writes it.
+pub(crate) fn suggested(asked: &Asked<'_>) -> Result<Value, Error> {
+    let text: Arc<[u8]> = asked.text.into();
+    let log = Log::of_text(Path::new(asked.name), &OpenOptions::default(), Box::new(std::io::Cursor::new(text)))?;
+    Ok(json!({ "map": logs::suggest(log.channels(), None).trim_end() }))
+}
