@@ -76,6 +76,13 @@ def test_strided_and_empty_columns() -> None:
     assert pa.table(wc.Table({"x": np.array([])})).num_rows == 0
 
 
+def test_a_column_without_a_type_has_missing_numbers() -> None:
+    for frame in (pl.DataFrame({"x": [None, None], "y": [1.0, 2.0]}), pa.table({"x": [None, None], "y": [1.0, 2.0]})):
+        table = wc.Table(frame)
+        assert np.isnan(table["x"]).all() and list(table["y"]) == [1.0, 2.0]
+    assert wc.Table(pl.DataFrame({"x": []})).rows == 0
+
+
 def test_times_of_day_are_seconds() -> None:
     times = pd.to_datetime(["2026-01-01 00:00:00.250", "2026-01-01 00:00:01.000"])
     expected = [1767225600.25, 1767225601.0]

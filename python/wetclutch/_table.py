@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -110,7 +111,7 @@ def _native(data: Any) -> native.Table:
         return data._table
     if hasattr(data, "__arrow_c_stream__"):
         try:
-            return native.Table.from_arrow(data)
+            return native.Table.from_arrow(_without_null_columns(data))
         except ImportError:
             pass  # pandas exports Arrow data with pyarrow only.
     elif hasattr(data, "__arrow_c_array__"):
@@ -122,6 +123,14 @@ def _native(data: Any) -> native.Table:
     raise TypeError(
         f"a {type(data).__name__} is no table: give a data frame, Arrow data, or a mapping from names to columns"
     )
+
+
+def _without_null_columns(data: Any) -> Any:
+    """The same where polars has columns without a type: it exports them with a buffer, which Arrow's interface does not know."""
+    polars = sys.modules.get("polars")
+    if polars is not None and isinstance(data, polars.DataFrame) and polars.Null in data.dtypes:
+        return data.cast({polars.Null: polars.Float64})
+    return data
 
 
 def _column(values: Any) -> Any:
