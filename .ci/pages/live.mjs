@@ -203,6 +203,7 @@ test("a log is estimated as the program does, and its name is text", async () =>
     assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /<img src=x onerror=alert\(1\)>\.csv with “six-speed/);
     assert.equal(await page.$("#log-messages img"), null);
     assert((await page.$$("#shown-choice option")).length > 4);
+    assert(await download(page, browser, "#log-messages button", ".csv") === ours);
   });
 });
 

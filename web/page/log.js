@@ -8,13 +8,13 @@ function logs(sensor, panel, result) {
 
   // Takes a file: first with the names of the program, else with a first map.
   async function take(file) {
-    say([`reading ${file.name}`]);
+    say(`estimating ${file.name}`);
     log = { name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) };
     map.value = "";
     mapping.hidden = true;
     const answer = await estimated();
     if (!answer.error) return;
-    const suggested = sensor.read({ ask: "map", name: log.name }, log.bytes);
+    const suggested = await sensor.readAside({ ask: "map", name: log.name }, log.bytes);
     if (suggested.error) return;
     map.value = suggested.map;
     mapping.hidden = false;
@@ -25,15 +25,22 @@ function logs(sensor, panel, result) {
   const question = (ask) => ({ ask, car: panel.values.car, name: log.name, map: map.value.trim() ? map.value : null });
 
   async function estimated() {
-    // The words are drawn before the work begins.
-    await new Promise((done) => setTimeout(done, 30));
-    const answer = sensor.read(question("log"), log.bytes);
+    const asked = log;
+    const answer = await sensor.readAside(question("log"), log.bytes);
+    // Another one was dropped in the meantime.
+    if (asked !== log) return {};
     if (answer.error) messages.replaceChildren(failed(answer));
     else {
       const car = panel.cars.find(({ name }) => name === panel.values.car);
       const done = `${log.name} with “${car.title}”${map.value.trim() ? ", by the channel map below" : ""}:`;
       const button = make("button", { type: "button" }, "Save the estimates as CSV");
-      button.addEventListener("click", () => saveAs(sensor.ask(question("log_estimates"), log.bytes), "text/csv", log.name.replace(/(\.[^.]*)?$/, "_estimates.csv")));
+      const wanted = question("log_estimates");
+      button.addEventListener("click", async () => {
+        button.disabled = true;
+        const text = await sensor.askAside(wanted, asked.bytes).catch(() => "");
+        button.disabled = false;
+        if (text) saveAs(text, "text/csv", log.name.replace(/(\.[^.]*)?$/, "_estimates.csv"));
+      });
       messages.replaceChildren(make("p", {}, make("b", {}, done), " its drive is drawn above. ", button), ...sentences(answer.notes));
       result.take({ ...answer, notes: [] }, true);
       byId("figure").scrollIntoView({ block: "start" });
@@ -41,7 +48,7 @@ function logs(sensor, panel, result) {
     return answer;
   }
 
-  const say = (words) => messages.replaceChildren(...words.map((word) => make("p", {}, word)));
+  const say = (words) => messages.replaceChildren(make("p", {}, words));
   byId("file").addEventListener("change", (event) => event.target.files[0] && take(event.target.files[0]));
   mapping.querySelector("button").addEventListener("click", () => log && estimated());
   addEventListener("dragover", (event) => {
