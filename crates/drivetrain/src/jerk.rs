@@ -123,6 +123,12 @@ impl PeakJerk {
 
 /// The second derivative of the parabola with the least squares of distances.
 fn second_derivative(points: &[(f64, f64)]) -> Option<f64> {
+    derivatives(points, points.first()?.0).map(|[_, second]| second)
+}
+
+/// First and second derivative at this time, s, of the parabola with the least squares of distances to these times and values; none where
+/// three of the times are not different.
+pub fn derivatives(points: &[(f64, f64)], at_s: f64) -> Option<[f64; 2]> {
     let ((first_s, first), (last_s, _)) = (*points.first()?, *points.last()?);
     let (middle_s, half_s) = (0.5 * (first_s + last_s), 0.5 * (last_s - first_s));
     // Normal equations in times from -1 to 1; with speeds over the first one their sums keep their digits.
@@ -152,7 +158,10 @@ fn second_derivative(points: &[(f64, f64)]) -> Option<f64> {
         }
     }
     let quadratic = sums[2][3] / sums[2][2];
-    Some(2.0 * quadratic / (half_s * half_s)).filter(|jerk| jerk.is_finite())
+    let linear = (sums[1][3] - sums[1][2] * quadratic) / sums[1][1];
+    let time = (at_s - middle_s) / half_s;
+    let both = [(linear + 2.0 * quadratic * time) / half_s, 2.0 * quadratic / (half_s * half_s)];
+    Some(both).filter(|both| both.iter().all(|derivative| derivative.is_finite()))
 }
 
 /// The same of points at even times. From the middle, in half steps, their squares less the mean square are the weights: two points that

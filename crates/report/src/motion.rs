@@ -3,8 +3,7 @@
 //! Both are derivatives of the parabola with the least squares of distances to the speed over 0.3 s around a time: that of
 //! [`drivetrain::jerk`], whose maximum jerk stands in the tables.
 
-use drivetrain::Real;
-use drivetrain::jerk::WINDOW_S;
+use drivetrain::jerk::{self, WINDOW_S};
 
 use crate::figure::{Panel, Series, Stroke};
 use crate::panels::panel;
@@ -45,38 +44,17 @@ fn derivatives(speeds: &[(f64, f64)], time_s: f64) -> Option<[f64; 2]> {
     let from = speeds.partition_point(|(at_s, _)| *at_s < time_s - half_s - ROUNDING_S);
     let to = speeds.partition_point(|(at_s, _)| *at_s <= time_s + half_s + ROUNDING_S);
     let window = &speeds[from..to];
-    let ((first_s, first), (last_s, _)) = (*window.first()?, *window.last()?);
+    let ((first_s, _), (last_s, _)) = (*window.first()?, *window.last()?);
     if window.len() < MINIMUM || last_s - first_s < WHOLE * WINDOW_S {
         return None;
     }
-    // Normal equations in times of about -1 to 1, solved by Cramer's rule.
-    let (mut powers, mut values) = ([0.0; 5], [0.0; 3]);
-    for (at_s, speed) in window {
-        let time = (at_s - time_s) / half_s;
-        for (power, sum) in powers.iter_mut().enumerate() {
-            *sum += Real::powi(time, i32::try_from(power).unwrap_or(0));
-        }
-        for (power, sum) in values.iter_mut().enumerate() {
-            *sum += Real::powi(time, i32::try_from(power).unwrap_or(0)) * (speed - first);
-        }
-    }
-    let columns = [0, 1, 2].map(|i| [powers[i], powers[i + 1], powers[i + 2]]);
-    let whole = determinant(columns);
-    let with = |at: usize| {
-        let mut columns = columns;
-        columns[at] = values;
-        determinant(columns) / whole
-    };
-    Some([with(1) / half_s, 2.0 * with(2) / (half_s * half_s)]).filter(|ends| ends.iter().all(|end| end.is_finite()))
-}
-
-fn determinant([a, b, c]: [[f64; 3]; 3]) -> f64 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) - b[0] * (a[1] * c[2] - a[2] * c[1]) + c[0] * (a[1] * b[2] - a[2] * b[1])
+    jerk::derivatives(window, time_s)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drivetrain::Real;
     use drivetrain::jerk::PeakJerk;
 
     fn speeds(count: u32, step_s: f64, speed: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
