@@ -40,11 +40,8 @@ pub(crate) fn fit(
     let (found, notes) = work::done(py, progress.as_ref(), move |work| {
         let mapped = logs.into_iter().map(|(path, table, mapping)| Ok((path, table, mapping.read(Some(&vehicle))?)));
         let mapped: Vec<(PathBuf, _, ChannelMap)> = mapped.collect::<Result<_, Error>>()?;
-        let inputs = mapped.iter().map(|(path, table, map)| LogInput {
-            path,
-            memory: table.as_ref().map(InMemory::Table),
-            map,
-        });
+        let inputs =
+            mapped.iter().map(|(path, table, map)| LogInput { path, memory: table.as_ref().map(InMemory::Table), map });
         let inputs: Vec<LogInput<'_>> = inputs.collect();
         let sensors = sensors.as_deref().map(wetclutch::read_sensors).transpose()?;
         let options = FitOptions { sensors, output: None, with_page, interrupt: Some(work.stop()) };
