@@ -141,6 +141,16 @@ test("sliders move by keys, and those of the figure move its cursor", () => on(a
   assert.match(await page.$eval(".plots .time", (time) => time.textContent), /^time \d/);
 }));
 
+test("a row of a drive shows its shift", () => on(async (page) => {
+  await page.select("#set-shift", "all");
+  await frame(page);
+  assert.equal(await page.$eval("#shown-choice", (select) => select.value), "0");
+  await page.click("#numbers tr:nth-of-type(2) button");
+  await frame(page);
+  assert.equal(await page.$eval("#shown-choice", (select) => select.value), "2");
+  assert.match(await page.$eval("#figure", (figure) => figure.textContent), /oncoming/);
+}));
+
 test("a zoomed view and hidden curves stay while a slider moves", () => on(async (page) => {
   await page.focus(".plots");
   await page.keyboard.press("+");

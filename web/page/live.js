@@ -289,6 +289,17 @@ class Result {
     this.numbers(number);
   }
 
+  // The number of a shift, which shows it; of one that is not drawn the number alone.
+  opener(number) {
+    if (![...this.select.options].some(({ value }) => value === number)) return number;
+    const button = make("button", { type: "button", "aria-label": `show shift ${number}` }, number);
+    button.addEventListener("click", () => {
+      this.select.value = number;
+      this.draw();
+    });
+    return button;
+  }
+
   close() {
     if (!this.figure) return;
     if (active === this.figure) activate(null);
@@ -314,7 +325,7 @@ class Result {
           at && row[at] ? [make("tr", {}, make("th", { scope: "row" }, name === "N m" ? `${columns[at - 1][0]} ${name}` : name), cell(row[at]), cell(meaning))] : [])))
       : make("table", { class: "scores two-names" }, make("caption", { class: "unseen" }, "Shifts of the drive"),
         make("thead", {}, make("tr", {}, ...columns.map(title))),
-        make("tbody", {}, ...rows.map((row) => make("tr", {}, ...row.map(cell)))));
+        make("tbody", {}, ...rows.map(([first, ...others]) => make("tr", {}, make("td", {}, this.opener(first)), ...others.map(cell)))));
     byId("numbers").replaceChildren(make("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Numbers" }, table));
   }
 }
