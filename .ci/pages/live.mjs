@@ -88,6 +88,16 @@ test("a slider changes figure, numbers and link", () => on(async (page) => {
   await page.waitForFunction(() => location.hash.includes("throttle="), { timeout: 2000 });
 }));
 
+test("what an axis leaves out follows the values", () => on(async (page) => {
+  const notes = () => page.$$eval("#figure .note", (notes) => notes.map((note) => note.textContent).join());
+  const before = await notes();
+  assert.match(before, /values reach/);
+  await move(page, "friction_factor", -35);
+  await move(page, "valve_gain_factor", -15);
+  await frame(page);
+  assert.notEqual(await notes(), before);
+}));
+
 test("each car has its shifts, and each fault a run", () => on(async (page) => {
   for (const { name, gears } of cars) {
     await page.select("#set-car", name);

@@ -64,7 +64,7 @@ class Figure {
     const entries = [...panel.lines, ...(panel.ends ? [panel.ends[0]] : [])].map((line, n) => {
       const isRange = n === panel.lines.length;
       const check = make("input", { type: "checkbox" });
-      check.checked = true;
+      check.checked = !this.hidden.has(line.name);
       check.addEventListener("change", () => this.show(line.name, check.checked));
       const key = make("i", { class: isRange ? "key range" : "key" });
       // Room for the value, so that nothing moves when it appears.
@@ -74,9 +74,9 @@ class Figure {
       return { line, isRange, check, key, label: make("label", {}, check, key, make("span", {}, line.name), read) };
     });
     const plot = make("div", { class: "plot" });
-    const note = panel.note ? [make("p", { class: "quiet note" }, panel.note)] : [];
+    const note = make("p", { class: "quiet note" });
     const legend = make("div", { class: "legend" }, make("b", {}, panel.name), ...entries.map((entry) => entry.label));
-    return { panel, entries, values, plot, element: make("div", { class: "panel" }, legend, plot, ...note) };
+    return { panel, entries, values, plot, note, element: make("div", { class: "panel" }, legend, plot, note) };
   }
 
   widestReading(panel, isRange) {
@@ -92,7 +92,8 @@ class Figure {
     this.refresh();
   }
 
-  plotOf({ panel, entries, plot }, isLast) {
+  plotOf({ panel, entries, plot, note }, isLast) {
+    note.textContent = panel.note ?? "";
     for (const { key, line, isRange } of entries) {
       const style = line.dash ? "dashed" : "solid";
       if (isRange) key.style.background = ink(line.colour);
@@ -248,24 +249,37 @@ class Figure {
     this.later = setTimeout(() => this.table.replaceChildren(tableOf(this)), 200);
   }
 
-  // Takes another figure with the same curves, such as that of another run, and draws it in the same view; false where its curves differ.
+  // Takes another figure with as many panels, such as that of another run, and draws it in the same view; false where it has others.
   take(text) {
     const next = decoded(text);
-    const curvesOf = ({ panels }) => JSON.stringify(panels.map(({ name, lines, ends }) => [name, lines.map((line) => line.name), !ends]));
-    if (curvesOf(next) !== curvesOf(this.data)) return false;
+    if (next.panels.length !== this.panels.length) return false;
     const isWhole = this.view[0] === this.whole[0] && this.view[1] === this.whole[1];
     this.whole = [next.from, next.to];
     this.view = isWhole ? [...this.whole] : this.view;
     Object.assign(this.data, { from: next.from, to: next.to, spans: next.spans });
-    this.data.panels.forEach((panel, n) => {
-      const { low, high, lines, ends } = next.panels[n];
-      Object.assign(panel, { low, high });
-      panel.lines.forEach((line, at) => Object.assign(line, lines[at]));
-      panel.ends?.forEach((line, at) => Object.assign(line, ends[at]));
-      this.plots[n].setData(joined([...panel.drawn, ...(panel.ends ?? [])]), false);
-    });
+    next.panels.forEach((panel, n) => this.takePanel(panel, n));
     this.setView(...this.view);
     return true;
+  }
+
+  // Takes new values of a panel, or a panel with other curves in its place.
+  takePanel(next, n) {
+    const curvesOf = ({ name, lines, ends }) => JSON.stringify([name, lines.map((line) => line.name), Boolean(ends)]);
+    const panel = this.data.panels[n];
+    if (curvesOf(panel) === curvesOf(next)) {
+      Object.assign(panel, { low: next.low, high: next.high, note: next.note });
+      this.panels[n].note.textContent = next.note ?? "";
+      panel.lines.forEach((line, at) => Object.assign(line, next.lines[at]));
+      panel.ends?.forEach((line, at) => Object.assign(line, next.ends[at]));
+      this.plots[n].setData(joined([...panel.drawn, ...(panel.ends ?? [])]), false);
+      return;
+    }
+    this.data.panels[n] = next;
+    const made = this.panelElement(next);
+    this.panels[n].element.replaceWith(made.element);
+    this.plots[n].destroy();
+    this.panels[n] = made;
+    this.plots[n] = this.plotOf(made, n + 1 === this.panels.length);
   }
 
   // Zooms by a factor about a time, else about the cursor or the middle.
