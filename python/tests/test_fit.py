@@ -16,6 +16,7 @@ from conftest import ROOT
 
 np = pytest.importorskip("numpy")
 pa = pytest.importorskip("pyarrow")
+pl = pytest.importorskip("polars")
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +55,20 @@ def test_several_logs_are_fitted_together(car: wc.Car, measured: wc.Table, fitte
     assert copied.shifts == fitted.shifts and any("the same readings" in finding for finding in copied.findings)
 
 
-def test_a_shift_of_a_one_shift_car_is_fitted() -> None:
+def test_a_car_of_one_shift_is_fitted_to_a_file_as_to_a_table(tmp_path: Path) -> None:
     two_speed = wc.Car.read(ROOT / "vehicles" / "two_speed_at.toml")
-    with pytest.raises(wc.InputError):
+    with pytest.raises(wc.InputError, match="a fit needs"):
         wc.fit(two_speed, {"time_s": [0.0, 0.01], "turbine_speed_rad_s": [100.0, 100.0]})
+    command = os.environ.get("WETCLUTCH")
+    if not command:
+        pytest.skip("WETCLUTCH names no binary")
+    subprocess.run([command, "simulate", ROOT / "experiments" / "bench.toml", "-o", tmp_path], check=True, capture_output=True)
+    path = tmp_path / "bench_measured.csv"
+    in_file, in_memory = (wc.fit(two_speed, log, page=True) for log in (path, pl.read_csv(path)))
+    assert in_file.shifts == in_memory.shifts == 1 and in_file.intervals == in_memory.intervals
+    assert in_memory.car.kind == "one-shift" and in_memory.page
+    values = [[line for line in fit.car.to_toml().splitlines() if not line.startswith("#")] for fit in (in_file, in_memory)]
+    assert values[0] == values[1]
 
 
 def test_intervals_are_drawn(fitted: wc.Fit) -> None:
