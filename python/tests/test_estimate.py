@@ -136,7 +136,7 @@ def test_the_same_seed_gives_the_same_drive(car: wc.Car, drive_file: str, run: w
 
 def test_threads_estimate_at_the_same_time(car: wc.Car, measured: wc.Table) -> None:
     expected = wc.estimate(car, measured).rows
-    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+    with concurrent.futures.ThreadPoolExecutor(20) as pool:
         for found in pool.map(lambda _: wc.estimate(car, measured), range(20)):
             assert found.rows == expected
 
