@@ -1,9 +1,9 @@
-//! Channels that show the reading of the speed next to them.
+//! Channels that show the reading of another speed.
 //!
 //! A gateway that maps a signal wrongly for a while, or a logger that fills a gap, writes the value of one speed into the channel of another. Two
 //! sensors of two shafts agree to the last digit where the shafts turn together, as behind a lock-up clutch, and then their speeds came together by
-//! and by. A channel shows another one that agrees with it to the last digit for [`SAMPLES`] samples, after a difference that closed within one
-//! sample by [`SUDDEN`] times what it changes by from sample to sample: the one that jumped is wrong, until they differ again or for
+//! and by. A channel shows another one that agrees with it to the last digit for [`SAMPLES`] samples, where the difference that was to be expected
+//! from the two before is not zero, by [`SUDDEN`] times what such a difference errs by: the one that jumped is wrong, until they differ again or for
 //! [`LONGEST_S`]. A difference that was closed before says nothing: what begins while both shafts turn together, as in the direct gear, and
 //! goes on after it, is not seen here.
 
@@ -12,9 +12,9 @@ use crate::speed_faults::LONGEST_S;
 
 /// So many equal samples show it.
 const SAMPLES: u32 = 3;
-/// How many times its usual change a difference closes by at once, with a size that is no rounding, rad/s \[chosen\].
+/// How many times its usual error a difference that was to be expected closes by at once, with a size that is no rounding, rad/s \[chosen\].
 const SUDDEN: (f64, f64) = (8.0, 1.0);
-/// Samples in which the usual change is learnt, and weight of one in its mean.
+/// Samples in which the usual error is learnt, and weight of one in its mean.
 const LEARNT: u32 = 20;
 const LATEST: f64 = 0.125;
 /// In slower samples a shift passes between two of them, s: an inertia phase takes longer.
@@ -24,12 +24,18 @@ const STANDS_RAD_S: f64 = 1.0;
 /// Relative difference of one number in two units.
 const ROUNDING: f64 = 1e-12;
 
-/// Engine and turbine, turbine and output, output and wheel.
-const PAIRS: [[usize; 2]; 3] = [
+/// Speeds that are compared: those next to each other first.
+const PAIRS: [[usize; 2]; 6] = [
     [Role::EngineSpeed as usize, Role::TurbineSpeed as usize],
     [Role::TurbineSpeed as usize, Role::OutputSpeed as usize],
     [Role::OutputSpeed as usize, Role::WheelSpeed as usize],
+    [Role::EngineSpeed as usize, Role::OutputSpeed as usize],
+    [Role::TurbineSpeed as usize, Role::WheelSpeed as usize],
+    [Role::EngineSpeed as usize, Role::WheelSpeed as usize],
 ];
+
+/// Those whose shafts a clutch makes one while one of both fails: what is refused for another reason is not compared.
+const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[1], PAIRS[2]];
 
 /// A reading: its value, rad/s, and its time, s.
 pub(crate) type Stamped = [f64; 2];
@@ -38,16 +44,20 @@ pub(crate) type Stamped = [f64; 2];
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Copies([Pair; PAIRS.len()]);
 
-/// Two speeds next to each other.
+/// Two speeds.
 #[derive(Debug, Clone, Copy)]
 struct Pair {
     /// Readings since both were compared.
     newest: [Option<Stamped>; 2],
+    /// Whether one of these is refused for another reason.
+    is_fault: bool,
     /// The readings at which they differed last.
     before: Option<[Stamped; 2]>,
-    /// Change of the difference from sample to sample: its mean, and the last one, rad/s; and how many there were.
-    change: [f64; 2],
+    /// Change of the difference in the last sample, rad/s, and how many changes there were.
+    change: f64,
     changes: u32,
+    /// By how much a change differs from the one before: its mean, and the last one, rad/s.
+    error: [f64; 2],
     /// Samples in which they are equal, and which of both jumped to the other, if one did.
     equal: u32,
     jumped: Option<usize>,
@@ -55,35 +65,59 @@ struct Pair {
 
 impl Copies {
     pub(crate) fn new() -> Self {
-        Self(
-            [Pair { newest: [None; 2], before: None, change: [0.0; 2], changes: 0, equal: 0, jumped: None };
-                PAIRS.len()],
-        )
+        let pair = Pair {
+            newest: [None; 2],
+            is_fault: false,
+            before: None,
+            change: 0.0,
+            changes: 0,
+            error: [0.0; 2],
+            equal: 0,
+            jumped: None,
+        };
+        Self([pair; PAIRS.len()])
     }
 
-    /// Takes a reading that is believed. Returns the speed whose channel shows another one, with its last reading that is right.
-    pub(crate) fn push(&mut self, role: Role, reading: Stamped) -> Option<(Role, Stamped)> {
+    /// Takes a reading, and whether it is refused for another reason. Returns the speed whose channel shows another one, with its last
+    /// reading that is right.
+    pub(crate) fn push(&mut self, role: Role, reading: Stamped, is_fault: bool) -> Option<(Role, Stamped)> {
         let at = role as usize;
         let mut found = None;
         for (pair, of) in self.0.iter_mut().zip(PAIRS) {
             let Some(which) = of.iter().position(|speed| *speed == at) else { continue };
+            if is_fault && MAY_JOIN.contains(&of) {
+                continue;
+            }
+            pair.is_fault |= is_fault;
             pair.newest[which] = Some(reading);
             if let [Some(one), Some(other)] = pair.newest {
                 pair.newest = [None; 2];
                 let copy = pair.compare([one, other]);
-                found = found.or(copy.map(|(which, before)| (Role::SPEEDS[of[which]], before)));
+                found = found.or(copy.map(|(which, before)| (Role::SPEEDS[of[which]], before, of)));
             }
         }
-        found
+        let (copied, before, by) = found?;
+        for (pair, of) in self.0.iter_mut().zip(PAIRS) {
+            if of != by && of.contains(&(copied as usize)) {
+                pair.before = None;
+            }
+        }
+        Some((copied, before))
     }
 }
 
 impl Pair {
     /// Which of both is the other's value, with its last reading that is right.
     fn compare(&mut self, newest: [Stamped; 2]) -> Option<(usize, Stamped)> {
+        let is_fault = std::mem::take(&mut self.is_fault);
         let [[one, _], [other, _]] = newest;
         if (one - other).abs() > ROUNDING * other.abs() || one.abs() < STANDS_RAD_S {
-            self.differ(newest);
+            // With a reading that is refused the difference says nothing.
+            if is_fault {
+                (self.equal, self.jumped) = (0, None);
+            } else {
+                self.differ(newest);
+            }
             return None;
         }
         let before = self.before?;
@@ -99,23 +133,29 @@ impl Pair {
     fn differ(&mut self, newest: [Stamped; 2]) {
         let difference = |[[one, _], [other, _]]: [Stamped; 2]| one - other;
         if let Some(before) = self.before.filter(|_| self.equal == 0) {
-            let change = (difference(newest) - difference(before)).abs();
-            let [mean, _] = self.change;
-            self.change = [mean + LATEST * (change - mean), change];
+            let change = difference(newest) - difference(before);
+            let error = (change - self.change).abs();
+            self.change = change;
+            self.error = [self.error[0] + LATEST * (error - self.error[0]), error];
             self.changes = self.changes.saturating_add(1);
         }
         (self.before, self.equal, self.jumped) = (Some(newest), 0, None);
     }
 
-    /// Which of both jumped to the other, where the difference closed at once.
+    /// Which of both jumped to the other, where the difference closed at once: it was to be expected on its side of zero. What a clutch takes
+    /// to zero would have gone beyond.
     fn jump(&self, before: [Stamped; 2], newest: [Stamped; 2]) -> Option<usize> {
         let (times, min_rad_s) = SUDDEN;
-        let [mean, last] = self.change;
-        let closed = (before[0][0] - before[1][0]).abs();
+        let [mean, last] = self.error;
+        let difference = before[0][0] - before[1][0];
+        let expected = difference + self.change;
         let moved = [0, 1].map(|which| (newest[which][0] - before[which][0]).abs());
         let passed_s = newest[0][1].max(newest[1][1]) - before[0][1].min(before[1][1]);
-        let is_sudden = closed > times * mean.max(last) + min_rad_s && (0.0..=SLOWEST_S).contains(&passed_s);
+        let is_sudden = expected.abs() > times * mean.max(last) + min_rad_s
+            && expected * difference > 0.0
+            && (0.0..=SLOWEST_S).contains(&passed_s);
         let which = usize::from(moved[1] > moved[0]);
+        let closed = difference.abs();
         let is_one = 2.0 * moved[which] > closed && 2.0 * moved[1 - which] < closed;
         (is_sudden && is_one && self.changes >= LEARNT).then_some(which)
     }
@@ -131,8 +171,8 @@ mod tests {
         let mut all = Vec::new();
         for row in 0..600 {
             let (time_s, [engine, turbine]) = (0.01 * f64::from(row), speeds(row));
-            assert_eq!(copies.push(Role::EngineSpeed, [engine, time_s]), None);
-            let copy = copies.push(Role::TurbineSpeed, [turbine, time_s]);
+            assert_eq!(copies.push(Role::EngineSpeed, [engine, time_s], false), None);
+            let copy = copies.push(Role::TurbineSpeed, [turbine, time_s], false);
             all.extend(copy.map(|(role, [right, _])| (row, role, right)));
         }
         all
@@ -173,6 +213,50 @@ mod tests {
         assert_eq!(found(|row| if row < 200 { apart(row) } else { [0.0, 0.0] }), []);
         // One jump of both, as where a recording goes on elsewhere.
         assert_eq!(found(|row| if row < 200 { apart(row) } else { [120.0, 120.0 + f64::from(row % 2)] }), []);
+    }
+
+    #[test]
+    fn a_copy_in_an_inertia_phase_is_found() {
+        // The turbine falls by 3 rad/s a row, ever faster, away from the engine.
+        let shifts = |row: u32| {
+            let (time, [engine, turbine]) = (f64::from(row.max(200) - 200), apart(row));
+            [engine, turbine - (3.0 * time + 0.02 * time * time).min(80.0)]
+        };
+        let rows = found(|row| {
+            let [engine, turbine] = shifts(row);
+            [engine, if (206..226).contains(&row) { engine } else { turbine }]
+        });
+        assert_eq!(rows.iter().map(|(row, ..)| *row).collect::<Vec<_>>(), (208..226).collect::<Vec<_>>());
+        assert_eq!(found(shifts), []);
+    }
+
+    #[test]
+    fn a_clutch_that_grips_hard_makes_no_copy() {
+        // The slip falls ever faster, and ends within a row.
+        for per_row in [5.0, 9.0, 17.0] {
+            let grips = |row: u32| {
+                let [engine, _] = apart(row);
+                let time = f64::from(row.max(200) - 200);
+                [engine, engine - (100.0 - per_row * time - 0.3 * time * time).max(0.0)]
+            };
+            assert_eq!(found(grips), [], "{per_row}");
+        }
+    }
+
+    #[test]
+    fn a_channel_that_shows_the_speed_of_any_other_shaft_is_found() {
+        let mut copies = Copies::new();
+        let mut rows = Vec::new();
+        for row in 0..300_u32 {
+            let (time_s, [engine, turbine]) = (0.01 * f64::from(row), apart(row));
+            let wheel = 0.1 * turbine + 0.01 * (2.1 * f64::from(row)).sin();
+            let shown = if (200..250).contains(&row) { wheel } else { engine };
+            let speeds = [shown, turbine, 0.4 * turbine, wheel];
+            for (role, speed) in Role::SPEEDS.into_iter().zip(speeds) {
+                rows.extend(copies.push(role, [speed, time_s], false).map(|(role, _)| (row, role)));
+            }
+        }
+        assert_eq!(rows, (202..250).map(|row| (row, Role::EngineSpeed)).collect::<Vec<_>>());
     }
 
     #[test]

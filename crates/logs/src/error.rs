@@ -43,7 +43,12 @@ pub enum LogError {
 
 impl LogError {
     pub(crate) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |source| Self::Io { path: path.to_owned(), source }
+        |source| match source.kind() {
+            std::io::ErrorKind::IsADirectory => {
+                Self::file(path, "this is a folder and no log\nhint: give the log itself, one of the files in it")
+            }
+            _ => Self::Io { path: path.to_owned(), source },
+        }
     }
 
     pub(crate) fn file(path: &Path, message: impl Into<String>) -> Self {

@@ -5,7 +5,7 @@
 //! [`FROZEN_CHANGE`], and by more than [`FROZEN_QUANTA`] of its own quanta: it is not used until it changes. Its quantum is the
 //! smallest change that was seen of it; before it has changed, [`FROZEN_FROM_START_S`] and [`FROZEN_CHANGE_FROM_START`] count. One that
 //! changed by [`FROZEN_QUANTA`] of its quanta from sample to sample stands for [`STOPPED_S`] and [`STOPPED_SAMPLES`] only, and the other
-//! changes by those quanta.
+//! changes by those quanta. Where such a speed never had one value twice in a row, in [`MANY_CHANGES`] changes, no other one has to show it.
 //! Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from a turbine that is nearly as fast
 //! or faster: below that the idle control may hold the engine while the car comes to rest. An engine that is faster than any idle control
 //! holds it, [`IDLE_RAD_S`], parts from the turbine by the slip of the converter, but does not stand still to the last digit while the turbine
@@ -42,6 +42,9 @@ pub const STOPPED_S: f64 = 0.05;
 /// See [`STOPPED_S`].
 pub const STOPPED_SAMPLES: u32 = 5;
 
+/// Changes after which a speed is known never to have one value twice in a row \[chosen\].
+const MANY_CHANGES: u32 = 200;
+
 /// Below this a shaft stands, rad/s.
 const STANDS_RAD_S: f64 = 1.0;
 
@@ -65,6 +68,8 @@ pub struct FrozenSpeed {
     quantum: f64,
     /// Mean change from sample to sample, of late.
     moves: f64,
+    /// How often it has changed.
+    changes: u32,
 }
 
 /// A speed that stands still.
@@ -81,7 +86,7 @@ struct Still {
 impl FrozenSpeed {
     /// Watches the speed of this role.
     pub fn new(role: Role) -> Self {
-        Self { role, still: None, longest_still: 0, quantum: f64::INFINITY, moves: 0.0 }
+        Self { role, still: None, longest_still: 0, quantum: f64::INFINITY, moves: 0.0, changes: 0 }
     }
 
     /// Whether the speed is known to be frozen since an earlier value.
@@ -101,9 +106,8 @@ impl FrozenSpeed {
                 let change = (value - before.value).abs();
                 self.quantum = self.quantum.min(change);
                 self.moves += LATEST * (change / f64::from(before.samples) - self.moves);
-                // A car that stands, and an engine that idles, say nothing of how coarse their speeds are.
-                let rests_rad_s = if self.role == Role::EngineSpeed { IDLE_RAD_S } else { STANDS_RAD_S };
-                if !before.frozen && before.value.abs() > rests_rad_s {
+                self.changes = self.changes.saturating_add(1);
+                if !before.frozen && before.value.abs() > rests_rad_s(self.role) {
                     self.longest_still = self.longest_still.max(before.samples);
                 }
             }
@@ -124,6 +128,12 @@ impl FrozenSpeed {
             && self.moves > quantum
             && still.samples >= STOPPED_SAMPLES.max(3 * self.longest_still)
             && time_s - still.since_s >= STOPPED_S;
+        // A speed that never had one value twice does not have it for so long.
+        let never_stood = stopped && self.longest_still == 1 && self.changes >= MANY_CHANGES;
+        let rests_rad_s = rests_rad_s(self.role);
+        if !still.frozen && never_stood && value.abs() > rests_rad_s {
+            still.frozen = true;
+        }
         if !still.frozen && value != 0.0 && (long || stopped) {
             let quanta = quantum / value.abs();
             let limit = if stopped { quanta.max(STOPPED_CHANGE) } else { fraction.max(quanta) };
@@ -137,6 +147,12 @@ impl FrozenSpeed {
         }
         still.frozen
     }
+}
+
+/// Up to this speed, rad/s, it may stand still to the last digit: a car that stands, and an engine that idles, say nothing of how coarse their
+/// speeds are.
+fn rests_rad_s(role: Role) -> f64 {
+    if role == Role::EngineSpeed { IDLE_RAD_S } else { STANDS_RAD_S }
 }
 
 /// The speeds that one cannot part from.

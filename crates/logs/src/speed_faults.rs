@@ -4,7 +4,7 @@
 //!
 //! - if it is further from the last one that was believed than the shaft's largest acceleration allows in the time between them, or
 //! - if it fell to a tenth of that and less while another speed shows that the shaft turns, or
-//! - if it came by a jump to the value of the speed next to it: two sensors of two shafts do not agree by a jump, or
+//! - if it came by a jump to the value of another speed: two sensors of two shafts do not agree by a jump, or
 //! - if output and wheel speed, which the final drive ties, part, or
 //! - if it stays at zero while another speed shows for some time that the shaft turns fast, as where a sensor died at a standstill.
 //!
@@ -60,8 +60,6 @@ const WATCHED: usize = 4;
 /// Largest acceleration of each shaft, rad/s^2, and speed up to which its sensor may read zero or wake up, rad/s \[chosen\]. An engine or a
 /// turbine of 0.1 kg m^2 has 3000 rad/s^2 by 300 N m; a locked brake stops a wheel of 2 kg m^2 by 1000 rad/s^2 with 2000 N m.
 const SHAFTS: [(f64, f64); WATCHED] = [(3000.0, 40.0), (3000.0, 40.0), (1000.0, 10.0), (1000.0, 4.0)];
-/// Speeds next to each, whose value its channel may show.
-const NEXT_TO: [&[usize]; WATCHED] = [&[TURBINE, OUTPUT], &[ENGINE, OUTPUT], &[ENGINE, TURBINE, WHEEL], &[OUTPUT]];
 
 /// Watches engine, turbine, output and wheel speed.
 #[derive(Debug, Clone, Copy)]
@@ -138,6 +136,7 @@ impl SpeedFaults {
     pub fn disbelieve_after(&mut self, role: Role, rad_s: f64, time_s: f64) {
         if let Some(believed) = self.believed.get_mut(role as usize) {
             *believed = Some(Believed { rad_s, time_s, first_s: time_s });
+            self.faults[role as usize] = None;
         }
     }
 
@@ -176,7 +175,8 @@ impl SpeedFaults {
         let fell = rad_s.abs() <= FELL * before.rad_s.abs();
         let is_short = time_s - fault.since_s <= LONGEST_S;
         let shows_another = fault.another.is_some_and(|another| self.is_near(STILL_ANOTHER, another, rad_s, time_s))
-            && !(at == TURBINE && self.may_have_shifted(before, rad_s, (fault, time_s)));
+            && !((at, fault.another) == (TURBINE, Some(OUTPUT))
+                && self.may_have_shifted(before, rad_s, (fault, time_s)));
         let is_wrong = || jumps(at, before, rad_s, time_s) || fell || shows_another || self.parts(at, rad_s, time_s);
         let is_dead = || rad_s.abs() <= ZERO_RAD_S && fell && self.is_contradicted(at, before, time_s);
         (is_short && is_wrong()) || is_dead()
@@ -228,10 +228,10 @@ impl SpeedFaults {
         }
     }
 
-    /// The speed next to it whose value a reading has, if they are not one shaft.
+    /// The speed whose value a reading has, if they are not one shaft.
     fn another(&self, at: usize, rad_s: f64, time_s: f64) -> Option<usize> {
         let is_one_shaft = |other: usize| at.max(other) == TURBINE && time_s - self.together_s <= TOGETHER_S;
-        NEXT_TO[at].iter().copied().find(|other| !is_one_shaft(*other) && self.shows(*other, rad_s, time_s))
+        (0..WATCHED).find(|&other| other != at && !is_one_shaft(other) && self.shows(other, rad_s, time_s))
     }
 
     /// Whether a reading has the value of this speed.

@@ -53,23 +53,26 @@ impl SpeedWatch {
     pub fn judge(&mut self, reading: SpeedReading) -> (Quality, Option<Withdrawn>) {
         let SpeedReading { role, value, time_s, may_be_held } = reading;
         let Some((frozen, held)) = self.speeds.get_mut(role as usize) else { return (Quality::Good, None) };
-        if self.faults.is_fault(role, value, time_s) {
-            return (Quality::Impossible, None);
-        }
+        let is_fault = self.faults.is_fault(role, value, time_s);
         let was_frozen = frozen.is_known();
-        let is_frozen = frozen.is_frozen(value, time_s, &self.newest);
-        let is_held = may_be_held && held.is_held(value);
-        if is_frozen && let Some([value, after_s]) = frozen.still() {
-            self.faults.disbelieve_after(role, value, after_s);
+        let is_held = !is_fault && may_be_held && held.is_held(value);
+        if !is_fault
+            && frozen.is_frozen(value, time_s, &self.newest)
+            && let Some([right, after_s]) = frozen.still()
+        {
+            self.faults.disbelieve_after(role, right, after_s);
             let withdrawn = Withdrawn { role, after_s, quality: Quality::Frozen };
             return (Quality::Frozen, Some(withdrawn).filter(|_| !was_frozen));
         }
-        self.newest[role as usize] = value;
-        let copy = self.copies.push(role, [value, time_s]).map(|(role, [value, after_s])| {
-            self.faults.disbelieve_after(role, value, after_s);
+        let copied = self.copies.push(role, [value, time_s], is_fault).map(|(role, [right, after_s])| {
+            self.faults.disbelieve_after(role, right, after_s);
             Withdrawn { role, after_s, quality: Quality::Impossible }
         });
-        (if is_held { Quality::Held } else { Quality::Good }, copy)
+        if is_fault || copied.is_some_and(|copied| copied.role == role) {
+            return (Quality::Impossible, copied);
+        }
+        self.newest[role as usize] = value;
+        (if is_held { Quality::Held } else { Quality::Good }, copied)
     }
 }
 

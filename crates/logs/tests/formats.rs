@@ -491,7 +491,8 @@ fn what_is_no_log_is_refused_with_what_to_do() {
         assert!(error.contains(message), "{error} | {message}");
     }
     assert!(matches!(Log::open(&folder.0.join("none"), &OpenOptions::default()), Err(logs::LogError::Io { .. })));
-    assert!(matches!(Log::open(&folder.0, &OpenOptions::default()), Err(logs::LogError::Io { .. })));
+    let of_folder = read(&folder.0, &OpenOptions::default()).map(|_| ()).unwrap_err().to_string();
+    assert!(of_folder.contains("this is a folder and no log\nhint: give the log itself"), "{of_folder}");
 }
 
 #[test]

@@ -412,27 +412,30 @@ fn a_public_drive_has_its_three_upshifts() {
 }
 
 #[test]
-fn a_shift_over_which_a_speed_is_refused_is_found_by_the_ratios_around_it() {
+fn a_shift_over_which_a_speed_is_not_there_is_found_by_the_ratios_around_it() {
     let drive = Drive::new(2, &[(3.0, 3)]);
     let roles = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed];
     let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };
-    for role in [Role::TurbineSpeed, Role::OutputSpeed] {
-        let found = |to_s: f64, is_refused: bool| {
-            let mut finder = ShiftFinder::new(&gearbox, |role| roles.contains(&role)).unwrap();
-            for mut reading in drive.readings(&roles) {
-                if reading.role == role && reading.time_s > 2.7 && reading.time_s < to_s {
-                    if !is_refused {
-                        continue;
-                    }
-                    reading.value = f64::NAN;
+    let found = |fails: &[Role], to_s: f64, is_refused: bool| {
+        let mut finder = ShiftFinder::new(&gearbox, |role| roles.contains(&role)).unwrap();
+        for mut reading in drive.readings(&roles) {
+            if fails.contains(&reading.role) && reading.time_s > 2.7 && reading.time_s < to_s {
+                if !is_refused {
+                    continue;
                 }
-                finder.push(&reading);
+                reading.value = f64::NAN;
             }
-            gears(&finder.finish())
-        };
-        assert_eq!(found(4.2, true), [(2, 3)], "{role:?}");
-        // A hole may hold more than one shift, and so may a failure of more than three seconds.
-        assert_eq!(found(4.2, false), [], "{role:?}");
-        assert_eq!(found(5.9, true), [], "{role:?}");
+            finder.push(&reading);
+        }
+        gears(&finder.finish())
+    };
+    for role in [Role::TurbineSpeed, Role::OutputSpeed] {
+        for is_refused in [true, false] {
+            assert_eq!(found(&[role], 4.2, is_refused), [(2, 3)], "{role:?} {is_refused}");
+            // A failure of more than three seconds may hold more than one shift.
+            assert_eq!(found(&[role], 5.9, is_refused), [], "{role:?} {is_refused}");
+        }
     }
+    // And so may a hole of the recording.
+    assert_eq!(found(&roles, 4.2, false), []);
 }

@@ -265,7 +265,7 @@ impl ShiftFinder {
         let Reading { role, time_s, value, .. } = *reading;
         if reading.is_refused() {
             if matches!(role, Role::TurbineSpeed | Role::OutputSpeed) {
-                self.ratio.refused(time_s);
+                self.ratio.goes_on(time_s);
             }
             return;
         }

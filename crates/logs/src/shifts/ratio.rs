@@ -23,6 +23,8 @@ const IN_GEAR_POINTS: u32 = 5;
 pub(super) const LONGEST_S: f64 = 3.0;
 /// Readings further apart than this are a hole, s: what happens in it is not seen.
 const HOLE_S: f64 = 0.3;
+/// Without the other one of turbine and output for so long, a reading is one that came alone, s \[chosen\].
+const ALONE_S: f64 = 0.1;
 /// Points of which the middle one is taken.
 const MEDIAN: usize = 5;
 
@@ -82,8 +84,10 @@ pub(super) struct RatioWatch {
     before: Option<InGear>,
     now: Option<InGear>,
     changes: VecDeque<RatioChange>,
-    /// From when until when the newest readings were refused, s: their sensor failed, and the car drove on.
-    refused_s: Option<[f64; 2]>,
+    /// When the newest output reading came, s.
+    output_s: f64,
+    /// From when until when there was no ratio the last time, s: a sensor failed, and the car drove on.
+    without_ratio_s: Option<[f64; 2]>,
     unfit: Unfit,
 }
 
@@ -108,7 +112,8 @@ impl RatioWatch {
             before: None,
             now: None,
             changes: VecDeque::new(),
-            refused_s: None,
+            output_s: f64::NAN,
+            without_ratio_s: None,
             unfit: Unfit::default(),
         }
     }
@@ -126,10 +131,14 @@ impl RatioWatch {
 
     pub(super) fn turbine(&mut self, time_s: f64, rad_s: f64) {
         self.turbine.push(time_s, rad_s);
+        if time_s - self.output_s > ALONE_S {
+            self.goes_on(time_s);
+        }
         self.join();
     }
 
     pub(super) fn output(&mut self, time_s: f64, rad_s: f64) {
+        self.output_s = time_s;
         self.outputs.push_back((time_s, rad_s));
         // Without a turbine speed nothing is held for long.
         let oldest_s = self.held_outputs.oldest_s(time_s);
@@ -139,18 +148,18 @@ impl RatioWatch {
         self.join();
     }
 
-    /// A reading of turbine or output speed that was refused.
-    pub(super) fn refused(&mut self, time_s: f64) {
-        match &mut self.refused_s {
+    /// The drive goes on without a ratio: a reading of turbine or output speed was refused, or one of them came alone.
+    pub(super) fn goes_on(&mut self, time_s: f64) {
+        match &mut self.without_ratio_s {
             Some([_, last_s]) if time_s - *last_s <= HOLE_S => *last_s = last_s.max(time_s),
-            refused_s => *refused_s = Some([time_s, time_s]),
+            without_ratio_s => *without_ratio_s = Some([time_s, time_s]),
         }
     }
 
-    /// Whether what lies between two times is a hole: not where readings came throughout and were refused.
+    /// Whether what lies between two times is a hole: not where the drive is known to have gone on.
     fn is_hole(&self, from_s: f64, to_s: f64) -> bool {
         let is_bridged = self
-            .refused_s
+            .without_ratio_s
             .is_some_and(|[first_s, last_s]| from_s <= last_s && first_s - from_s <= HOLE_S && to_s - last_s <= HOLE_S);
         to_s - from_s > HOLE_S && !is_bridged
     }
@@ -180,7 +189,11 @@ impl RatioWatch {
             self.outputs.front().filter(|(time_s, _)| *time_s <= self.turbine.newest_s())
         {
             self.outputs.pop_front();
-            let turbine_rad_s = self.turbine.at(time_s, HOLE_S).filter(|rad_s| *rad_s > TURBINE_MIN_RAD_S);
+            let turbine_rad_s = self.turbine.at(time_s, HOLE_S);
+            if turbine_rad_s.is_none() {
+                self.goes_on(time_s);
+            }
+            let turbine_rad_s = turbine_rad_s.filter(|rad_s| *rad_s > TURBINE_MIN_RAD_S);
             if let Some(turbine_rad_s) = turbine_rad_s.filter(|_| output_rad_s > OUTPUT_MIN_RAD_S) {
                 self.raw[self.raw_count % MEDIAN] = Point { time_s, ratio: turbine_rad_s / output_rad_s, output_rad_s };
                 self.raw_count += 1;
