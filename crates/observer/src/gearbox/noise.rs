@@ -9,11 +9,11 @@
 //!
 //! `q` is 1 with the stated noise. Of `n` differences of white noise it has the standard deviation `q sqrt(3 / n)`. Only what lies
 //! two of these above 1 counts, so that readings as stated are used as stated. Neither state nor equations of the filter take part: a wrong model cannot take
-//! its error for noise.
+//! its error for noise. Readings near standstill are left out: a wheel that stands has none.
 
 use drivetrain::Real;
 
-use super::{GearboxFilter, GearboxState, OUTPUT, Reading, ShiftInput, TURBINE, square};
+use super::{GearboxFilter, GearboxState, Newest, OUTPUT, Reading, ShiftInput, TURBINE, square};
 
 /// Differences in the mean at most: it follows a change of the noise within some seconds \[chosen\].
 const MAXIMUM: u16 = 400;
@@ -88,7 +88,9 @@ impl<T: Real> GearboxFilter<'_, T> {
         let came = |k: usize, reading: &Option<Reading<T>>| {
             state.newest[k].filter(|newest| reading.is_some() && !newest.refused)
         };
-        let together = came(TURBINE, &input.turbine_rad_s).zip(came(OUTPUT, &input.output_rad_s));
+        let moves = |output: &Newest<T>| output.value.abs() >= self.uncertainty.output_least_rad_s;
+        let output = came(OUTPUT, &input.output_rad_s).filter(moves);
+        let together = came(TURBINE, &input.turbine_rad_s).zip(output);
         let (Some(row), Some((turbine, output))) = (row, together) else { return state.noise.pause() };
         let [of_turbine, of_output] = [TURBINE, OUTPUT].map(|k| square(self.readings[k].std_dev_rad_s));
         let slip = turbine.value - row.ratio * output.value;
