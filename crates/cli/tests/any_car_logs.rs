@@ -136,6 +136,29 @@ fn torques(text: &str) -> Vec<f64> {
 }
 
 #[test]
+fn a_delay_in_the_channel_map_is_a_delay_of_the_sensor() {
+    let folder = town("any-delay");
+    convert(&folder.path("sim/city_measured.csv"), &folder.path("foreign.mf4"), foreign);
+    let on_time = folder.write("on_time.toml", sensors());
+    let late = folder.write("late.toml", sensors().replace("delay_s = 0.0", "delay_s = 0.02"));
+    let mut map = foreign_map("");
+    let stated = folder.write("map.toml", &map);
+    for speed in ["engine", "turbine", "output", "wheel"] {
+        let channel = format!("[channel.{speed}_speed]\n");
+        assert!(map.contains(&channel), "{map}");
+        map = map.replace(&channel, &format!("{channel}delay_s = 0.02\n"));
+    }
+    let delayed = folder.write("delayed.toml", &map);
+    for (output, map, sensors) in
+        [("sensors.csv", &stated, &late), ("map.csv", &delayed, &on_time), ("none.csv", &stated, &on_time)]
+    {
+        said(&estimate(&folder, "foreign.mf4", output, &["--map", map, "--sensors", sensors]));
+    }
+    assert!(folder.read("map.csv") == folder.read("sensors.csv"));
+    assert!(folder.read("map.csv") != folder.read("none.csv"));
+}
+
+#[test]
 fn a_channel_map_and_a_choice_of_shifts_work_for_any_gearbox() {
     let folder = town("any-maps");
     said(&estimate(&folder, "sim/city_measured.csv", "csv.csv", &[]));

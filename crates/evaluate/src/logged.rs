@@ -138,6 +138,17 @@ impl<'c> LoggedDrive<'c> {
         }
     }
 
+    /// The same where engine, turbine, output and wheel speed come later by these times, s, than their sensors do.
+    #[must_use]
+    pub fn with_speed_delays(mut self, delays_s: [f64; 4]) -> Self {
+        let [engine, of_gearbox @ ..] = delays_s;
+        self.filter.engine.0.delay_s += engine;
+        for (reading, delay_s) in self.filter.readings.iter_mut().zip(of_gearbox) {
+            reading.delay_s += delay_s;
+        }
+        self
+    }
+
     /// The tables of a car behind these sensors.
     ///
     /// # Errors

@@ -16,6 +16,9 @@ use super::car_log::LogStep;
 use super::gear_signal::Gears;
 use super::pressure_command::command_for;
 
+/// The speeds that the filter reads, in its order.
+const SPEEDS: [Role; 4] = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
+
 /// The newest reading of each entry of a map since the step before.
 #[derive(Debug, Clone)]
 pub struct Newest(Vec<Option<Reading>>);
@@ -60,6 +63,8 @@ pub struct CarChannels<'a> {
     entries: Vec<Entry>,
     /// Commands of which the map says that they are sent on change, by their places in the filter's tables.
     on_change: [OnChange; MAX_ELEMENTS],
+    /// Delays by the map of engine, turbine, output and wheel speed, s.
+    speed_delays_s: [f64; 4],
     gears: Gears,
     lock_up_applied: bool,
     pedal: f64,
@@ -86,16 +91,36 @@ impl<'a> CarChannels<'a> {
                 on_change[place] = OnChange::by_map(mapped.delay_s);
             }
         }
+        let speed_delays_s = SPEEDS
+            .map(|role| map.channels.iter().find(|mapped| mapped.role == role).map_or(0.0, |mapped| mapped.delay_s));
         let readings = Readings::new(log, map)?;
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
         let gears = Gears::new([Role::Gear, Role::TargetGear].map(Role::name));
         let (lock_up_applied, pedal, vehicle_m_s, oil_degc) = (false, f64::NAN, None, None);
-        Ok(Self { car, tables, steps, entries, on_change, gears, lock_up_applied, pedal, vehicle_m_s, oil_degc })
+        Ok(Self {
+            car,
+            tables,
+            steps,
+            entries,
+            on_change,
+            speed_delays_s,
+            gears,
+            lock_up_applied,
+            pedal,
+            vehicle_m_s,
+            oil_degc,
+        })
     }
 
     /// The commands by their places in the filter's tables, with those of which the map says that they are sent on change.
     pub fn commands_on_change(&self) -> [OnChange; MAX_ELEMENTS] {
         self.on_change
+    }
+
+    /// Delays by the map of engine, turbine, output and wheel speed, s. They are not in the ages of the readings: the filter takes them
+    /// off ([`evaluate::LoggedDrive::with_speed_delays`]).
+    pub fn speed_delays_s(&self) -> [f64; 4] {
+        self.speed_delays_s
     }
 
     /// The readings, with their summary and notes.
@@ -127,7 +152,8 @@ impl<'a> CarChannels<'a> {
         let mut changed_gear = [None; 2];
         for (Entry { role, element }, reading) in self.entries.iter().zip(&readings) {
             let Some(reading) = reading else { continue };
-            let measured = Measured { value: reading.value, age_s: (time_s - reading.time_s).max(0.0) };
+            let taken_s = if SPEEDS.contains(role) { reading.stamp_s } else { reading.time_s };
+            let measured = Measured { value: reading.value, age_s: (time_s - taken_s).max(0.0) };
             match role {
                 Role::EngineSpeed => of_role[0] = Some(measured),
                 Role::TurbineSpeed => of_role[1] = Some(measured),

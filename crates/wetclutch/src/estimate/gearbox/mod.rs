@@ -125,7 +125,8 @@ pub fn estimate(
     let mut opened = None;
     let reading = CarReading { car, tables, log, stop: options.follow.as_ref(), threads: options.threads };
     let mut source = CarSource::open(reading, &mut opened, say)?;
-    let mut drive = LoggedDrive::new(car, tables, options.sensors.as_ref(), options.learnt.as_ref());
+    let mut drive = LoggedDrive::new(car, tables, options.sensors.as_ref(), options.learnt.as_ref())
+        .with_speed_delays(source.speed_delays_s());
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();
     let places: Vec<(usize, &str)> =

@@ -129,6 +129,14 @@ impl<'a> CarSource<'a> {
         Ok(Self { kind, looked_at, commands, on_change })
     }
 
+    /// Delays by the channel map of engine, turbine, output and wheel speed, s.
+    pub fn speed_delays_s(&self) -> [f64; 4] {
+        match &self.kind {
+            SourceKind::Rows(_) => [0.0; 4],
+            SourceKind::Channels(channels) => channels.speed_delays_s(),
+        }
+    }
+
     /// What watches the columns of a table; mapped channels are watched by their readings.
     pub(crate) fn columns(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<Columns> {
         match &self.kind {
