@@ -40,7 +40,7 @@ MEANINGS = [
     (r"^turbine_torque_estimate_n_m$", "estimated torque at the gearbox input"),
     (r"^shaft_torque_estimate_n_m$", "estimated torque of the drive shafts"),
     (r"^(lock_up|launch_clutch)_torque_estimate_n_m$", "estimated torque of the lock-up clutch while it is applied; of the clutch of the gear without a converter"),
-    (r"_deviation_n_m$", "its standard deviation (1-sigma)"),
+    (r"_deviation_(n_m|pa)$", "its standard deviation (1-sigma)"),
     (r"^health$", "may the row be used: [words](messages.md#health-of-an-estimate)"),
     (r"_command_reading$", "what became of the command: `good`, `absent`, `refused`, `lost`, `unused`"),
     (r"_reading$", "what became of the channel's reading: `good`, `absent`, `refused`, `lost`, `unused`"),

@@ -396,6 +396,8 @@ mod tests {
     fn rows(error_n_m: f64) -> Vec<ShiftScoreRow> {
         let clutch = |sticks: bool, truth_n_m: f64| ClutchRow {
             torque_n_m: [truth_n_m, truth_n_m + error_n_m, truth_n_m],
+            torque_std_dev_n_m: 5.0,
+            pressure_std_dev_pa: 2e4,
             pressure_pa: [3e5, 3.1e5, 3e5],
             sticks,
             slip_rad_s: if sticks { 0.0 } else { 20.0 },

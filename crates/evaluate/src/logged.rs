@@ -433,6 +433,8 @@ fn clutch_row(
         slip_rad_s: if slip_rad_s.is_nan() { by_speeds } else { slip_rad_s },
         alpha: f64::NAN,
         torque_n_m: [torque_n_m, found.torque_n_m, found.open_loop_n_m],
+        torque_std_dev_n_m: found.std_dev_n_m,
+        pressure_std_dev_pa: found.pressure_std_dev_pa,
         pressure_pa: [pressure_pa, found.pressure_pa, found.valve_pa],
         sticks: if slip_rad_s.is_nan() { found.holds } else { slip_rad_s.abs() < STICKS_RAD_S },
         torque_range_n_m: found.torque_range_n_m,

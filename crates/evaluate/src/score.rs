@@ -15,6 +15,10 @@ pub struct ClutchRow {
     /// Torque, N m: true (not a number where it is not known), estimated, by the valve model alone; in a simulation this in the true
     /// direction.
     pub torque_n_m: [f64; 3],
+    /// Standard deviation of the estimated torque by the filter, N m; not a number where it gives none.
+    pub torque_std_dev_n_m: f64,
+    /// The same of the pressure, Pa.
+    pub pressure_std_dev_pa: f64,
     /// Pressure, Pa: true (not a number where it is not known), estimated, by the valve model alone.
     pub pressure_pa: [f64; 3],
     /// Slip, rad/s; by the readings where the true one is not known.
@@ -66,11 +70,29 @@ pub enum TruePhase {
     Inertia,
 }
 
+/// Two standard deviations to either side of an estimate.
+fn band(estimate: f64, std_dev: f64) -> Option<[f64; 2]> {
+    let half = 2.0 * std_dev;
+    (estimate.is_finite() && half.is_finite()).then_some([estimate - half, estimate + half])
+}
+
 impl ClutchRow {
+    /// Two standard deviations of the filter to either side of the torque, N m, where it gives one.
+    pub fn torque_band_n_m(&self) -> Option<[f64; 2]> {
+        band(self.torque_n_m[1], self.torque_std_dev_n_m)
+    }
+
+    /// The same of the pressure, Pa.
+    pub fn pressure_band_pa(&self) -> Option<[f64; 2]> {
+        band(self.pressure_pa[1], self.pressure_std_dev_pa)
+    }
+
     /// A clutch of which nothing is known but whether it sticks.
     pub(crate) fn unknown(sticks: bool) -> Self {
         Self {
             torque_n_m: [f64::NAN; 3],
+            torque_std_dev_n_m: f64::NAN,
+            pressure_std_dev_pa: f64::NAN,
             pressure_pa: [f64::NAN; 3],
             slip_rad_s: f64::NAN,
             alpha: f64::NAN,
@@ -253,6 +275,8 @@ pub fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstima
         (found.element == tables.place(truth.element).unwrap_or(ONE_WAY)).then(|| ClutchRow {
             // A valve model knows no direction: it is told the true one. Else noise of a slip that is not yet seen would be its error.
             torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m.abs().copysign(truth.torque_n_m)],
+            torque_std_dev_n_m: found.std_dev_n_m,
+            pressure_std_dev_pa: found.pressure_std_dev_pa,
             pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
             slip_rad_s: truth.slip_rad_s,
             alpha: alphas.map_or(f64::NAN, |alphas| alphas[c]),

@@ -174,7 +174,10 @@ impl ShiftTables<f64> {
                     limits: valve_limits(errors),
                     piston: fill.map(|fill| piston(&clutch.cylinder, &fill)),
                     budget: Some(range),
-                    uncertainty: element_uncertainty(errors, budget.valve_error_scale),
+                    uncertainty: ElementUncertainty {
+                        drag_n_m: clutch.drag_n_m,
+                        ..element_uncertainty(errors, budget.valve_error_scale)
+                    },
                 })
             },
             on_input_kg_m2,
@@ -279,6 +282,7 @@ pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncerta
         valve_lag_fraction: scale * std_dev_of(errors.valve_lag()),
         valve_delay_s: scale * std_dev_of(errors.valve_delay()),
         pressure_pa: scale * PRESSURE_PA,
+        drag_n_m: 0.0,
     }
 }
 

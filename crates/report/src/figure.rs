@@ -76,8 +76,8 @@ pub struct Panel {
     pub height: f64,
     /// The curves, in the order of the legend.
     pub series: Vec<Series>,
-    /// A range behind them.
-    pub band: Option<Band>,
+    /// Ranges behind them, the widest first.
+    pub bands: Vec<Band>,
     /// What the axis shows.
     pub axis: Axis,
 }
@@ -113,8 +113,8 @@ struct Placed<'a> {
     panel: &'a Panel,
     /// Visible points of each series.
     visible: Vec<Vec<(f64, f64)>>,
-    /// Visible points of the lower and upper ends of the range.
-    range: Option<[Vec<(f64, f64)>; 2]>,
+    /// Visible points of the lower and upper ends of each range.
+    ranges: Vec<[Vec<(f64, f64)>; 2]>,
     /// Lowest and highest visible value.
     extremes: Option<(f64, f64)>,
     scale: Scale,
@@ -151,15 +151,16 @@ impl Figure {
 
     fn place<'a>(&self, panel: &'a Panel) -> Placed<'a> {
         let visible: Vec<_> = panel.series.iter().map(|series| self.visible(&series.points)).collect();
-        let range = panel.band.as_ref().map(|band| [&band.lower, &band.upper].map(|ends| self.visible(ends)));
+        let ends_of = |band: &Band| [&band.lower, &band.upper].map(|ends| self.visible(ends));
+        let ranges: Vec<_> = panel.bands.iter().map(ends_of).collect();
         let curves = extremes(visible.iter().flatten());
-        let ends = extremes(range.iter().flatten().flatten());
+        let ends = extremes(ranges.iter().flatten().flatten());
         let scale = panel.axis.scale(curves, ends, panel.height / TICK_DISTANCE);
         let tolerance = TOLERANCE * (scale.high - scale.low) / panel.height;
         let visible = visible.iter().map(|points| simplified(points, tolerance)).collect();
-        let range = range.map(|ends| simplified_range(ends, tolerance));
+        let ranges = ranges.into_iter().map(|ends| simplified_range(ends, tolerance)).collect();
         let extremes = curves.into_iter().chain(ends).reduce(|(a, b), (low, high)| (a.min(low), b.max(high)));
-        let mut placed = Placed { panel, visible, range, extremes, scale, height: panel.height };
+        let mut placed = Placed { panel, visible, ranges, extremes, scale, height: panel.height };
         placed.height = placed.legend(0.0).iter().map(Entry::height).sum::<f64>().max(panel.height);
         placed
     }
@@ -272,7 +273,7 @@ impl Placed<'_> {
         let Scale { low, high, .. } = self.scale;
         // Without any plot there would be no axes.
         let mut plots = vec![Plot::Line(LinePlot::new())];
-        if let (Some(band), Some([lower, upper])) = (&self.panel.band, &self.range) {
+        for (band, [lower, upper]) in self.panel.bands.iter().zip(&self.ranges) {
             for (lower, upper) in pieces(lower).into_iter().zip(pieces(upper)) {
                 let clamped = |ends: &[(f64, f64)]| ends.iter().map(|p| p.1.clamp(low, high)).collect::<Vec<_>>();
                 plots.push(Plot::Band(
@@ -307,12 +308,12 @@ impl Placed<'_> {
             end(points).map(|wish| Entry::new(Key::Stroke(series.stroke), &series.label, wish))
         });
         let mut entries: Vec<Entry> = series.collect();
-        if let (Some(band), Some([_, upper])) = (&self.panel.band, &self.range)
-            && upper.iter().any(|(_, value)| value.is_finite())
-        {
-            // Below the curves.
-            let wish = entries.iter().map(|entry| entry.wish).fold(top, f64::max);
-            entries.push(Entry::new(Key::Range(band.colour), &band.label, wish));
+        for (band, [_, upper]) in self.panel.bands.iter().zip(&self.ranges).rev() {
+            if upper.iter().any(|(_, value)| value.is_finite()) {
+                // Below the curves.
+                let wish = entries.iter().map(|entry| entry.wish).fold(top, f64::max);
+                entries.push(Entry::new(Key::Range(band.colour), &band.label, wish));
+            }
         }
         let remark = self.scale.beyond(self.extremes);
         entries.extend(remark.map(|remark| Entry::new(Key::Remark, &remark, top + self.height)));
@@ -415,7 +416,7 @@ mod tests {
     }
 
     fn figure(series: Vec<Series>, axis: Axis) -> Figure {
-        let panel = Panel { y_label: "pressure (MPa)".into(), height: 150.0, series, band: None, axis };
+        let panel = Panel { y_label: "pressure (MPa)".into(), height: 150.0, series, bands: Vec::new(), axis };
         Figure { x_label: "time (s)", x_range: (0.0, 1.0), spans: Vec::new(), panels: vec![panel] }
     }
 

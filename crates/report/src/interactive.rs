@@ -63,7 +63,8 @@ struct PanelData<'a> {
     marked: bool,
     note: Option<String>,
     curves: Vec<Curve<'a>>,
-    range: Option<Range<'a>>,
+    /// The widest first.
+    ranges: Vec<Range<'a>>,
 }
 
 #[derive(Serialize)]
@@ -173,12 +174,16 @@ impl Figure {
             marked: !matches!(panel.axis, Axis::Unmarked(..)),
             note,
             curves: curves.collect(),
-            range: panel.band.as_ref().map(|band| Range {
-                name: &band.label,
-                colour: band.colour,
-                lower: values(&band.lower),
-                upper: values(&band.upper),
-            }),
+            ranges: panel
+                .bands
+                .iter()
+                .map(|band| Range {
+                    name: &band.label,
+                    colour: band.colour,
+                    lower: values(&band.lower),
+                    upper: values(&band.upper),
+                })
+                .collect(),
         }
     }
 
@@ -266,7 +271,7 @@ mod tests {
             y_label: "torque (N m)".to_owned(),
             height: 90.0,
             series: vec![series],
-            band: None,
+            bands: Vec::new(),
             axis: Axis::All,
         };
         let span = Span { label: "torque phase".to_owned(), start: 0.2, end: 9.0, colour: "#fff" };

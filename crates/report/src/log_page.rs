@@ -211,7 +211,7 @@ fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
         spans: spans.take(MAX_DRAWN).collect(),
         panels: [
             panel("speed (rpm)", 150.0, speeds.collect()),
-            Panel { band: Some(band), ..panel("clutch pressure (MPa)", 110.0, vec![pressure]) },
+            Panel { bands: vec![band], ..panel("clutch pressure (MPa)", 110.0, vec![pressure]) },
         ]
         .into_iter()
         .chain(health_panel(&healths))
@@ -283,9 +283,9 @@ impl Samples<'_> {
         measured.into_iter().chain([estimate(self.all(value))]).collect()
     }
 
-    fn band(&self, range: &dyn Fn(&LogSample) -> Option<[f64; 2]>) -> Option<Band> {
+    fn bands(&self, range: &dyn Fn(&LogSample) -> Option<[f64; 2]>) -> Vec<Band> {
         let end = |end: usize| self.all(&|sample| range(sample).map_or(f64::NAN, |range| range[end]));
-        Some(Band { label: "range by the error budget".to_owned(), colour: RANGE, lower: end(0), upper: end(1) })
+        vec![Band { label: "range by the error budget".to_owned(), colour: RANGE, lower: end(0), upper: end(1) }]
     }
 
     /// The largest value up to a time; at least zero.
@@ -302,7 +302,7 @@ impl Samples<'_> {
         let measured = self.measured(&|sample| Some(mpa(sample.pressure_pa?.value)));
         let series = self.beside_measured(measured, &|sample| mpa(sample.estimate.pressure_pa));
         Panel {
-            band: self.band(&|sample| Some(sample.estimate.bounds?.pressure_pa.map(mpa))),
+            bands: self.bands(&|sample| Some(sample.estimate.bounds?.pressure_pa.map(mpa))),
             axis: Axis::Within(0.0, 1.1 * maximum.max(0.01)),
             ..panel("clutch pressure (MPa)", 150.0, series)
         }
@@ -317,7 +317,7 @@ impl Samples<'_> {
         let measured = self.measured(&|sample| Some(sample.torque_n_m?.value));
         let series = self.beside_measured(measured, &|sample| sample.estimate.clutch_torque_n_m);
         Panel {
-            band: self.band(&|sample| Some(sample.estimate.bounds?.clutch_torque_n_m)),
+            bands: self.bands(&|sample| Some(sample.estimate.bounds?.clutch_torque_n_m)),
             axis: Axis::Within(-0.1 * maximum.max(1.0), 1.1 * maximum.max(1.0)),
             ..panel("clutch torque (N\u{a0}m)", 120.0, series)
         }
@@ -383,7 +383,7 @@ pub(crate) fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> 
     let series: Vec<Series> = series.collect();
     let lines = series.len() as f64;
     let axis = Axis::Unmarked(0.5 - lines, 0.5);
-    Some(Panel { y_label: "health".to_owned(), height: 18.0 * lines + 8.0, series, band: None, axis })
+    Some(Panel { y_label: "health".to_owned(), height: 18.0 * lines + 8.0, series, bands: Vec::new(), axis })
 }
 
 /// A line at this height where a health holds. One sample of it is drawn until the next, and so wide that it is seen.

@@ -32,7 +32,7 @@ fn figure(x_label: &'static str, x_range: (f64, f64), panels: Vec<(&str, Vec<Ser
         y_label: y_label.to_owned(),
         height: 210.0,
         series,
-        band: None,
+        bands: Vec::new(),
         axis: Axis::All,
     };
     Figure { x_label, x_range, spans: Vec::new(), panels: panels.into_iter().map(panel).collect() }

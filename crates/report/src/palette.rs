@@ -13,6 +13,8 @@ const GREY: &str = "#767676";
 
 /// The guaranteed range, which is the same around every observer: the colour of the default one.
 pub(crate) const RANGE: &str = "#0072B2";
+/// That of a range around another one.
+pub(crate) const WIDE_RANGE: &str = "#777777";
 
 /// A family of curves over one parameter, from low to high: dark to light of the map viridis.
 pub const FAMILY: [Stroke; 6] = [

@@ -4,7 +4,7 @@ use crate::figure::{Axis, Panel, Series};
 
 /// A panel whose axis shows every value.
 pub(crate) fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
-    Panel { y_label: y_label.to_owned(), height, series, band: None, axis: Axis::All }
+    Panel { y_label: y_label.to_owned(), height, series, bands: Vec::new(), axis: Axis::All }
 }
 
 /// The panels that show anything, and the quantities of the others.

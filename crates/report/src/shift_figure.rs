@@ -143,7 +143,7 @@ impl<'a> Curves<'a> {
         let (low, high) = self.until_lock_up(&truth)?;
         let size = (high - low).max(MIN_MPA);
         Some(Panel {
-            band: self.range(|bounds| Some(bounds.pressure_pa.map(units::mpa))),
+            bands: self.range(|bounds| Some(bounds.pressure_pa.map(units::mpa))),
             axis: Axis::Within(low - 0.2 * size, high + 0.3 * size),
             ..panel(
                 "clutch pressure (MPa)",
@@ -160,7 +160,7 @@ impl<'a> Curves<'a> {
         let maximum = 0.5 * (high - low).max(MIN_MPA);
         let errors = self.of_observers(|run, i| units::mpa(run.truth_pa[i] - run.estimates[i].pressure_pa));
         Some(Panel {
-            band: self.certified_band(),
+            bands: self.certified_band().into_iter().collect(),
             axis: Axis::Within(-maximum, maximum),
             ..panel("pressure error (MPa)", 165.0, errors)
         })
@@ -172,7 +172,7 @@ impl<'a> Curves<'a> {
         let axis = self.around(&truth)?;
         let estimates = self.estimates(|e| e.clutch_torque_n_m);
         Some(Panel {
-            band: self.range(|bounds| Some(bounds.clutch_torque_n_m)),
+            bands: self.range(|bounds| Some(bounds.clutch_torque_n_m)),
             axis,
             ..panel("clutch torque (N\u{a0}m)", 190.0, [vec![truth], estimates].concat())
         })
@@ -258,16 +258,16 @@ impl<'a> Curves<'a> {
     }
 
     /// The guaranteed range, as the main observer carries it, if there is one.
-    fn range(&self, of: impl Fn(&Bounds<f64>) -> Option<[f64; 2]>) -> Option<Band> {
+    fn range(&self, of: impl Fn(&Bounds<f64>) -> Option<[f64; 2]>) -> Vec<Band> {
         let main = main_observer(self.runs.iter().map(|run| &run.entry));
-        let run = self.runs.get(main)?;
+        let Some(run) = self.runs.get(main) else { return Vec::new() };
         let ends = |end: usize| -> Vec<(f64, f64)> {
             let value = |bounds: &Bounds<f64>| of(bounds).map_or(f64::NAN, |ends| ends[end]);
             let estimates = run.time_s.iter().zip(&run.estimates);
             estimates.map(|(&time, e)| (time, e.bounds.as_ref().map_or(f64::NAN, value))).collect()
         };
         let band = Band { label: "guaranteed range".into(), colour: RANGE, lower: ends(0), upper: ends(1) };
-        band.upper.iter().any(|(_, value)| value.is_finite()).then_some(band)
+        if band.upper.iter().any(|(_, value)| value.is_finite()) { vec![band] } else { Vec::new() }
     }
 
     /// The bound of the certificate of the first observer, where it is the rigid one.

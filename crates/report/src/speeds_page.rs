@@ -382,7 +382,7 @@ impl SpeedsPage<'_> {
             x_label: "turbine speed over engine speed",
             x_range: (0.0, 1.0),
             spans: Vec::new(),
-            panels: vec![Panel { band: Some(band), ..panel("capacity (10⁻³ N\u{a0}m\u{a0}s²)", 210.0, curves) }],
+            panels: vec![Panel { bands: vec![band], ..panel("capacity (10⁻³ N\u{a0}m\u{a0}s²)", 210.0, curves) }],
         }
     }
 
@@ -411,7 +411,7 @@ impl SpeedsPage<'_> {
             x_label: "time (s)",
             x_range,
             spans: spans.collect(),
-            panels: vec![Panel { band: Some(band), ..panel("torque into the converter (N\u{a0}m)", 160.0, curves) }],
+            panels: vec![Panel { bands: vec![band], ..panel("torque into the converter (N\u{a0}m)", 160.0, curves) }],
         }
     }
 
@@ -437,7 +437,7 @@ impl SpeedsPage<'_> {
             let end = |end: usize| torque.torques.iter().map(|t| (t.time_s, t.clutches_n_m[end])).collect::<Vec<_>>();
             let band = Band { label: "range".to_owned(), colour: RANGE, lower: end(0), upper: end(2) };
             panels.push(Panel {
-                band: Some(band),
+                bands: vec![band],
                 ..panel("U of both clutches (N\u{a0}m at the turbine)", 120.0, vec![series("U", FITTED, end(1))])
             });
         }

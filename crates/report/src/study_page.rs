@@ -251,7 +251,7 @@ fn effects_figure(summary: &Summary, phase: usize) -> Figure {
 }
 
 fn panel(y_label: &str, height: f64, axis: Axis, series: Vec<Series>) -> Panel {
-    Panel { y_label: y_label.to_owned(), height, series, band: None, axis }
+    Panel { y_label: y_label.to_owned(), height, series, bands: Vec::new(), axis }
 }
 
 /// Sobol indices: one row for each factor, the first order (and total) of each observer.

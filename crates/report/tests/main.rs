@@ -31,7 +31,7 @@ fn the_headline_figure_shows_every_observer_and_the_default_one_strongest() {
         let panel = panel(&figure.panels, quantity);
         let labels: Vec<&str> = panel.series.iter().map(|series| series.label.as_str()).collect();
         assert_eq!(labels, [&["true"], names.as_slice()].concat(), "{quantity}");
-        assert!(panel.band.is_some(), "{quantity} has the guaranteed range");
+        assert!(!panel.bands.is_empty(), "{quantity} has the guaranteed range");
         let strongest: Vec<&str> =
             panel.series.iter().filter(|s| s.stroke.weight == Weight::Main).map(|s| s.label.as_str()).collect();
         assert_eq!(strongest, ["Kalman, 100 Hz"], "{quantity}");

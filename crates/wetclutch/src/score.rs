@@ -146,6 +146,8 @@ fn clutch_row([pressure_pa, torque_n_m, slip_rad_s]: [f64; 3], found: &[f64]) ->
     Some(ClutchRow {
         // The valve model knows no direction: it is given the true one.
         torque_n_m: [torque_n_m, estimate_n_m, valve_n_m.abs().copysign(torque_n_m)],
+        torque_std_dev_n_m: f64::NAN,
+        pressure_std_dev_pa: f64::NAN,
         pressure_pa: [pressure_pa, estimate_pa, valve_pa],
         slip_rad_s,
         alpha: f64::NAN,

@@ -79,7 +79,7 @@ fn phase_part(vehicle: &Vehicle, phase: Phase, options: &Design) -> Option<Part>
         y_label: y_label.to_owned(),
         height: 140.0,
         series,
-        band: None,
+        bands: Vec::new(),
         axis: Axis::All,
     };
     let unit = if model == Model::Rigid { "gain (Pa s/rad)" } else { "gain, normalised" };

@@ -283,6 +283,14 @@ impl<T: Real> ElementState<T> {
         }
     }
 
+    /// Standard deviation of that error, Pa.
+    pub(super) fn error_std_dev_pa(&self, element: &FrictionElement<T>) -> T {
+        match &self.pistons {
+            None => self.std_dev_pa(&element.uncertainty),
+            Some(pistons) => pistons.spread.all_pa,
+        }
+    }
+
     /// Correlation of the error of the pressure with that at the step before, beside its fading; `None` without a stroke: all of it
     /// lasts.
     pub(super) fn error_lasts(&self) -> Option<T> {

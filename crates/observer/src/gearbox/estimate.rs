@@ -8,6 +8,7 @@ use super::powertrain::{ClutchTorque, Torques};
 use super::{
     ClutchesAtTurbine, FRACTION, FRICTION, GearCommand, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS,
     N, Newest, OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+    square,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -23,8 +24,10 @@ pub struct ClutchEstimate<T> {
     pub pressure_pa: T,
     /// Torque, N m, positive when it drives its output side.
     pub torque_n_m: T,
-    /// Standard deviation of the torque, N m.
+    /// Standard deviation of the torque, N m: of the filter's states, and of one that slips or is open its drag.
     pub std_dev_n_m: T,
+    /// Standard deviation of the pressure, Pa: of the filter's states, and what these leave of the gain of the valve.
+    pub pressure_std_dev_pa: T,
     /// Pressure by the models of valve and piston alone, Pa.
     pub valve_pa: T,
     /// Torque by these models and friction alone, N m; of a clutch that holds, the torque up to which it does, in the direction of
@@ -226,20 +229,24 @@ impl<T: Real> GearboxFilter<'_, T> {
         [f, k]: [T; 2],
     ) -> ClutchEstimate<T> {
         let zero = T::zero();
-        let (torque, valve_pa, pressure_pa, both) =
-            self.element(elements, clutch.element).map_or((ClutchTorque::none(), zero, zero, zero), |found| {
+        let nothing = (ClutchTorque::none(), zero, zero, zero, [zero; 2]);
+        let (torque, valve_pa, pressure_pa, both, [drag, variance]) =
+            self.element(elements, clutch.element).map_or(nothing, |found| {
                 let (memory, element) = found;
                 let torque = memory.torque(element, clutch, slip, &PressureError::unseen(k));
                 let valve_pa = memory.pressure_pa();
                 let pressure_pa = element.limits.possible_pressure(valve_pa * (T::one() + element.gain_error(f, k)));
-                (torque, valve_pa, pressure_pa, element.correlation_in_shift())
+                let u = &element.uncertainty;
+                let variance = square(valve_pa * u.valve_gain) + square(memory.error_std_dev_pa(element));
+                (torque, valve_pa, pressure_pa, element.correlation_in_shift(), [u.drag_n_m, variance])
             });
         let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
         ClutchEstimate {
             element: clutch.element,
             pressure_pa,
             torque_n_m: corrected / clutch.alpha,
-            std_dev_n_m: (torque.unlearnt_variance(both).sqrt() / clutch.alpha).abs(),
+            std_dev_n_m: (torque.unlearnt_variance(both) / square(clutch.alpha) + square(drag)).sqrt(),
+            pressure_std_dev_pa: variance.sqrt(),
             valve_pa,
             open_loop_n_m: torque.open_loop_n_m / clutch.alpha,
             holds: false,
@@ -272,14 +279,26 @@ impl<T: Real> GearboxFilter<'_, T> {
             torque = zero;
         }
         let std_dev = x.variance(&row).sqrt();
-        let (valve_pa, pressure_pa, both) =
-            self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
+        let nothing = (zero, zero, zero, [zero; 2]);
+        let (valve_pa, pressure_pa, both, [drag, variance]) =
+            self.element(elements, clutch.element).map_or(nothing, |(memory, element)| {
                 let modelled_pa = memory.pressure_pa();
                 let gain = modelled_pa * element.gain_error(x.mean[FRICTION[c]], x.mean[KISS[c]]);
                 // The error of the pressure itself.
                 let itself = memory.error_pa(element, x.mean[PRESSURE[c]]);
                 let pressure_pa = modelled_pa + gain + if holds { zero } else { itself };
-                (modelled_pa, element.limits.possible_pressure(pressure_pa), element.correlation_in_shift())
+                let possible_pa = element.limits.possible_pressure(pressure_pa);
+                let left = square(modelled_pa) * element.gain_left();
+                let [by_f, by_k] = element.gain_by(element.uncertainty.slow_part.sqrt());
+                let of_itself = memory.error_std_dev_pa(element);
+                let mut pressure = [zero; N];
+                (pressure[FRICTION[c]], pressure[KISS[c]]) = (modelled_pa * by_f, modelled_pa * by_k);
+                // Of one that holds the speeds show nothing of it.
+                let unseen = if holds { square(of_itself) } else { zero };
+                pressure[PRESSURE[c]] = if holds { zero } else { of_itself };
+                let drag = if holds { zero } else { element.uncertainty.drag_n_m };
+                let variance = x.variance(&pressure) + left + unseen;
+                (modelled_pa, possible_pa, element.correlation_in_shift(), [drag, variance])
             });
         let open_loop_n_m = if holds { own.open_loop_n_m.abs() * torque.signum() } else { own.open_loop_n_m };
         let alone = own.unlearnt_variance(both).sqrt();
@@ -287,7 +306,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             element: clutch.element,
             pressure_pa,
             torque_n_m: torque / clutch.alpha,
-            std_dev_n_m: (std_dev / clutch.alpha).abs(),
+            std_dev_n_m: (square(std_dev / clutch.alpha) + square(drag)).sqrt(),
+            pressure_std_dev_pa: variance.at_least(zero).sqrt(),
             valve_pa,
             open_loop_n_m: open_loop_n_m / clutch.alpha,
             holds,

@@ -50,6 +50,8 @@ pub struct ElementUncertainty<T> {
     pub valve_delay_s: T,
     /// Error of the pressure at rest that does not last, Pa.
     pub pressure_pa: T,
+    /// Torque of the plates that no model has, of a clutch that slips or is open: its drag, N m.
+    pub drag_n_m: T,
 }
 
 impl<T: Real> ShiftUncertainty<T> {
@@ -90,6 +92,7 @@ impl<T: Real> ElementUncertainty<T> {
             valve_lag_fraction: to(self.valve_lag_fraction),
             valve_delay_s: to(self.valve_delay_s),
             pressure_pa: to(self.pressure_pa),
+            drag_n_m: to(self.drag_n_m),
         }
     }
 }
@@ -121,17 +124,26 @@ impl<T: Real> FrictionElement<T> {
         by_f * f + by_k * k
     }
 
-    /// Regression of the gain on torque factor and kiss point; `slow` is the standard deviation of what lasts of them in their own.
-    pub(super) fn gain_by(&self, slow: T) -> [T; 2] {
+    /// Variance of the valve's gain, as a fraction, that is left where torque factor and kiss point are known.
+    pub(super) fn gain_left(&self) -> T {
         let u = &self.uncertainty;
-        let variance = u.valve_gain * u.valve_gain;
-        // Covariances of the gain with both, and of these two.
-        let per = variance * slow / u.slow_part.sqrt();
-        let with_f = per / u.torque_fraction;
+        let [with_f, with_k, both] = self.gain_with(u.slow_part.sqrt());
+        let [by_f, by_k] = regression([with_f, with_k], both);
+        (square(u.valve_gain) - by_f * with_f - by_k * with_k).at_least(T::zero())
+    }
+
+    /// Regression of the gain on torque factor and kiss point; `slow` is the deviation of what lasts of them in their own.
+    pub(super) fn gain_by(&self, slow: T) -> [T; 2] {
+        let [with_f, with_k, both] = self.gain_with(slow);
+        regression([with_f, with_k], both)
+    }
+
+    /// Covariances of the gain with torque factor and kiss point, and of these two.
+    fn gain_with(&self, slow: T) -> [T; 3] {
+        let u = &self.uncertainty;
+        let per = square(u.valve_gain) * slow / u.slow_part.sqrt();
         let with_k = -per * self.clutch.kiss_pressure() / self.kiss_std_dev_pa();
-        let both = slow * slow * self.correlation();
-        let left = T::one() - both * both;
-        [(with_f - both * with_k) / left, (with_k - both * with_f) / left]
+        [per / u.torque_fraction, with_k, slow * slow * self.correlation()]
     }
 
     /// Correlation of what lasts of torque factor and kiss point: a higher gain is more torque and an earlier kiss point.
@@ -146,4 +158,10 @@ impl<T: Real> FrictionElement<T> {
     pub(super) fn correlation_in_shift(&self) -> T {
         self.uncertainty.slow_part * self.correlation()
     }
+}
+
+/// Coefficients of the regression on two values of unit variance with this covariance, from the covariances with both.
+fn regression<T: Real>([with_f, with_k]: [T; 2], both: T) -> [T; 2] {
+    let left = T::one() - both * both;
+    [(with_f - both * with_k) / left, (with_k - both * with_f) / left]
 }

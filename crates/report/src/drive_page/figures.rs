@@ -10,7 +10,7 @@ use super::{MAX_DRAWN, clutch_names, name};
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
 use crate::log_page::{ESTIMATE, health_panel};
 use crate::motion::motion_panels;
-use crate::palette::{RANGE, Weight};
+use crate::palette::{RANGE, WIDE_RANGE, Weight};
 use crate::panels::{panel, with_values};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
 
@@ -185,7 +185,7 @@ fn at_turbine_panel(rows: &[ShiftScoreRow]) -> Panel {
         lower: points(|[torque, sd]| torque - 2.0 * sd),
         upper: points(|[torque, sd]| torque + 2.0 * sd),
     };
-    Panel { band: Some(band), ..panel("torque at the turbine (N\u{a0}m)", 170.0, series) }
+    Panel { bands: vec![band], ..panel("torque at the turbine (N\u{a0}m)", 170.0, series) }
 }
 
 /// Truth, estimate and valve model of a clutch's torque. One that holds has no torque by its valve model, and its range is all
@@ -195,7 +195,7 @@ fn torque_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
     let of = |clutch: &ClutchRow| {
         let [truth, estimate, valve] = clutch.torque_n_m;
         let range = clutch.torque_range_n_m.map(|range| range.map(|end| held(clutch, end)));
-        ([truth, estimate, held(clutch, valve)], range)
+        ([truth, estimate, held(clutch, valve)], [range, clutch.torque_band_n_m()])
     };
     clutch_panel(rows, c, (format!("torque of {clutch} (N\u{a0}m)"), 125.0, Axis::All), of)
 }
@@ -205,7 +205,10 @@ fn torque_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
 fn pressure_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
     let slipping = rows.iter().map(|row| &row.clutches[c]).filter(|clutch| !clutch.sticks);
     let maximum = slipping.flat_map(|clutch| clutch.pressure_pa).map(mpa).fold(MIN_MPA, f64::max);
-    let of = |clutch: &ClutchRow| (clutch.pressure_pa.map(mpa), clutch.pressure_range_pa.map(|range| range.map(mpa)));
+    let of = |clutch: &ClutchRow| {
+        let ranges = [clutch.pressure_range_pa, clutch.pressure_band_pa()];
+        (clutch.pressure_pa.map(mpa), ranges.map(|range| range.map(|ends| ends.map(mpa))))
+    };
     let axis = Axis::Within(0.0, PRESSURE_ROOM * maximum);
     clutch_panel(rows, c, (format!("pressure of {clutch} (MPa)"), 110.0, axis), of)
 }
@@ -214,15 +217,15 @@ fn clutch_panel(
     rows: &[ShiftScoreRow],
     c: usize,
     (y_label, height, axis): (String, f64, Axis),
-    of: impl Fn(&ClutchRow) -> ([f64; 3], Option<[f64; 2]>),
+    of: impl Fn(&ClutchRow) -> ([f64; 3], [Option<[f64; 2]>; 2]),
 ) -> Panel {
     let curve = |which: usize, label: &str, stroke: Stroke| Series {
         label: label.to_owned(),
         stroke,
         points: rows.iter().map(|row| (row.time_s, of(&row.clutches[c]).0[which])).collect(),
     };
-    let end = |end: usize| {
-        let value = |row: &ShiftScoreRow| of(&row.clutches[c]).1.map_or(f64::NAN, |range| range[end]);
+    let ends = |which: usize, end: usize| {
+        let value = |row: &ShiftScoreRow| of(&row.clutches[c]).1[which].map_or(f64::NAN, |range| range[end]);
         rows.iter().map(|row| (row.time_s, value(row))).collect()
     };
     // A log may have a measured pressure, and then no torque.
@@ -231,6 +234,12 @@ fn clutch_panel(
     if !is_one_way(rows, c) {
         series.push(curve(2, "valve model", OPEN_LOOP));
     }
-    let band = Band { label: "range by the error budget".to_owned(), colour: RANGE, lower: end(0), upper: end(1) };
-    Panel { y_label, height, series, band: Some(band), axis }
+    let bands = [("range by the error budget", WIDE_RANGE), ("two standard deviations", RANGE)];
+    let bands = bands.into_iter().enumerate().map(|(which, (label, colour))| Band {
+        label: label.to_owned(),
+        colour,
+        lower: ends(which, 0),
+        upper: ends(which, 1),
+    });
+    Panel { y_label, height, series, bands: bands.collect(), axis }
 }

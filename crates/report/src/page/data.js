@@ -18,8 +18,8 @@ function valuesOf({ low, step, data }) {
   return Float64Array.from(codes, (code) => (code === 0xffff ? NaN : low + step * code));
 }
 
-// The figure with its numbers decoded: `lines` of a panel in the order of the legend, `drawn` from the lowest to the uppermost, `ends` of
-// its range.
+// The figure with its numbers decoded: `lines` of a panel in the order of the legend, `drawn` from the lowest to the uppermost, `bands` with
+// the lower and the upper end of each range.
 function decoded(text) {
   const figure = JSON.parse(text);
   const times = figure.times.map(timesOf);
@@ -31,10 +31,7 @@ function decoded(text) {
     const isWhole = ({ values }) => values.every((value) => Number.isNaN(value) || Math.abs(value - Math.round(value)) < 1e-3);
     panel.isWhole = panel.marked && panel.lines.every(isWhole) && panel.high - panel.low < 100;
     panel.drawn = [...panel.lines].reverse().sort((a, b) => a.layer - b.layer);
-    if (panel.range) {
-      const { name, colour, lower, upper } = panel.range;
-      panel.ends = [line(lower, { name, colour }), line(upper, { name, colour })];
-    }
+    panel.bands = panel.ranges.map(({ name, colour, lower, upper }) => [lower, upper].map((end) => line(end, { name, colour })));
   }
   return figure;
 }

@@ -61,8 +61,9 @@ class Figure {
   // A panel: its quantity, its legend with switches and values, and the place of its plot.
   panelElement(panel) {
     const values = [];
-    const entries = [...panel.lines, ...(panel.ends ? [panel.ends[0]] : [])].map((line, n) => {
-      const isRange = n === panel.lines.length;
+    const ranges = panel.bands.map((ends) => ({ line: ends[0], ends })).reverse();
+    const entries = [...panel.lines.map((line) => ({ line })), ...ranges].map(({ line, ends }) => {
+      const isRange = ends !== undefined;
       const check = make("input", { type: "checkbox" });
       check.checked = !this.hidden.has(line.name);
       check.addEventListener("change", () => this.show(line.name, check.checked));
@@ -71,7 +72,7 @@ class Figure {
       const read = make("output", {});
       read.style.minWidth = `${this.widestReading(panel, isRange)}ch`;
       values.push(read);
-      return { line, isRange, check, key, label: make("label", {}, check, key, make("span", {}, line.name), read) };
+      return { line, ends: ends ?? [line], isRange, check, key, label: make("label", {}, check, key, make("span", {}, line.name), read) };
     });
     const plot = make("div", { class: "plot" });
     const note = make("p", { class: "quiet note" });
@@ -99,7 +100,7 @@ class Figure {
       if (isRange) key.style.background = ink(line.colour);
       else key.style.borderTop = `${Math.max(line.width, 1.5)}px ${style} ${ink(line.colour)}`;
     }
-    const lines = [...panel.drawn, ...(panel.ends ?? [])];
+    const lines = [...panel.drawn, ...panel.bands.flat()];
     const grid = { stroke: pageColour("--grid"), width: 1 };
     const axis = { stroke: pageColour("--ink"), grid, ticks: grid, font: "12px Helvetica, Arial, sans-serif" };
     const ends = panel.lines.length;
@@ -120,7 +121,7 @@ class Figure {
       cursor: { y: false, drag: { x: true, y: false, setScale: false }, points: { size: 6 }, bind: { dblclick: () => () => this.setView(...this.whole) } },
       scales: { x: { time: false, range: () => this.view }, y: { range: () => this.heights(panel) } },
       series: [{}, ...series],
-      bands: panel.ends ? [{ series: [ends + 2, ends + 1], fill: ink(panel.range.colour, 0.18) }] : [],
+      bands: panel.bands.map(([{ colour }], n) => ({ series: [ends + 2 * n + 2, ends + 2 * n + 1], fill: ink(colour, 0.18) })),
       axes: [
         isLast
           ? { ...axis, size: 34, label: this.data.x, labelSize: 20, labelFont: axis.font }
@@ -142,7 +143,7 @@ class Figure {
     const isWhole = this.view[0] === this.whole[0] && this.view[1] === this.whole[1];
     if (isWhole || !panel.free) return [panel.low, panel.high];
     const curves = panel.lines.filter((line) => !this.hidden.has(line.name));
-    const found = extremes(curves.length ? curves : (panel.ends ?? []), ...this.view);
+    const found = extremes(curves.length ? curves : panel.bands.flat(), ...this.view);
     if (!found) return [panel.low, panel.high];
     let [low, high] = found.map((value) => Math.min(Math.max(value, panel.low), panel.high));
     const room = 0.08 * (high - low) || 0.02 * (panel.high - panel.low);
@@ -214,10 +215,10 @@ class Figure {
   }
 
   // What a line reads at the cursor, with its unit.
-  reading(panel, { line, isRange }) {
+  reading(panel, { line, ends }) {
     if (!panel.marked) return Number.isNaN(valueAt(line, this.time)) ? "" : "yes";
     const size = panel.isWhole ? 1000 : panel.high - panel.low;
-    const values = (isRange ? panel.ends : [line]).map((line) => shown(valueAt(line, this.time), size));
+    const values = ends.map((line) => shown(valueAt(line, this.time), size));
     return `${values.join(" to ")} ${panel.unit}`;
   }
 
@@ -264,14 +265,14 @@ class Figure {
 
   // Takes new values of a panel, or a panel with other curves in its place.
   takePanel(next, n) {
-    const curvesOf = ({ name, lines, ends }) => JSON.stringify([name, lines.map((line) => line.name), Boolean(ends)]);
+    const curvesOf = ({ name, lines, bands }) => JSON.stringify([name, lines.map((line) => line.name), bands.length]);
     const panel = this.data.panels[n];
     if (curvesOf(panel) === curvesOf(next)) {
       Object.assign(panel, { low: next.low, high: next.high, note: next.note });
       this.panels[n].note.textContent = next.note ?? "";
       panel.lines.forEach((line, at) => Object.assign(line, next.lines[at]));
-      panel.ends?.forEach((line, at) => Object.assign(line, next.ends[at]));
-      this.plots[n].setData(joined([...panel.drawn, ...(panel.ends ?? [])]), false);
+      panel.bands.flat().forEach((line, at) => Object.assign(line, next.bands.flat()[at]));
+      this.plots[n].setData(joined([...panel.drawn, ...panel.bands.flat()]), false);
       return;
     }
     this.data.panels[n] = next;
@@ -309,7 +310,7 @@ class Figure {
     if (isShown) this.hidden.delete(name);
     else this.hidden.add(name);
     this.panels.forEach(({ panel, entries }, n) => {
-      [...panel.drawn, ...(panel.ends ?? [])].forEach((line, at) => {
+      [...panel.drawn, ...panel.bands.flat()].forEach((line, at) => {
         if (line.name === name) this.plots[n].setSeries(at + 1, { show: isShown });
       });
       for (const entry of entries) if (entry.line.name === name) entry.check.checked = isShown;

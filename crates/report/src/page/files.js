@@ -2,11 +2,11 @@
 
 const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.charCodeAt(0)};`);
 const shownLines = (figure, panel) =>
-  [...panel.lines, ...(panel.ends ?? [])].filter((line) => !figure.hidden.has(line.name));
+  [...panel.lines, ...panel.bands.flat()].filter((line) => !figure.hidden.has(line.name));
 
 // The name of a line among those of a figure, with its unit.
 const columnName = (panel, line) => {
-  const end = panel.ends?.indexOf(line) ?? -1;
+  const end = panel.bands.find((ends) => ends.includes(line))?.indexOf(line) ?? -1;
   return `${panel.quantity}: ${line.name}${["", " lower", " upper"][end + 1]}${panel.unit ? ` (${panel.unit})` : ""}`;
 };
 
@@ -29,16 +29,17 @@ function svgOf(figure) {
   figure.panels.forEach(({ panel }, n) => {
     const [low, high] = figure.heights(panel);
     const lines = panel.lines.filter((line) => !figure.hidden.has(line.name));
-    const ends = panel.ends && !figure.hidden.has(panel.range.name) ? panel.ends : null;
+    const bands = panel.bands.filter(([{ name }]) => !figure.hidden.has(name));
+    const isEnd = new Set(bands.map(([lower]) => lower));
     // Names above the panel, in as many rows as they need.
     let at = LEFT;
     y += 14;
     parts.push(text(at, y, "start", panel.name, 'font-weight="bold"'));
     at += measure.measureText(panel.name).width * 1.1 + 14;
-    for (const line of [...lines, ...(ends ? [ends[0]] : [])]) {
+    for (const line of [...lines, ...isEnd]) {
       const wide = 28 + measure.measureText(line.name).width;
       if (at + wide > WIDTH - RIGHT && at > LEFT) [at, y] = [LEFT, y + 16];
-      parts.push(ends && line === ends[0]
+      parts.push(isEnd.has(line)
         ? `<rect x="${at}" y="${y - 9}" width="22" height="10" fill="${line.colour}" opacity=".16"/>`
         : `<path d="M${at} ${y - 4}h22" ${stroke(line)}/>`);
       parts.push(text(at + 26, y, "start", line.name));
@@ -51,7 +52,7 @@ function svgOf(figure) {
     for (const span of figure.data.spans) {
       parts.push(`<rect x="${x(span.from).toFixed(1)}" y="${top}" width="${Math.max(x(span.to) - x(span.from), 0.5).toFixed(1)}" height="${height}" fill="${span.colour}" opacity=".5"/>`);
     }
-    if (ends) parts.push(`<path d="${bandPath(ends, from, to, x, up)}" fill="${panel.range.colour}" opacity=".16"/>`);
+    for (const ends of bands) parts.push(`<path d="${bandPath(ends, from, to, x, up)}" fill="${ends[0].colour}" opacity=".16"/>`);
     for (const line of panel.drawn.filter((line) => lines.includes(line))) parts.push(`<path d="${linePath(line, from, to, x, up)}" ${stroke(line)}/>`);
     parts.push("</g>");
     parts.push(`<rect x="${LEFT}" y="${top}" width="${WIDTH - LEFT - RIGHT}" height="${height}" fill="none" stroke="#888" stroke-width=".6"/>`);

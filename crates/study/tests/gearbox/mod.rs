@@ -4,6 +4,7 @@
 #![expect(clippy::print_stdout, reason = "a test may")]
 
 mod attacks;
+mod band;
 mod bounds;
 mod cars;
 mod command_delay;

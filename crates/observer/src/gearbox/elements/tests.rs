@@ -8,6 +8,7 @@ use drivetrain::{Clutch, ClutchValve, Cylinder, Table1, ValveMaps};
 const LIMITS: ValveLimits<f64> = ValveLimits { command_max: 1.2, command_error: 0.01, pressure_max_pa: 1.1e6 };
 
 const UNCERTAINTY: ElementUncertainty<f64> = ElementUncertainty {
+    drag_n_m: 1.0,
     torque_fraction: 0.12,
     slow_part: 0.75,
     valve_gain: 0.06,

@@ -65,10 +65,11 @@ impl<'a> Row<'a> {
         element.map_or("", |element| element.name.as_str())
     }
 
-    /// Pressure, torque, their ranges, both by the valve model, and whether the speeds show nothing, in the order of [`CLUTCH`].
+    /// Pressure, torque, their ranges, both by the valve model, whether the speeds show nothing, and the standard deviations, in the order
+    /// of [`CLUTCH`].
     fn clutch(&self, which: usize, what: usize) -> f64 {
         let Some(clutch) = self.estimate.clutches.map(|clutches| clutches[which]) else { return f64::NAN };
-        if clutch.element == ONE_WAY && what != TORQUE {
+        if clutch.element == ONE_WAY && ![TORQUE, TORQUE_DEVIATION].contains(&what) {
             // It has a torque alone.
             return f64::NAN;
         }
@@ -82,6 +83,8 @@ impl<'a> Row<'a> {
             5 => end(clutch.torque_range_n_m, 1),
             6 => clutch.valve_pa,
             7 => clutch.open_loop_n_m,
+            9 => clutch.pressure_std_dev_pa,
+            TORQUE_DEVIATION => clutch.std_dev_n_m,
             _ => f64::from(u8::from(clutch.hidden)),
         }
     }
@@ -93,7 +96,7 @@ impl<'a> Row<'a> {
 }
 
 /// The columns of a clutch, after `offgoing_` or `oncoming_`.
-const CLUTCH: [&str; 9] = [
+const CLUTCH: [&str; 11] = [
     "pressure_estimate_pa",
     "pressure_least_pa",
     "pressure_greatest_pa",
@@ -103,11 +106,14 @@ const CLUTCH: [&str; 9] = [
     "valve_model_pressure_pa",
     "valve_model_torque_n_m",
     "hidden",
+    "pressure_deviation_pa",
+    "torque_deviation_n_m",
 ];
 /// The column of an element, after its name, that says what became of the reading of its command.
 const COMMAND_READING: &str = "command_reading";
-/// The place of the torque among them.
+/// The places of the torque and of its standard deviation among them.
 const TORQUE: usize = 3;
+const TORQUE_DEVIATION: usize = 10;
 /// The columns of an element, after its name: those of [`CLUTCH`] that its command alone gives.
 const ELEMENT: [&str; 3] = [CLUTCH[6], CLUTCH[1], CLUTCH[2]];
 const ROLES: [&str; 2] = ["offgoing", "oncoming"];
