@@ -2,7 +2,7 @@
 
 use drivetrain::Real;
 
-use crate::fitted_file::SIDES;
+use crate::verdict::SIDES;
 
 /// Standard deviations in the error budget of a fitted file \[chosen: the ranges of `estimate` are to hold nearly always, not in 95 %
 /// of the cars\].

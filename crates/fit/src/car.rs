@@ -1,40 +1,13 @@
 //! The car of a set of parameters.
 
-use car::{SpeedSensor, Vehicle};
+use car::Vehicle;
 use drivetrain::{Clutch, Converter, Cylinder, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Tyre};
 
 use crate::Parameter;
 use crate::parameters::{Prior, SHAPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S, Shaft};
 use crate::pressure::Hydraulics;
-use crate::record::SegmentKind;
+use crate::record::{ReadingAges, SegmentKind};
 use crate::shape::{Knots, Map, mapped};
-
-/// How far a speed wheel turns while a reading ages, rad: a reading is the mean over some teeth, and the last of them passed
-/// half a tooth ago. Zero where the sensor is not known; its delay then takes the mean.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ReadingAges {
-    /// Engine speed.
-    pub engine_rad: f64,
-    /// Turbine speed.
-    pub turbine_rad: f64,
-    /// Output speed.
-    pub output_rad: f64,
-    /// Wheel speed.
-    pub wheel_rad: f64,
-}
-
-impl ReadingAges {
-    /// Those of described sensors.
-    pub fn of(sensors: &car::Sensors) -> Self {
-        let age = |sensor: &SpeedSensor| 0.5 * (sensor.periods + 1.0) * std::f64::consts::TAU / sensor.teeth;
-        Self {
-            engine_rad: age(&sensors.engine),
-            turbine_rad: age(&sensors.turbine),
-            output_rad: age(&sensors.output),
-            wheel_rad: age(&sensors.wheel),
-        }
-    }
-}
 
 /// The car of a set of parameters, and how its signals are read.
 #[derive(Debug, Clone)]

@@ -8,10 +8,8 @@ use crate::car::Car;
 use crate::driving::backlash;
 use crate::parameters::HYSTERESIS_UNIT_PA;
 use crate::vehicle_text::{FITTED, Step, VehicleText, headed, kept, keys, number, shaft_inertia};
+use crate::verdict::SIDES;
 use crate::{FillFit, Fit, FitError, Map, Parameter, ReadingAges, Verdict, parameters};
-
-/// Standard deviations on either side of a stated interval.
-pub(crate) const SIDES: f64 = 2.0;
 
 impl Fit {
     /// The vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the

@@ -14,14 +14,14 @@ use crate::fill::{FillFit, FillLog, Filling};
 use crate::freeing::Misfit;
 use crate::intervals::{self, Precision};
 use crate::least_squares::Iterations;
-use crate::parameters::{self, Available, DELAY_UNIT_S, OFFSET_UNIT_PA, Prior, Shaft};
+use crate::parameters::{self, Available, DELAY_UNIT_S, Held, OFFSET_UNIT_PA, Prior, Shaft};
 use crate::pressure::Hydraulics;
 use crate::record::OutputClock;
 use crate::shape::Map;
 use crate::shift_model::ShiftModel;
+use crate::shift_weights::ShiftWeights;
 use crate::solver::{Problem, Solved, Unknowns};
 use crate::torque_change::TorqueChange;
-use crate::weights::Weights;
 use crate::{Channel, FitError, Parameter, ReadingAges, ShiftRecord, freeing};
 
 /// More shifts only shrink what is below the floor of the intervals.
@@ -73,7 +73,7 @@ pub struct Fit {
     pub torque_change: TorqueChange,
     /// The fill volume of the oncoming clutch; none where its piston has no stroke.
     pub fill: Option<FillFit>,
-    pub(crate) weights: Weights,
+    pub(crate) weights: ShiftWeights,
 }
 
 /// How far a fit is.
@@ -201,7 +201,9 @@ fn freed(problem: &Problem<'_>, solved: &Solved, held: &[Held]) -> Result<Vec<Ma
     // Near a minimum the derivatives of the last step are those of its end.
     // What is held of a shape is no reason to free it.
     let of_maps: Vec<Held> = held.iter().copied().filter(|held| !held.parameter.is_shape()).collect();
-    let precision = intervals::precision(problem.priors, &solved.normal, &of_maps).ok_or_else(singular)?;
+    let precision =
+        intervals::precision(problem.priors, &solved.normal.information, &solved.normal.all_scores(), &of_maps)
+            .ok_or_else(singular)?;
     Ok(freeing::differing(problem.priors, &solved.at.shared, &precision.stated, solved.at.own.len()))
 }
 
@@ -227,7 +229,9 @@ fn found(
     let problem = Problem { priors: &all, ..*problem };
     let lines = problem.linearised(models, &at);
     let normal = problem.normal(models, &lines, &at, &solved.weights)?;
-    let precision = intervals::precision(&all, &normal, held).ok_or_else(singular)?.of_first(known);
+    let precision = intervals::precision(&all, &normal.information, &normal.all_scores(), held)
+        .ok_or_else(singular)?
+        .of_first(known);
     let maps: Vec<Map> = pairs.into_iter().map(|(map, _)| map).collect();
     let misfits = freeing::misfits(&all, &precision.stated, known, &maps, &normal, &at.shared).ok_or_else(singular)?;
     Ok((precision, misfits))
@@ -317,7 +321,7 @@ fn fit_some(
     let own = few.iter().map(ShiftModel::start).collect();
     let start = Unknowns { shared, own, drives: problem.drives.start() };
     let mut say = |iteration| progress(Progress { shifts: few.len(), iteration });
-    problem.solve(&few, start, Weights::START, FIRST, &mut say)
+    problem.solve(&few, start, ShiftWeights::START, FIRST, &mut say)
 }
 
 /// The shifts that can be used now that the clock of the output speed is known, and why the others cannot.
@@ -341,17 +345,10 @@ fn usable(
 }
 
 /// Scale and gain of the channels that the shifts have.
-fn channels(models: &[ShiftModel], weights: &Weights) -> Vec<(Channel, f64, f64)> {
+fn channels(models: &[ShiftModel], weights: &ShiftWeights) -> Vec<(Channel, f64, f64)> {
     let has = |channel| models.iter().any(|model| model.blocks.iter().any(|block| block.channel == channel));
     let channels = Channel::ALL.into_iter().filter(|channel| has(*channel));
-    channels.map(|c| (c, weights.scale[c as usize], weights.gain[c as usize])).collect()
-}
-
-/// A parameter that is held near the value of the file, with the standard deviation of what is known of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Held {
-    pub(crate) parameter: Parameter,
-    pub(crate) sd: f64,
+    channels.map(|c| (c, weights.of(c).scale, weights.of(c).gain)).collect()
 }
 
 /// Without a pressure the gain of the valve cannot be told, nor, apart from the spring, its gain at the kiss point: what speeds seem to say of

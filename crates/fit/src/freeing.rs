@@ -12,11 +12,11 @@
 use drivetrain::Real;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use crate::fitted_file::SIDES;
 use crate::hotelling::excess;
 use crate::parameters::Prior;
 use crate::shape::Map;
 use crate::solver::Normal;
+use crate::verdict::SIDES;
 
 /// Probability with which a misfit is said where all maps are right \[chosen\].
 pub(crate) const LEVEL: f64 = 0.01;

@@ -7,16 +7,8 @@
 use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
-use crate::Parameter;
-use crate::driving::WIND;
-use crate::fitting::Held;
-use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, OFFSET_UNIT_PA, Prior};
-use crate::shape::Map;
-use crate::solver::Normal;
+use crate::parameters::{Held, Prior};
 use crate::weights::FACTOR;
-
-/// Minimum standard deviation of the zero offset of a pressure sensor, Pa \[chosen: what a valve at rest may leave in an open clutch\].
-pub(crate) const OFFSET_FLOOR_PA: f64 = 500.0;
 
 /// What is known of the parameters after a fit.
 #[derive(Debug, Clone)]
@@ -62,27 +54,17 @@ impl Precision {
     }
 }
 
-/// Minimum standard deviation of a parameter: what the model leaves out does not shrink with more shifts.
-pub(crate) fn floor(parameter: Parameter) -> f64 {
-    match parameter {
-        Parameter::Inertia(_) | Parameter::Stiffness => 0.015,
-        Parameter::Damping | Parameter::Tyre | Parameter::Lag | Parameter::Shape(Map::Lag, _) => 0.02,
-        Parameter::Hysteresis => 300.0 / HYSTERESIS_UNIT_PA,
-        Parameter::Air => WIND,
-        Parameter::WheelScale => 1e-4,
-        Parameter::PressureScale => 1e-3,
-        Parameter::PressureOffset => OFFSET_FLOOR_PA / OFFSET_UNIT_PA,
-        _ if parameter.is_delay() => 0.3e-3 / DELAY_UNIT_S,
-        _ => 0.005,
-    }
-}
-
-/// The precision at a minimum with these normal equations.
-pub(crate) fn precision(priors: &[Prior], normal: &Normal, held: &[Held]) -> Option<Precision> {
+/// The precision at a minimum where the data have this information, and these gradients of shifts and drives.
+pub(crate) fn precision(
+    priors: &[Prior],
+    information: &DMatrix<f64>,
+    scores: &[DVector<f64>],
+    held: &[Held],
+) -> Option<Precision> {
     let count = priors.len();
     let prior = DMatrix::from_diagonal(&DVector::from_iterator(count, priors.iter().map(|p| Real::powi(p.sd, -2))));
-    let mut auto = (&normal.information + &prior).cholesky()?.inverse();
-    let cluster = cluster(&auto, &normal.all_scores(), &prior);
+    let mut auto = (information + &prior).cholesky()?.inverse();
+    let cluster = cluster(&auto, scores, &prior);
     let mut stated = auto.clone();
     // Each parameter takes the larger variance; the correlations are those of "auto".
     for (i, prior) in priors.iter().enumerate() {

@@ -4,9 +4,9 @@ use car::Vehicle;
 use config::VehicleFile;
 use drivetrain::Real;
 
-use crate::driving::{AIR, ROLLING, rolling_floor};
+use crate::driving::{AIR, ROLLING, WIND, rolling_floor};
 use crate::shape::{Knots, Map};
-use crate::{FitError, intervals, vehicle_text};
+use crate::{FitError, vehicle_text};
 
 /// Delays are fitted in units of this, s, so that every unknown is of the order of 0.1 to 1.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
@@ -200,6 +200,13 @@ pub struct Available {
     pub driving: bool,
 }
 
+/// A parameter that is held near the value of the file, with the standard deviation of what is known of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Held {
+    pub(crate) parameter: Parameter,
+    pub(crate) sd: f64,
+}
+
 /// A shaft of the gear train with what it adds to the mass matrix of the shift.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shaft {
@@ -224,6 +231,24 @@ pub(crate) fn shafts(vehicle: &VehicleFile) -> Result<Vec<Shaft>, FitError> {
         Ok(Shaft { name, mass_kg_m2 })
     };
     names.into_iter().enumerate().map(shaft).collect()
+}
+
+/// Minimum standard deviation of the zero offset of a pressure sensor, Pa \[chosen: what a valve at rest may leave in an open clutch\].
+pub(crate) const OFFSET_FLOOR_PA: f64 = 500.0;
+
+/// Minimum standard deviation of a parameter: what the model leaves out does not shrink with more shifts.
+pub(crate) fn floor(parameter: Parameter) -> f64 {
+    match parameter {
+        Parameter::Inertia(_) | Parameter::Stiffness => 0.015,
+        Parameter::Damping | Parameter::Tyre | Parameter::Lag | Parameter::Shape(Map::Lag, _) => 0.02,
+        Parameter::Hysteresis => 300.0 / HYSTERESIS_UNIT_PA,
+        Parameter::Air => WIND,
+        Parameter::WheelScale => 1e-4,
+        Parameter::PressureScale => 1e-3,
+        Parameter::PressureOffset => OFFSET_FLOOR_PA / OFFSET_UNIT_PA,
+        _ if parameter.is_delay() => 0.3e-3 / DELAY_UNIT_S,
+        _ => 0.005,
+    }
 }
 
 /// The standard deviation of a factor that lies anywhere within this fraction of 1.
@@ -293,8 +318,7 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
     list.extend(more);
     (list.into_iter().zip(names))
         .map(|((parameter, _, mean, sd), name)| {
-            let floor =
-                if parameter == P::Rolling { rolling_floor(&vehicle.road) } else { intervals::floor(parameter) };
+            let floor = if parameter == P::Rolling { rolling_floor(&vehicle.road) } else { floor(parameter) };
             Prior { parameter, name, mean, sd: sd.max(1e-4), floor }
         })
         .collect()
@@ -315,7 +339,7 @@ pub(crate) fn shape_priors(vehicle: &Vehicle, knots: &Knots, map: Map, numbers: 
         name: knots.name(map, *i),
         mean: 0.0,
         sd: (whole * knots.sd_fraction(map, *i)).max(1e-4),
-        floor: intervals::floor(Parameter::Shape(map, *i)),
+        floor: floor(Parameter::Shape(map, *i)),
     };
     numbers.iter().map(prior).collect()
 }

@@ -1,8 +1,9 @@
 //! The readings of one shift, and the segments in which its phase is known.
 
+use car::SpeedSensor;
 use drivetrain::ReducedShift;
 
-use crate::{ReadingAges, Series};
+use crate::Series;
 
 /// Before the inertia phase so much is used, s: the torque phase, and some time in which the load of the road is seen.
 const BEFORE_S: f64 = 1.0;
@@ -32,6 +33,33 @@ pub enum SegmentKind {
     Slipping,
     /// The oncoming clutch holds.
     Locked,
+}
+
+/// How far a speed wheel turns while a reading ages, rad: a reading is the mean over some teeth, and the last of them passed
+/// half a tooth ago. Zero where the sensor is not known; its delay then takes the mean.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ReadingAges {
+    /// Engine speed.
+    pub engine_rad: f64,
+    /// Turbine speed.
+    pub turbine_rad: f64,
+    /// Output speed.
+    pub output_rad: f64,
+    /// Wheel speed.
+    pub wheel_rad: f64,
+}
+
+impl ReadingAges {
+    /// Those of described sensors.
+    pub fn of(sensors: &car::Sensors) -> Self {
+        let age = |sensor: &SpeedSensor| 0.5 * (sensor.periods + 1.0) * std::f64::consts::TAU / sensor.teeth;
+        Self {
+            engine_rad: age(&sensors.engine),
+            turbine_rad: age(&sensors.turbine),
+            output_rad: age(&sensors.output),
+            wheel_rad: age(&sensors.wheel),
+        }
+    }
 }
 
 /// A part of a shift in which the phase is known, so that the equations are smooth.

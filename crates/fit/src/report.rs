@@ -4,9 +4,9 @@ use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use crate::fill::{FILL_IDENTIFIED_BY, FillFit};
-use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, OFFSET_UNIT_PA};
+use crate::verdict::SIDES;
 use crate::{BacklashFit, Channel, Fit, Known, Measure, Parameter, ReportRow, Verdict, correlated};
 
 /// A one-step gain of the turbine speed above this says that the model does not fit.
@@ -16,6 +16,17 @@ pub(crate) const MEAN_GRADE: &str = "Grade is not measured, and a mean grade act
      constant grade would tell it, and a fit does not read that";
 
 impl Fit {
+    /// What the logs tell of a parameter.
+    pub fn verdict(&self, parameter: Parameter) -> Verdict {
+        let Some(place) = self.place(parameter) else { return Verdict::NotIdentifiable };
+        Verdict::of(self.sd(parameter).unwrap_or(f64::INFINITY), self.priors[place].sd)
+    }
+
+    /// What the logs tell of the factor that all torques have in common: an engine torque signal is a measurement of it.
+    pub fn torque_scale_verdict(&self) -> Verdict {
+        if self.available.engine_torque { Verdict::Partly } else { Verdict::NotIdentifiable }
+    }
+
     /// The table: combinations first, then each parameter.
     pub fn report(&self) -> Vec<ReportRow> {
         use Parameter as P;

@@ -14,7 +14,7 @@ use crate::drives::{DriveNormal, Drives};
 use crate::least_squares::{Equations, Iterations, Minimum, Objective, minimised};
 use crate::parameters::{Prior, Shaft};
 use crate::shift_model::{Block, Changed, Linearised, ShiftModel};
-use crate::weights::{HUBER, Weights};
+use crate::shift_weights::ShiftWeights;
 
 /// What does not change during a fit.
 pub(crate) struct Problem<'a> {
@@ -44,7 +44,7 @@ impl Unknowns {
 /// Where a fit ended.
 pub(crate) struct Solved {
     pub(crate) at: Unknowns,
-    pub(crate) weights: Weights,
+    pub(crate) weights: ShiftWeights,
     /// The last step was small; otherwise the iterations were used up.
     pub(crate) is_converged: bool,
     /// Where the last step began.
@@ -103,21 +103,17 @@ impl Problem<'_> {
     }
 
     /// Half the robust sum of squares, priors included.
-    fn cost(&self, shifts: &[ShiftModel], at: &Unknowns, residuals: &[DVector<f64>], weights: &Weights) -> f64 {
+    fn cost(&self, shifts: &[ShiftModel], at: &Unknowns, residuals: &[DVector<f64>], weights: &ShiftWeights) -> f64 {
         let prior: f64 = (self.priors.iter().zip(&at.shared)).map(|(p, x)| Real::powi((x - p.mean) / p.sd, 2)).sum();
         let data = shifts.iter().zip(residuals).zip(&at.own).map(|((shift, rows), own)| {
             let mut errors = rows.clone();
             weights.errors(&shift.blocks, errors.as_mut_slice());
-            let huber = |e: f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
             let own: f64 = shift.own.iter().zip(own).map(|(u, x)| Real::powi((x - u.mean) / u.sd, 2)).sum();
-            let of_block = |block: &Block| {
-                let sum: f64 = errors.as_slice()[block.rows.clone()].iter().map(|e| huber(*e)).sum();
-                sum / weights.inflation[block.channel as usize]
-            };
-            own + shift.blocks.iter().map(of_block).sum::<f64>()
+            let of_block = |block: &Block| weights.of(block.channel).cost(&errors.as_slice()[block.rows.clone()]);
+            0.5 * own + shift.blocks.iter().map(of_block).sum::<f64>()
         });
         let driving = self.drives.cost(self.priors, at.of_driving(), &weights.drives);
-        0.5 * (prior + data.sum::<f64>()) + driving
+        0.5 * prior + data.sum::<f64>() + driving
     }
 
     pub(crate) fn linearised(&self, shifts: &[ShiftModel], at: &Unknowns) -> Vec<Linearised> {
@@ -132,7 +128,7 @@ impl Problem<'_> {
         shifts: &[ShiftModel],
         lines: &[Linearised],
         at: &Unknowns,
-        weights: &Weights,
+        weights: &ShiftWeights,
     ) -> Result<Normal, FitError> {
         let count = self.priors.len();
         let drives = self.drives.normal(self.priors, at.of_driving(), &weights.drives)?;
@@ -152,10 +148,8 @@ impl Problem<'_> {
             weights.errors(&shift.blocks, errors.as_mut_slice());
             let mut roots = DVector::zeros(shift.rows);
             for block in &shift.blocks {
-                for row in block.rows.clone() {
-                    let robust = (HUBER / errors[row].abs()).min(1.0);
-                    roots[row] = (robust / weights.inflation[block.channel as usize]).sqrt();
-                }
+                let channel = weights.of(block.channel);
+                block.rows.clone().for_each(|row| roots[row] = channel.weight(errors[row]).sqrt());
             }
             errors.component_mul_assign(&roots);
             for mut column in all.column_iter_mut() {
@@ -187,7 +181,7 @@ impl Problem<'_> {
         &self,
         shifts: &[ShiftModel],
         at: Unknowns,
-        weights: Weights,
+        weights: ShiftWeights,
         iterations: Iterations,
         progress: &mut dyn FnMut(u32) -> ControlFlow<()>,
     ) -> Result<Solved, FitError> {
@@ -215,7 +209,7 @@ fn squares(a: &DMatrix<f64>) -> DMatrix<f64> {
 struct Weighed<'a> {
     problem: &'a Problem<'a>,
     shifts: &'a [ShiftModel],
-    weights: Weights,
+    weights: ShiftWeights,
 }
 
 /// Unknowns and what they leave of the readings of each shift.

@@ -93,7 +93,7 @@ impl Fit {
         let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {
             self.weights.errors(&model.blocks, rows.as_mut_slice());
             let turbine = model.blocks.iter().filter(|block| block.channel == Channel::Turbine);
-            let scale = self.weights.scale[Channel::Turbine as usize];
+            let scale = self.weights.of(Channel::Turbine).scale;
             turbine
                 .flat_map(|block| rows.as_slice()[block.rows.clone()].to_vec())
                 .map(move |e| e * scale)

@@ -1,6 +1,7 @@
 //! What logs tell of a parameter.
 
-use crate::{Fit, Parameter};
+/// Standard deviations on either side of a stated interval.
+pub(crate) const SIDES: f64 = 2.0;
 
 /// What logs tell of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,18 +31,5 @@ impl Verdict {
             Self::Partly => "partly told by these logs",
             Self::NotIdentifiable => "not told by these logs",
         }
-    }
-}
-
-impl Fit {
-    /// What the logs tell of a parameter.
-    pub fn verdict(&self, parameter: Parameter) -> Verdict {
-        let Some(place) = self.place(parameter) else { return Verdict::NotIdentifiable };
-        Verdict::of(self.sd(parameter).unwrap_or(f64::INFINITY), self.priors[place].sd)
-    }
-
-    /// What the logs tell of the factor that all torques have in common: an engine torque signal is a measurement of it.
-    pub fn torque_scale_verdict(&self) -> Verdict {
-        if self.available.engine_torque { Verdict::Partly } else { Verdict::NotIdentifiable }
     }
 }

@@ -4,74 +4,15 @@
 //! speed and maps act as torques and add up in the speeds; how much they do so, `g` is found from the residuals themselves.
 
 use drivetrain::Real;
-use nalgebra::DVector;
-
-use crate::Channel;
-use crate::driving::DrivingWeights;
-use crate::shift_model::{Block, ShiftModel};
 
 /// Beyond so many scales a residual counts linearly.
 pub(crate) const HUBER: f64 = 2.5;
-/// Standard deviation of a normal distribution over the median of its sizes.
-const MAD: f64 = 1.4826;
-const CHANNELS: usize = Channel::ALL.len();
-/// The values that `g` is chosen from.
-const GAINS: [f64; 14] = [0.0, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8];
-
-/// Gain and scale of each channel.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Weights {
-    /// `g`.
-    pub(crate) gain: [f64; CHANNELS],
-    /// Standard deviation of a one-step error, in the unit of the channel.
-    pub(crate) scale: [f64; CHANNELS],
-    /// Factor by which the information of its readings is less than that of independent ones of a perfect model. The same one counts in
-    /// the fit and in the intervals: otherwise what is known before would count too little in the fit.
-    pub(crate) inflation: [f64; CHANNELS],
-    /// Of the driving of each log; where there is none, those of a start.
-    pub(crate) drives: Vec<DrivingWeights>,
-}
-
 /// Factor on standard deviations for what the model leaves out, from fits of cars whose parameters are known.
 pub(crate) const FACTOR: f64 = 1.4;
-
-impl Weights {
-    /// Where a fit starts: what is usual for each channel.
-    pub(crate) const START: Self = Self {
-        gain: [0.3, 0.03, 0.03, 0.3, 0.3],
-        scale: [0.5, 0.3, 0.1, 1.0, 3e3],
-        inflation: [FACTOR * FACTOR; CHANNELS],
-        drives: Vec::new(),
-    };
-
-    /// One-step errors of the residuals, or of a column of their derivatives, in scales.
-    pub(crate) fn errors(&self, blocks: &[Block], column: &mut [f64]) {
-        for block in blocks {
-            let channel = block.channel as usize;
-            one_step(&mut column[block.rows.clone()], self.gain[channel]);
-            column[block.rows.clone()].iter_mut().for_each(|error| *error /= self.scale[channel]);
-        }
-    }
-
-    /// Gains and scales that the residuals of all shifts ask for; where a channel has none they stay.
-    pub(crate) fn following(self, shifts: &[ShiftModel], residuals: &[DVector<f64>]) -> Self {
-        let mut weights = self;
-        for channel in Channel::ALL {
-            let blocks: Vec<&[f64]> = (shifts.iter().zip(residuals))
-                .flat_map(|(shift, rows)| {
-                    let of_channel = shift.blocks.iter().filter(|block| block.channel == channel);
-                    of_channel.map(|block| &rows.as_slice()[block.rows.clone()])
-                })
-                .collect();
-            if let Some((gain, scale)) = gain_and_scale(&blocks) {
-                weights.gain[channel as usize] = gain;
-                weights.scale[channel as usize] = scale;
-                weights.inflation[channel as usize] = FACTOR * FACTOR * correlation(&blocks, gain, scale);
-            }
-        }
-        weights
-    }
-}
+/// Standard deviation of a normal distribution over the median of its sizes.
+const MAD: f64 = 1.4826;
+/// The values that `g` is chosen from.
+const GAINS: [f64; 14] = [0.0, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8];
 
 /// Gain and scale of the one-step errors of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +25,11 @@ pub(crate) struct ChannelWeights {
 }
 
 impl ChannelWeights {
+    /// What is usual for a channel.
+    pub(crate) const fn usual(gain: f64, scale: f64) -> Self {
+        Self { gain, scale, inflation: FACTOR * FACTOR }
+    }
+
     /// One-step errors of residuals, or of a column of their derivatives, in scales.
     pub(crate) fn in_scales(&self, column: &mut [f64]) {
         one_step(column, self.gain);
@@ -95,7 +41,7 @@ impl ChannelWeights {
     }
 
     /// Half the robust sum of squares.
-    pub(crate) fn cost(&self, errors: &DVector<f64>) -> f64 {
+    pub(crate) fn cost(&self, errors: &[f64]) -> f64 {
         let loss = |e: &f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
         0.5 * errors.iter().map(loss).sum::<f64>() / self.inflation
     }
@@ -115,14 +61,14 @@ impl ChannelWeights {
 }
 
 /// The gain with which residuals have the minimum one-step errors, and the scale of these; none without residuals.
-pub(crate) fn gain_and_scale(blocks: &[&[f64]]) -> Option<(f64, f64)> {
+fn gain_and_scale(blocks: &[&[f64]]) -> Option<(f64, f64)> {
     let found = GAINS.into_iter().map(|gain| (gain, spread(blocks, gain)));
     let (gain, (_, scale)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
     (scale > 0.0).then_some((gain, scale))
 }
 
 /// Turns residuals into one-step errors. The first is the residual itself.
-pub(crate) fn one_step(residuals: &mut [f64], gain: f64) {
+fn one_step(residuals: &mut [f64], gain: f64) {
     let mut state = 0.0;
     for residual in residuals {
         *residual -= state;

@@ -14,7 +14,7 @@ use drivetrain::Real;
 use super::twist::{Cell, InputTorque, changes, identified, rests};
 use super::{DrivenCar, Driving};
 use crate::Verdict;
-use crate::fitted_file::SIDES;
+use crate::verdict::SIDES;
 
 /// Fewest reversals: their scatter is part of the interval.
 const REVERSALS: usize = 4;

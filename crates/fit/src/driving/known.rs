@@ -3,7 +3,7 @@
 use drivetrain::Real;
 
 use crate::Verdict;
-use crate::fitted_file::SIDES;
+use crate::verdict::SIDES;
 
 /// Errors of scale, and delays, s, that are nothing to correct \[chosen\].
 pub(crate) const MIN_SCALE: f64 = 1e-3;

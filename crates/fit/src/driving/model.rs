@@ -9,7 +9,7 @@ use super::stretch::{Driving, FINE_S, HalfStep, STEP_S, Stretch, means};
 use super::whitening::{Passing, Step, Whitening};
 use super::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_FRACTION, Places, Term};
 use crate::parameters::DELAY_UNIT_S;
-use crate::weights::{ChannelWeights, FACTOR, HUBER};
+use crate::weights::{ChannelWeights, HUBER};
 
 /// Standard deviation of the grade, rad, and the way over which it changes, m \[chosen: roads of hilly land; after twice that way 0.4 of a
 /// grade is left\].
@@ -35,8 +35,7 @@ pub(crate) struct DrivingWeights {
 }
 
 impl DrivingWeights {
-    pub(crate) const START: Self =
-        Self { channel: ChannelWeights { gain: 0.0, scale: 1.0, inflation: FACTOR * FACTOR }, lasting: LASTING[0] };
+    pub(crate) const START: Self = Self { channel: ChannelWeights::usual(0.0, 1.0), lasting: LASTING[0] };
 }
 
 /// A torque balance.
@@ -402,7 +401,7 @@ impl Evaluated {
                 self.information[(*place, *other)] += information[(i, j)];
             }
         }
-        self.cost += weights.cost(&in_scales);
+        self.cost += weights.cost(in_scales.as_slice());
         self.errors[group.0 as usize].extend(rows.row(0).iter());
         self.score += &score;
         match self.groups.iter_mut().find(|(other, _)| *other == group) {

@@ -1,7 +1,7 @@
 //! From the steps of a log to stretches of driving in which the engine pulls.
 
 use super::DrivenCar;
-use super::skew::SkewRecorder;
+use super::skew::{Dated, SkewRecorder, turns_by};
 use super::stretch::{Driving, Stretch, StretchReadings};
 use super::twist::TwistRecorder;
 use crate::Series;
@@ -18,9 +18,6 @@ const PULLS: [f64; 2] = [0.97, 0.99];
 const ENGINE_MIN_RAD_S: f64 = 120.0;
 /// Without a converter it pulls with this torque, and until it has less than the second one, N m \[chosen\].
 const PULLS_N_M: [f64; 2] = [15.0, 5.0];
-/// Fraction and speed, rad/s, by which the turbine may be off the ratio of the gear.
-const RATIO_FRACTION: f64 = 0.03;
-const RATIO_RAD_S: f64 = 2.0;
 /// The end of a stretch is left out, s: from the release of the accelerator until the engine does not pull any more the brake may be on
 /// already.
 const FOOT_S: f64 = 0.5;
@@ -36,9 +33,6 @@ pub(crate) struct RowState {
     pub(crate) gear: Option<usize>,
     pub(crate) lock_up: bool,
 }
-
-/// A reading at the time that it belongs to.
-pub(crate) type Dated = Option<(f64, f64)>;
 
 /// Takes the steps of a log one after the other.
 pub(crate) struct DrivingRecorder {
@@ -166,10 +160,4 @@ impl DrivingRecorder {
             }
         }
     }
-}
-
-/// Whether turbine and output turn by a ratio.
-pub(crate) fn turns_by(ratio: f64, turbine_rad_s: f64, output_rad_s: f64) -> bool {
-    let by_output = ratio * output_rad_s;
-    (turbine_rad_s - by_output).abs() <= RATIO_RAD_S + RATIO_FRACTION * by_output.abs()
 }

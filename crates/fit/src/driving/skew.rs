@@ -11,10 +11,9 @@
 
 use super::known::{Known, MIN_DELAY_S, MIN_SCALE, said_of_delay};
 use super::lines::{Identified, Line};
-use super::recorder::{Dated, turns_by};
 use super::twist::{DELAY_S, SCALE};
 use crate::Series;
-use crate::fitted_file::SIDES;
+use crate::verdict::SIDES;
 
 /// Length of a cell, s, and time between the points of its means, s.
 const CELL_S: f64 = 0.1;
@@ -34,6 +33,13 @@ const TIME_S: f64 = 20.0;
 const GROUPS: usize = 4;
 /// Minimum standard deviations that are stated, as in the one-shift fit: of scale and delay, s.
 const FLOORS: [f64; 2] = [1e-4, 0.3e-3];
+
+/// Fraction and speed, rad/s, by which the turbine may be off the ratio of the gear.
+const RATIO_FRACTION: f64 = 0.03;
+const RATIO_RAD_S: f64 = 2.0;
+
+/// A reading at the time that it belongs to.
+pub(crate) type Dated = Option<(f64, f64)>;
 
 /// Means of the turbine speed and of what a channel says that it is, rad/s.
 pub(crate) type Pair = [f64; 2];
@@ -176,4 +182,10 @@ fn mean(series: &Series, begin_s: f64) -> f64 {
     let points = (CELL_S / POINT_S).round() as u32;
     let at = (0..points).map(|point| series.at(begin_s + POINT_S * (f64::from(point) + 0.5)));
     at.sum::<f64>() / f64::from(points)
+}
+
+/// Whether turbine and output turn by a ratio.
+pub(crate) fn turns_by(ratio: f64, turbine_rad_s: f64, output_rad_s: f64) -> bool {
+    let by_output = ratio * output_rad_s;
+    (turbine_rad_s - by_output).abs() <= RATIO_RAD_S + RATIO_FRACTION * by_output.abs()
 }

@@ -9,7 +9,7 @@ use super::known::{Known, MIN_SCALE, said_of_delay};
 use super::twist::{Cell, DELAY_S, InputTorque, SCALE, changes, identified};
 use super::{DrivenCar, Driving};
 use crate::Verdict;
-use crate::fitted_file::SIDES;
+use crate::verdict::SIDES;
 
 /// Cells of a change: 0.5 s.
 const APART: usize = 5;

@@ -10,8 +10,8 @@ use super::quantities::{DELAY_UNIT_S, Quantity};
 use super::validation::HeldOut;
 use crate::FitError;
 use crate::budget::{BUDGET_COMMENT, BUDGET_SIDES, delays, factors};
-use crate::fitted_file::SIDES;
 use crate::vehicle_text::number;
+use crate::verdict::SIDES;
 
 impl GearboxFit {
     /// Writes the bounds of the car and of the elements that slipped in a fitted shift; the others keep theirs.

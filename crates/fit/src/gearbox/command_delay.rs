@@ -8,7 +8,7 @@ use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::Problem;
 use crate::Known;
-use crate::fitted_file::SIDES;
+use crate::verdict::SIDES;
 
 /// Step of the delays that are looked at first, s, and how many there are to each side; then those between, in quarters.
 const STEP_S: f64 = 0.05;

@@ -9,8 +9,9 @@ use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
 use super::validation::HeldOut;
 use crate::driving::DRAG_UNIT_N_M;
-use crate::fitted_file::{SIDES, fill_comment};
+use crate::fitted_file::fill_comment;
 use crate::vehicle_text::{FITTED, Step, VehicleText, headed, kept, keys, number};
+use crate::verdict::SIDES;
 use crate::{FitError, Verdict};
 
 /// A clutch that sticks holds at least so much more than it carries as it begins to slip, as a factor.

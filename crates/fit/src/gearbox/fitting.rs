@@ -21,9 +21,9 @@ use super::unfitted::Unfitted;
 use super::zero_offset::{without_offsets, zero_offsets};
 use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, InputTorque, WheelFit, fit_backlash, fit_wheel};
 use crate::fill::{FillFit, FillLog, Filling};
-use crate::fitted_file::SIDES;
 use crate::parameters::OFFSET_UNIT_PA;
 use crate::pressure::Hydraulics;
+use crate::verdict::SIDES;
 use crate::{FitError, Known, Verdict};
 
 /// How far a fit is.

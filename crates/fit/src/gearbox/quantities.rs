@@ -10,7 +10,7 @@ use observer::{ShiftTables, element_uncertainty, gearbox_filter};
 use super::shift_log::{ShiftLog, named_pair};
 use super::zero_offset::{sd_before_pa, zero_offsets};
 use crate::driving::{AIR, DRAG_UNIT_N_M, ROLLING, Term, WIND, rolling_floor};
-use crate::intervals::OFFSET_FLOOR_PA;
+use crate::parameters::OFFSET_FLOOR_PA;
 use crate::parameters::OFFSET_UNIT_PA;
 
 /// Unit of the unknown of a delay, s.

@@ -7,8 +7,8 @@ use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
 use crate::driving::{Balance, DRAG_UNIT_N_M, MIN_DELAY_S, said_of_delay};
 use crate::fill::{FILL_IDENTIFIED_BY, FillFit};
-use crate::fitted_file::SIDES;
 use crate::report::{MEAN_GRADE, cautions, fill_row, offset_row, said_of_offset};
+use crate::verdict::SIDES;
 use crate::{BacklashFit, Known, Measure, ReportRow, Verdict, WheelFit, correlated};
 
 /// Errors of the torque at the turbine, in their standard deviations, above which the shifts are not those of the model \[chosen\].

@@ -13,7 +13,7 @@ use super::shift::{Linearised, MeasuredPressure, OWN, ShiftModel};
 use crate::FitError;
 use crate::driving::{DrivingModel, DrivingWeights, Evaluated};
 use crate::least_squares::{Equations, Iterations, Minimum, Objective, minimised};
-use crate::weights::{ChannelWeights, FACTOR};
+use crate::weights::ChannelWeights;
 
 /// Steps after each of which the weights follow the residuals, and all of them.
 const ITERATIONS: Iterations = Iterations { reweighted: 5, maximum: 20, decrease: 0.1 };
@@ -34,8 +34,8 @@ pub(crate) struct Weights {
 impl Weights {
     /// Where a fit starts: what is usual.
     const START: Self = Self {
-        turbine: ChannelWeights { gain: 0.3, scale: 0.5, inflation: FACTOR * FACTOR },
-        pressure: ChannelWeights { gain: 0.3, scale: 3e3, inflation: FACTOR * FACTOR },
+        turbine: ChannelWeights::usual(0.3, 0.5),
+        pressure: ChannelWeights::usual(0.3, 3e3),
         driving: [DrivingWeights::START; 2],
     };
 }
@@ -94,7 +94,7 @@ fn profiled(shift: &ShiftModel, lines: &Linearised, weights: Weights) -> Profile
         }
         profiled.score += all.tr_mul(&errors);
         profiled.information += all.tr_mul(&whitened);
-        profiled.cost += weights.pressure.cost(&errors);
+        profiled.cost += weights.pressure.cost(errors.as_slice());
         profiled.pressure.push(residuals.as_slice().to_vec());
     }
     profiled
@@ -137,7 +137,7 @@ fn profiled_turbine(shift: &ShiftModel, lines: &Linearised, weights: ChannelWeig
     let mixed = by_own.tr_mul(&all);
     let inverse = square.try_inverse().unwrap_or_else(Matrix2::zeros);
     let information = all.tr_mul(&whitened) - mixed.tr_mul(&(inverse * &mixed));
-    let cost = weights.cost(&errors) + 0.5 * precision[(1, 1)] * own[1] * own[1];
+    let cost = weights.cost(errors.as_slice()) + 0.5 * precision[(1, 1)] * own[1] * own[1];
     let residuals = (&lines.residuals - &lines.by_own * own).as_slice().to_vec();
     Profiled {
         residuals,

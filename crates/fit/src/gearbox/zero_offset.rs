@@ -9,7 +9,7 @@ use observer::ShiftTables;
 
 use super::quantities::std_dev_of;
 use super::shift_log::ShiftLog;
-use crate::intervals::OFFSET_FLOOR_PA;
+use crate::parameters::OFFSET_FLOOR_PA;
 use crate::parameters::{OFFSET_PA, POSSIBLE};
 use crate::pressure::{Grid, Hydraulics, pressures};
 use crate::weights::FACTOR;
