@@ -1,16 +1,12 @@
 //! What is promised about a gain, and the check of it that needs no solver.
 
-use car::Vehicle;
 use drivetrain::Real;
 use nalgebra::DMatrix;
-use observer::{Discretisation, Phase};
+use observer::Phase;
 use serde::Serialize;
 
-use crate::compliant::{PRESSURE_UNIT_PA, SPEED_UNITS_RAD_S};
-use crate::discrete::given::longest_decaying_step_s;
-use crate::discrete::system::outputs;
 use crate::lmi::largest_eigenvalue;
-use crate::{IssRequirement, Model, Polytope, Vertex};
+use crate::{IssRequirement, Polytope, Vertex};
 
 /// What every certificate holds for. With backward slip `G` changes its sign on the pressure, and the observers change that of
 /// the gain: `L G` is the same, or, with the shaft torque as a state, the same but for the sign of the pressure's error.
@@ -97,14 +93,6 @@ impl Certificate {
     /// Bound on the error after `elapsed_s`, Pa, if it was `initial_error_pa` at first, Eq. (2.40).
     pub fn error_bound_pa(&self, initial_error_pa: f64, elapsed_s: f64) -> f64 {
         error_bound(self.offset_pa, self.kappa2_per_s, initial_error_pa, elapsed_s)
-    }
-
-    /// The longest step over which the gain may correct, s: over it the error still decays with `kappa2` at every vertex.
-    pub fn longest_step_s(&self, vehicle: &Vehicle, phase: Phase, discretisation: Discretisation) -> f64 {
-        let outputs = outputs(Model::Rigid, phase);
-        let entry = |&output: &usize| self.gain_pa_s_rad[output] * SPEED_UNITS_RAD_S[output] / PRESSURE_UNIT_PA;
-        let gain = DMatrix::from_row_iterator(1, outputs.len(), outputs.iter().map(entry));
-        longest_decaying_step_s(vehicle, Model::Rigid, phase, discretisation, (&gain, self.kappa2_per_s))
     }
 
     /// The gain for people.

@@ -18,8 +18,6 @@ use serde::Serialize;
 
 use crate::budget::{grade_n_m, mass_n_m, turbine_n_m};
 use crate::certificate::BOTH_DIRECTIONS;
-use crate::discrete::Model;
-use crate::discrete::given::longest_decaying_step_s;
 use crate::iss::{DesignError, OffsetMissed, five_steps, settling_time_for};
 use crate::lmi::{Block, Outcome, Problem, largest_eigenvalue};
 use crate::polytope::{distinct, valve_extremes};
@@ -108,16 +106,6 @@ pub struct CompliantDesign {
     pub torque_phase: CompliantCertificate,
     /// Inertia phase, outputs `(w_t, dw, w_w)`.
     pub inertia_phase: CompliantCertificate,
-}
-
-impl CompliantCertificate {
-    /// The longest step over which the gain may correct, s: over it the normalised error still decays with `kappa2` at every
-    /// vertex.
-    pub fn longest_step_s(&self, vehicle: &Vehicle, phase: Phase, discretisation: Discretisation) -> f64 {
-        let rows = &self.gain_normalised;
-        let gain = DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j]);
-        longest_decaying_step_s(vehicle, Model::Compliant, phase, discretisation, (&gain, self.kappa2_per_s))
-    }
 }
 
 impl CompliantDesign {

@@ -94,6 +94,43 @@ pub fn largest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
     symmetric.symmetric_eigenvalues().iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// A block that depends affinely on the unknowns, from a function that evaluates it.
+pub(crate) fn block(unknowns: usize, at: impl Fn(&[f64]) -> DMatrix<f64>) -> Block {
+    block_of(unknowns, 0..unknowns, at)
+}
+
+/// The same of a block that depends on some unknowns only.
+pub(crate) fn block_of(
+    unknowns: usize,
+    on: impl IntoIterator<Item = usize>,
+    at: impl Fn(&[f64]) -> DMatrix<f64>,
+) -> Block {
+    let mut x = vec![0.0; unknowns];
+    let constant = at(&x);
+    let mut per_unknown = vec![DMatrix::zeros(constant.nrows(), constant.ncols()); unknowns];
+    for k in on {
+        x[k] = 1.0;
+        per_unknown[k] = at(&x) - &constant;
+        x[k] = 0.0;
+    }
+    Block { constant, per_unknown }
+}
+
+/// `[a b'; b c]`.
+pub(crate) fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, m) = (a.nrows(), c.nrows());
+    let mut whole = DMatrix::zeros(n + m, n + m);
+    whole.view_mut((0, 0), (n, n)).copy_from(a);
+    whole.view_mut((n, 0), (m, n)).copy_from(b);
+    whole.view_mut((0, n), (n, m)).copy_from(&b.transpose());
+    whole.view_mut((n, n), (m, m)).copy_from(c);
+    whole
+}
+
+pub(crate) fn min_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
+    -largest_eigenvalue(&-matrix)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,8 +5,9 @@ use nalgebra::DMatrix;
 use observer::{CompliantGains, Phase, RigidGains, Schedule};
 
 use crate::compliant::{PRESSURE_UNIT_PA, SHAFT_UNIT_N_M, SPEED_UNITS_RAD_S};
+use crate::discrete::found::{WORTH_A_GAIN, open_loop_bound, slowest};
 use crate::discrete::system::{Corner, ErrorSystem, outputs};
-use crate::discrete::{Model, Quantity, WORTH_A_GAIN, open_loop_bound, slowest};
+use crate::discrete::{Model, Quantity};
 
 /// Steady-state bound on the error of the clutch torque in open loop, as a pressure, Pa, with every error of the budget.
 pub fn open_loop_bound_pa(vehicle: &Vehicle, model: Model, phase: Phase, sample_time_s: f64) -> f64 {

@@ -1,13 +1,22 @@
 //! What each cause of the error budget does to an estimate.
 
 use nalgebra::DMatrix;
+use serde::Serialize;
 
-use super::Contribution;
 use super::system::{Corner, ErrorSystem, READINGS};
 use crate::compliant::PRESSURE_UNIT_PA;
 
 /// Samples over which a response is followed at most.
 const RESPONSE_SAMPLES: usize = 5000;
+
+/// Part of an error that one cause makes up.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Contribution {
+    /// The cause.
+    pub cause: &'static str,
+    /// Its part, Pa.
+    pub bound_pa: f64,
+}
 
 /// What each cause does to the pressure at the corner where all of them together do most.
 pub(super) fn contributions(system: &ErrorSystem, gains: &[DMatrix<f64>]) -> Vec<Contribution> {

@@ -27,14 +27,15 @@
 
 use nalgebra::DMatrix;
 
+use super::found::{DiscreteMargin, Found, WORTH_A_GAIN, open_loop_bound, slowest};
+use super::norm::Norm;
 use super::search::{Search, SolverRecord, min_over};
 use super::system::{Corner, ErrorSystem};
-use super::{
-    DiscreteMargin, Found, Norm, RESERVE, WORTH_A_GAIN, block_of, min_eigenvalue, open_loop_bound, slowest, stacked,
-};
 use crate::iss::DesignError;
-use crate::lmi::{Block, Problem};
+use crate::lmi::{Block, Problem, block_of, min_eigenvalue, stacked};
 
+/// Errors are made larger by this fraction in a program than in the check, which leaves room for rounding.
+const RESERVE: f64 = 1e-4;
 /// The gain is sought in multiples of this, so that the unknowns are of order 1.
 const GAIN_UNIT: f64 = 30.0;
 /// Where the searches for `lambda` end: a factor between its last two values, at first and for the gain that was found.

@@ -6,10 +6,12 @@ use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::{Discretisation, Phase};
 
+use super::design_discrete;
+use super::model::Model;
 use super::norm::{Norm, longest_step};
-use super::system::corners;
-use super::{Model, design_discrete};
-use crate::compliant::{PRESSURE_UNIT_PA, SPEED_UNITS_RAD_S, best_compliant};
+use super::system::{corners, outputs};
+use crate::certificate::Certificate;
+use crate::compliant::{CompliantCertificate, PRESSURE_UNIT_PA, SPEED_UNITS_RAD_S, best_compliant};
 use crate::iss::DesignError;
 use crate::rigid::best_rigid;
 
@@ -91,7 +93,7 @@ pub fn longest_stable_step_s(vehicle: &Vehicle, entry: &ObserverEntry) -> Option
 
 /// The longest step over which an error decays with `kappa2` at least, as a certificate in continuous time promises it, s:
 /// `|Phi - L G Psi| <= exp(-kappa2 step)` at every vertex.
-pub(crate) fn longest_decaying_step_s(
+fn longest_decaying_step_s(
     vehicle: &Vehicle,
     model: Model,
     phase: Phase,
@@ -104,6 +106,26 @@ pub(crate) fn longest_decaying_step_s(
         let decayed = Real::exp(-kappa2_per_s * step_s);
         corners.iter().all(|corner| norm.factor(&corner.error_dynamics(gain)) <= decayed)
     })
+}
+
+impl Certificate {
+    /// The longest step over which the gain may correct, s: over it the error still decays with `kappa2` at every vertex.
+    pub fn longest_step_s(&self, vehicle: &Vehicle, phase: Phase, discretisation: Discretisation) -> f64 {
+        let outputs = outputs(Model::Rigid, phase);
+        let entry = |&output: &usize| self.gain_pa_s_rad[output] * SPEED_UNITS_RAD_S[output] / PRESSURE_UNIT_PA;
+        let gain = DMatrix::from_row_iterator(1, outputs.len(), outputs.iter().map(entry));
+        longest_decaying_step_s(vehicle, Model::Rigid, phase, discretisation, (&gain, self.kappa2_per_s))
+    }
+}
+
+impl CompliantCertificate {
+    /// The longest step over which the gain may correct, s: over it the normalised error still decays with `kappa2` at every
+    /// vertex.
+    pub fn longest_step_s(&self, vehicle: &Vehicle, phase: Phase, discretisation: Discretisation) -> f64 {
+        let rows = &self.gain_normalised;
+        let gain = DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j]);
+        longest_decaying_step_s(vehicle, Model::Compliant, phase, discretisation, (&gain, self.kappa2_per_s))
+    }
 }
 
 /// The longest step over which the speeds may correct the estimate of an observer of an experiment file, s: of designed gains

@@ -15,11 +15,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::found::{DiscreteMargin, Found, slowest};
+use super::norm::Norm;
 use super::search::{Search, SolverRecord, min_over};
 use super::system::{Corner, ErrorSystem};
-use super::{DiscreteMargin, Found, Norm, block, slowest};
 use crate::iss::DesignError;
-use crate::lmi::{Block, Problem};
+use crate::lmi::{Block, Problem, block};
 
 /// The gain is sought in multiples of this, so that the unknowns are of order 1.
 const GAIN_UNIT: f64 = 30.0;

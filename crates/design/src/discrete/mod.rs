@@ -26,8 +26,10 @@
 mod contributions;
 mod ellipsoid;
 mod error_model;
+pub(crate) mod found;
 pub(crate) mod given;
 mod interval;
+mod model;
 pub(crate) mod norm;
 pub(crate) mod search;
 mod smallest_gain;
@@ -41,39 +43,16 @@ use serde::Serialize;
 use crate::certificate::BOTH_DIRECTIONS;
 use crate::compliant::{PRESSURE_UNIT_PA, SPEED_UNITS_RAD_S, compliant_requirement};
 use crate::iss::DesignError;
-use crate::lmi::{Block, largest_eigenvalue};
 use crate::rigid::requirement;
+pub use contributions::Contribution;
 use contributions::contributions;
 pub use error_model::{ErrorModel, error_models};
+pub use found::DiscreteMargin;
+use found::{Found, WORTH_A_GAIN, open_loop_bound};
+pub use model::{Model, Quantity};
 use norm::{Norm, longest_certified_step};
 pub use search::SolverRecord;
-use system::{ErrorSystem, outputs, state_units};
-
-/// Which of the two reduced-order observers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Model {
-    /// Stiff shafts.
-    Rigid,
-    /// Elastic drive shafts.
-    Compliant,
-}
-
-/// Quantity of a bound. The speeds give a torque; an error of the friction then gives an error of the pressure. The valve
-/// model gives a pressure; the same error of the friction then gives an error of the torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Quantity {
-    /// The clutch torque, as the pressure that gives this torque with the friction of the observer's model.
-    ClutchTorque,
-    /// The pressure.
-    Pressure,
-}
-
-/// Errors are made larger by this fraction in a program than in the check, which leaves room for rounding.
-const RESERVE: f64 = 1e-4;
-/// A bound must beat the open loop's by this factor.
-pub(crate) const WORTH_A_GAIN: f64 = 0.999;
+use system::{Corner, ErrorSystem, outputs, state_units};
 
 /// A gain of a sampled observer in one phase, with the bound on its error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -122,25 +101,6 @@ pub struct GainAt {
     pub normalised: Vec<Vec<f64>>,
 }
 
-/// Part of an error that one cause makes up.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Contribution {
-    /// The cause.
-    pub cause: &'static str,
-    /// Its part, Pa.
-    pub bound_pa: f64,
-}
-
-/// One inequality, evaluated.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DiscreteMargin {
-    /// Which.
-    pub label: String,
-    /// Its minimum eigenvalue; of an interval gain, the minimum entry of the matrix that must have no negative one.
-    #[serde(rename = "least")]
-    pub minimum: f64,
-}
-
 /// Certified gains of both phases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiscreteDesign {
@@ -148,17 +108,6 @@ pub struct DiscreteDesign {
     pub torque_phase: DiscreteCertificate,
     /// Inertia phase.
     pub inertia_phase: DiscreteCertificate,
-}
-
-/// What a method found: gains (one, or two at the ends of the friction), bound of the normalised pressure, inequalities.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Found {
-    gains: Vec<DMatrix<f64>>,
-    bound: f64,
-    margins: Vec<DiscreteMargin>,
-    /// The norm in which an error shrinks, and by which factor in a sample.
-    norm: Norm,
-    contraction: f64,
 }
 
 /// Designs the gain of one phase for a sample time. For [`GainMethod::Iss`], which has no sample time, the result is
@@ -326,7 +275,7 @@ fn end_friction(vehicle: &Vehicle, end: usize) -> f64 {
 /// What the open loop has as a gain: none. Its inequality is that of a valve that forgets: `1 - Phi` of the pressure.
 fn without_a_gain(system: &ErrorSystem, method: GainMethod, bound: f64) -> Found {
     let (states, outputs) = (system.states(), system.h.nrows());
-    let forgets = |corner: &system::Corner| DiscreteMargin {
+    let forgets = |corner: &Corner| DiscreteMargin {
         label: corner.label.clone(),
         minimum: 1.0 - corner.phi[(states - 1, states - 1)],
     };
@@ -338,55 +287,6 @@ fn without_a_gain(system: &ErrorSystem, method: GainMethod, bound: f64) -> Found
         norm: Norm::euclidean(states),
         contraction: 1.0,
     }
-}
-
-/// Steady-state bound on the normalised pressure in open loop.
-pub(crate) fn open_loop_bound(system: &ErrorSystem) -> f64 {
-    let pressure = system.states() - 1;
-    let at_corner = |corner: &system::Corner| {
-        let valve: f64 = corner.direct.iter().map(|cause| cause.column[pressure].abs()).sum();
-        valve / (1.0 - corner.phi[(pressure, pressure)])
-    };
-    system.corners.iter().map(at_corner).fold(0.0, f64::max)
-}
-
-/// The largest fraction of an error of the pressure that is left after a sample of the valve alone.
-pub(crate) fn slowest(system: &ErrorSystem) -> f64 {
-    let pressure = system.states() - 1;
-    system.corners.iter().map(|corner| corner.phi[(pressure, pressure)]).fold(0.0, f64::max)
-}
-
-/// A block that depends affinely on the unknowns, from a function that evaluates it.
-fn block(unknowns: usize, at: impl Fn(&[f64]) -> DMatrix<f64>) -> Block {
-    block_of(unknowns, 0..unknowns, at)
-}
-
-/// The same of a block that depends on some unknowns only.
-fn block_of(unknowns: usize, on: impl IntoIterator<Item = usize>, at: impl Fn(&[f64]) -> DMatrix<f64>) -> Block {
-    let mut x = vec![0.0; unknowns];
-    let constant = at(&x);
-    let mut per_unknown = vec![DMatrix::zeros(constant.nrows(), constant.ncols()); unknowns];
-    for k in on {
-        x[k] = 1.0;
-        per_unknown[k] = at(&x) - &constant;
-        x[k] = 0.0;
-    }
-    Block { constant, per_unknown }
-}
-
-/// `[a b'; b c]`.
-fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
-    let (n, m) = (a.nrows(), c.nrows());
-    let mut whole = DMatrix::zeros(n + m, n + m);
-    whole.view_mut((0, 0), (n, n)).copy_from(a);
-    whole.view_mut((n, 0), (m, n)).copy_from(b);
-    whole.view_mut((0, n), (n, m)).copy_from(&b.transpose());
-    whole.view_mut((n, n), (m, m)).copy_from(c);
-    whole
-}
-
-fn min_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
-    -largest_eigenvalue(&-matrix)
 }
 
 /// The gain as a controller has it: in physical units and in single precision, here normalised again.

@@ -4,7 +4,7 @@ use car::{SAMPLE_TIMES_S, Vehicle};
 use nalgebra::{DMatrix, DVector};
 use observer::{Discretisation, Phase};
 
-use super::Model;
+use super::model::Model;
 use super::system::{Corner, corners};
 
 /// How the size of an error is measured.

@@ -3,7 +3,7 @@
 use drivetrain::Real;
 use serde::Serialize;
 
-use super::Found;
+use super::found::Found;
 use crate::iss::DesignError;
 use crate::lmi::{Outcome, Problem};
 

@@ -11,11 +11,12 @@
 use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
+use super::found::{DiscreteMargin, Found};
+use super::norm::Norm;
 use super::search::{Search, SolverRecord};
 use super::system::{Corner, ErrorSystem};
-use super::{DiscreteMargin, Found, Norm, block, min_eigenvalue, stacked};
 use crate::iss::DesignError;
-use crate::lmi::{Block, Problem};
+use crate::lmi::{Block, Problem, block, min_eigenvalue, stacked};
 
 /// The gain is sought in multiples of this, so that the unknowns are of order 1.
 const GAIN_UNIT: f64 = 30.0;

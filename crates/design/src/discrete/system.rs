@@ -33,7 +33,7 @@ use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 use observer::{Discretisation, Phase};
 
-use super::{Model, Quantity};
+use super::model::{Model, Quantity};
 use crate::budget::{ValveErrors, grade_n_m, mass_n_m};
 use crate::compliant::{PRESSURE_UNIT_PA, SHAFT_UNIT_N_M, SPEED_UNITS_RAD_S, compliant_model};
 use crate::compliant::{given_error_matrix, outputs as compliant_outputs};
