@@ -215,22 +215,6 @@ impl<T: Real> Table1<T> {
         (self.on(i, within), slope)
     }
 
-    /// The argument at which a table of rising values reaches `value`; the end arguments outside.
-    ///
-    /// Meaningful only where the values rise; elsewhere it returns the first crossing.
-    pub fn inverse_at(&self, value: T) -> T {
-        let last = self.axis.len - 1;
-        if value <= self.values[0] {
-            return self.axis.points[0];
-        }
-        for i in 0..last {
-            if value <= self.values[i + 1] {
-                return self.axis.points[i] + (value - self.values[i]) / self.slopes[i];
-            }
-        }
-        self.axis.points[last]
-    }
-
     /// Every value multiplied by `factor`, on the same axis.
     #[must_use]
     pub fn scaled(mut self, factor: T) -> Self {
@@ -451,14 +435,6 @@ mod tests {
                 assert!((low - expected[0]).abs() < 1e-12 && (high - expected[1]).abs() < 1e-12, "{from} {to}");
                 assert_eq!(table.range_within(minimum, maximum), table.range_from(&table.place(minimum), maximum));
             }
-        }
-    }
-
-    #[test]
-    fn inverse_undoes_a_rising_table() {
-        let table = Table1::new(&[0.0, 0.2, 1.0], &[0.0, 0.1, 0.9]).unwrap();
-        for x in [0.0_f64, 0.13, 0.2, 0.77, 1.0] {
-            assert!((table.inverse_at(table.at(x)) - x).abs() < 1e-15);
         }
     }
 

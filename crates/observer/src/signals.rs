@@ -89,12 +89,6 @@ impl<T: Real> InputLimits<T> {
         ((command - possible).abs() <= self.command_error).then_some(possible)
     }
 
-    /// Whether a valve command can be used.
-    #[inline]
-    pub fn command_valid(&self, command: T) -> bool {
-        self.possible_command(command).is_some()
-    }
-
     /// A reading of a valve command as far as it can be used.
     #[inline]
     pub(crate) fn read_command(&self, reading: &Reading<T>) -> Option<Reading<T>> {

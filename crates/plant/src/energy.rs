@@ -15,11 +15,6 @@ pub struct PowerBalance {
 }
 
 impl PowerBalance {
-    /// Power that is stored, W: what comes in less every sink.
-    pub fn stored_w(&self) -> f64 {
-        self.engine_w - self.sinks.iter().map(|(_, watts)| watts).sum::<f64>()
-    }
-
     /// The balance at this state.
     pub fn of(powertrain: &Powertrain, mode: Mode, x: &State, inputs: &Inputs) -> Self {
         let v = &powertrain.vehicle;

@@ -5,12 +5,10 @@
 
 use car::ErrorBudget;
 use car::{Car, Sensors};
-use observer::Reading;
 use observer::gearbox::{GearboxFilter, Learnt, ShiftInput};
 use observer::{ShiftTables, gearbox_filter};
 use plant::car::{CarSample, CarShift};
 
-use crate::gearbox::recording::reported_engine_n_m;
 use crate::gearbox::{EvaluateError, ShiftScoreRow, inputs, score_from, simulated};
 
 /// A shift of the true car with what the filter is shown of it.
@@ -43,14 +41,6 @@ impl RecordedShift {
     /// What the filter is shown, which a test may change.
     pub fn inputs_mut(&mut self) -> impl Iterator<Item = &mut ShiftInput<f64>> {
         self.inputs.iter_mut().map(|(_, input)| input)
-    }
-
-    /// Lets the engine's controller report its torque times a factor, some samples late.
-    pub fn report_engine_torque(&mut self, truth: &Car, factor: f64, late: usize) {
-        for (at, input) in &mut self.inputs {
-            let reported_n_m = reported_engine_n_m(truth, &self.samples[at.saturating_sub(late)]);
-            input.engine_n_m = Some(Reading::now(factor * reported_n_m));
-        }
     }
 
     /// Truth and estimates while the shift is under way, by a filter that has learnt this.
