@@ -17,9 +17,6 @@ use crate::thinned::thinned;
 use crate::worth_a_look::chosen;
 use crate::{EvaluateError, ShiftScoreRow, TruePhase};
 
-/// The place of no element among those of the gearbox.
-pub(crate) const NO_ELEMENT: usize = usize::MAX;
-
 /// The drive at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveState {
@@ -50,8 +47,8 @@ pub struct ScoredShift {
     pub kind: Option<ShiftKind>,
     /// Whether it is a garage shift: from or to neutral, or from one direction to the other. It has no old and new speed of the turbine.
     pub is_garage: bool,
-    /// Places of the offgoing and the oncoming element in the gearbox; that of no element where there is none.
-    pub elements: [usize; 2],
+    /// Places of the offgoing and the oncoming element in the gearbox, where there is one.
+    pub elements: [Option<usize>; 2],
     /// Time of the request, and of the last row, s.
     pub time_s: [f64; 2],
     /// How it went.
@@ -257,7 +254,7 @@ impl PassingShifts {
         &mut self,
         car: &Car,
         [from, to]: [usize; 2],
-        elements: [usize; 2],
+        elements: [Option<usize>; 2],
         (time_s, turbine_n_m): (f64, f64),
     ) {
         let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
@@ -343,9 +340,9 @@ impl<'a> DriveScorer<'a> {
             return;
         }
         if passing.open.is_none() {
-            let elements = sample.shift.as_ref().map_or([NO_ELEMENT; 2], |under_way| {
-                let offgoing = if under_way.is_from_neutral { NO_ELEMENT } else { under_way.offgoing.element };
-                [offgoing, under_way.oncoming.element]
+            let elements = sample.shift.as_ref().map_or([None; 2], |under_way| {
+                let offgoing = (!under_way.is_from_neutral).then_some(under_way.offgoing.element);
+                [offgoing, Some(under_way.oncoming.element)]
             });
             passing.begin(known, [from, to], elements, (sample.time_s, sample.turbine_n_m));
             let begun = CarShift { request_s: sample.time_s, ..CarShift::usual(known, from, to, 0.0) };
@@ -429,7 +426,7 @@ mod tests {
             to: 2,
             kind,
             is_garage: false,
-            elements: [0, 1],
+            elements: [Some(0), Some(1)],
             time_s: [5.0, 5.2],
             quality: CarShiftQuality::default(),
             summary: ShiftSummary::of(&rows, kind),

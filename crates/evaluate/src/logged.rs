@@ -21,7 +21,7 @@ use crate::checks::in_gear::{InGear, InGearRow};
 use crate::checks::lock_up_check::LockUpCheck;
 use crate::checks::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk, not_of_their_gears};
 use crate::checks::still_commands::StillCommands;
-use crate::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
+use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift};
 use crate::learning_count::LearningCount;
 use crate::score::within;
 use crate::{ClutchRow, DRAG_N_M, EvaluateError, ROUNDING_PA, ShiftScoreRow};
@@ -197,9 +197,9 @@ impl<'c> LoggedDrive<'c> {
         if let Some(open) = self.passing.open.as_ref().filter(|_| is_hole) {
             self.holes.count += 1;
             self.holes.cut = gears.filter(|gears| *gears == [open.from, open.to]);
-            self.end(f64::NAN, usize::MAX);
+            self.end(None);
         } else if self.passing.ends(gears) {
-            self.end(step.time_s, from);
+            self.end(Some((step.time_s, from)));
         }
         let is_same = self.gear.is_none_or(|before| before == from || before == NO_GEAR || from == NO_GEAR);
         match gears {
@@ -291,7 +291,7 @@ impl<'c> LoggedDrive<'c> {
         let elements = self.tables.tables().shift(from, to).map(|row| row.clutches.map(|clutch| clutch.element));
         if self.passing.open.is_none() {
             let single = || self.car.gearbox.shift(from, to).and_then(|shift| shift.change.single());
-            let elements = elements.and_then(|_| single()).unwrap_or([NO_ELEMENT; 2]);
+            let elements = elements.and_then(|_| single()).map_or([None; 2], |elements| elements.map(Some));
             let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
             self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
             self.begun_s = step.time_s;
@@ -343,19 +343,20 @@ impl<'c> LoggedDrive<'c> {
         shift.rows.push(row);
     }
 
-    /// Ends the open shift with the first row after it, which is in this gear.
-    fn end(&mut self, time_s: f64, gear: usize) {
+    /// Ends the open shift: at the time, s, of the first row after it, and in its gear; `None` where the log does not have it.
+    fn end(&mut self, at: Option<(f64, usize)>) {
         let Some(shift) = &self.passing.open else { return };
-        let complete_s = (gear == shift.to).then_some(time_s - self.begun_s);
-        if let Some(row) = self.tables.tables().shift(shift.from, shift.to).filter(|_| complete_s.is_some()) {
+        let completed_s = at.filter(|(_, gear)| *gear == shift.to).map(|(time_s, _)| time_s);
+        if let Some((row, time_s)) = self.tables.tables().shift(shift.from, shift.to).zip(completed_s) {
             self.still.end(row.clutches.map(|clutch| clutch.element));
             self.delay.end([shift.from, shift.to], [self.begun_s, time_s]);
         }
+        let complete_s = completed_s.map(|time_s| time_s - self.begun_s);
         // A log has no slip of the held elements.
         let unknown =
             CarShiftQuality { jerk_m_s3: f64::NAN, held_slip_rad_s: f64::NAN, tie_up_n_m: f64::NAN, ..shift.quality };
         self.passing.end(CarShiftQuality { complete_s, ..unknown });
-        self.jerk.end(time_s);
+        self.jerk.end(at.map(|(time_s, _)| time_s));
     }
 
     /// Keeps what figures need of at most so many of the shifts up to now that are wanted, those with the largest errors, or without truth those
@@ -369,7 +370,7 @@ impl<'c> LoggedDrive<'c> {
         let jerk_m_s3 = self.jerk.ended(f64::INFINITY);
         self.passing.take_jerk(jerk_m_s3);
         // A shift that the log cuts off is not complete.
-        self.end(f64::NAN, usize::MAX);
+        self.end(None);
         let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));
         let mut warnings: Vec<String> = swapped.into_iter().chain(self.commands.warnings()).collect();
         let ended = self.in_gear.ended();

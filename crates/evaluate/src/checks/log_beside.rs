@@ -9,7 +9,7 @@ use observer::gearbox::{GearCommand, MAX_ELEMENTS};
 use plant::car::CarShiftQuality;
 
 use crate::LogStep;
-use crate::drive::{NO_ELEMENT, ScoredShift};
+use crate::drive::ScoredShift;
 use crate::score::within;
 use crate::{ROUNDING_PA, ShiftScoreRow};
 
@@ -81,12 +81,12 @@ pub(crate) struct DoubtedPressures {
 
 impl DoubtedPressures {
     /// Takes a row of a shift between these elements.
-    pub(crate) fn push(&mut self, elements: [usize; 2], row: &ShiftScoreRow) {
+    pub(crate) fn push(&mut self, elements: [Option<usize>; 2], row: &ShiftScoreRow) {
         for (element, clutch) in elements.into_iter().zip(row.clutches) {
             let [measured_pa, ..] = clutch.pressure_pa;
-            if !measured_pa.is_finite() || clutch.torque_n_m[0].is_finite() || element == NO_ELEMENT {
+            let Some(element) = element.filter(|_| measured_pa.is_finite() && !clutch.torque_n_m[0].is_finite()) else {
                 continue;
-            }
+            };
             self.rows.resize(self.rows.len().max(element + 1), [0; 2]);
             let [all, outside] = &mut self.rows[element];
             *all += 1;
@@ -149,9 +149,9 @@ impl ShiftJerk {
         before
     }
 
-    /// The shift ends at this time, s; not a number where the rest of it is not seen.
-    pub(crate) fn end(&mut self, time_s: f64) {
-        self.until_s = Some(time_s + AROUND_S).filter(|until_s| until_s.is_finite());
+    /// The shift ends at this time, s; `None` where the rest of it is not seen.
+    pub(crate) fn end(&mut self, time_s: Option<f64>) {
+        self.until_s = time_s.map(|time_s| time_s + AROUND_S);
     }
 
     /// The jerk of the shift that has ended, m/s^3, once its speeds are all there, or at the end of the log.

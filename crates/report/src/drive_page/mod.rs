@@ -152,7 +152,7 @@ fn phase_s(shift: &ScoredShift, phase: TruePhase) -> f64 {
 
 /// Offgoing and oncoming element; empty where the shift has none that is known.
 fn clutch_names<'a>(shift: &ScoredShift, car: &'a Car) -> [&'a str; 2] {
-    shift.elements.map(|at| car.gearbox.elements.get(at).map_or("", |element| element.name.as_str()))
+    shift.elements.map(|at| at.and_then(|at| car.gearbox.elements.get(at)).map_or("", |element| element.name.as_str()))
 }
 
 /// What the clutches of a shift do, in words.
