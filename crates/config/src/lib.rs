@@ -14,6 +14,7 @@ pub mod error;
 pub mod experiment;
 pub mod gearbox;
 pub mod learnt;
+mod near;
 pub mod source;
 mod speed_trace;
 pub mod study;
@@ -29,8 +30,9 @@ pub use experiment::{ExperimentFile, read_sensors, sensors_of};
 pub use gearbox::GearboxFile;
 pub use learnt::{check_learnt, read_learnt, write_learnt};
 pub use source::{Kind, Source, toml_number};
-pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
+pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use trace::toml_string;
+pub use tree::Change;
 pub use vehicle::{CarFile, DefaultTaken, VehicleFile};
 
 /// A file is used as what it describes.

@@ -13,7 +13,7 @@ use toml::de::{DeTable, DeValue, Deserializer};
 use trace::text_file::{LARGEST_LIST, LARGEST_TEXT, read_text_of};
 
 use crate::ConfigError;
-use crate::all_errors::is_near;
+use crate::near::is_near;
 
 /// What a configuration file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers};
-use crate::tree::Tree;
+use crate::tree::{Change, Tree};
 use crate::{ConfigError, ExperimentFile, Kind, Source, VehicleFile};
 use experiments::{changed_experiment, experiment_tree};
 
@@ -56,19 +56,6 @@ pub enum Target {
     Vehicle,
     /// The experiment file.
     Experiment,
-}
-
-/// What a factor does to the value in the file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Change {
-    /// Replaces it.
-    #[default]
-    Set,
-    /// Multiplies it; every number of a list.
-    Scale,
-    /// Adds to it; to every number of a list.
-    Add,
 }
 
 /// What varies.

@@ -4,14 +4,27 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
+use serde::Deserialize;
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{self, DeserializeOwned, Deserializer, IntoDeserializer, Visitor};
 use serde_spanned::de::{SpannedDeserializer, is_spanned};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::study::Change;
 use crate::{ConfigError, Source};
+
+/// What a factor does to the value in the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Change {
+    /// Replaces it.
+    #[default]
+    Set,
+    /// Multiplies it; every number of a list.
+    Scale,
+    /// Adds to it; to every number of a list.
+    Add,
+}
 
 /// The values of a file with their places in it.
 #[derive(Debug, Clone)]

@@ -18,6 +18,7 @@ pub mod logged;
 pub mod measured;
 pub mod recording;
 pub mod score;
+mod scored_shift;
 pub mod shift_comfort;
 pub mod shift_summary;
 mod step;

@@ -1,6 +1,6 @@
 //! The states of a long drive, of which a figure of the whole drive needs only some.
 
-use crate::drive::DriveState;
+use crate::scored_shift::DriveState;
 
 /// Around a shift all states are kept, s: its figure shows them.
 const AROUND_S: f64 = 1.0;

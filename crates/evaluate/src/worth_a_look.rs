@@ -3,8 +3,8 @@
 use drivetrain::{Real, ShiftKind};
 use observer::Health;
 
-use crate::drive::ScoredShift;
 use crate::errors::controlling_of;
+use crate::scored_shift::ScoredShift;
 use crate::{ClutchRow, ShiftScoreRow, TruePhase};
 
 /// Shifts that are chosen by each of the measures: with the first of each kind they are at most 60.

@@ -34,7 +34,10 @@ pub use simulate::{Simulation, simulate};
 pub use studies::StudyRuns;
 pub use table::{Column, Table, Values, Words};
 pub use text::{grouped, shell_quoted};
-pub use vehicle::{TemplateNumbers, VehicleFile, gearboxes, method_named, observer_named, read_drive, read_sensors};
+pub use vehicle::{
+    TemplateNumbers, VehicleFile, gearboxes, learnt_without_effect, method_named, observer_named, read_drive,
+    read_sensors,
+};
 
 /// Takes a sentence for the user as it comes. It may have several lines; one that begins with `hint: ` says what to do.
 pub type Notes<'a> = &'a mut dyn FnMut(&str);

@@ -9,7 +9,6 @@ use observer::gearbox::Learnt;
 use trace::ShownPath as _;
 
 use crate::Error;
-use crate::estimate::one_shift::observer::learnt_without_effect;
 
 /// The gearboxes of the program, by their names.
 pub fn gearboxes() -> [&'static str; 5] {
@@ -227,4 +226,13 @@ pub fn method_named(name: &str) -> Result<GainMethod, Error> {
 
 pub(crate) fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
     Error::Input(format!("{what}: there is no `{}`\nhint: expected one of {}", name.escape_debug(), known.join(", ")))
+}
+
+/// Refuses what was learnt with a vehicle file that does not use it.
+pub fn learnt_without_effect() -> Error {
+    Error::Input(
+        "--learnt has no effect with the vehicle file of one shift\n\
+         hint: leave it out; the filter of a car with a gearbox, such as vehicles/eight_speed.toml, keeps what it learns"
+            .to_owned(),
+    )
 }

@@ -6,8 +6,16 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Guess;
 use super::wrong::Wrong;
+
+/// What is put in place of what is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Guess {
+    /// One, or the nearest number within the range.
+    Near,
+    /// Two, or the middle of the range.
+    Middle,
+}
 
 /// A text that is mended.
 pub(super) struct Draft {

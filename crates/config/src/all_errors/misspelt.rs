@@ -2,9 +2,9 @@
 
 use crate::ConfigError;
 
-use super::Guess;
-use super::draft::{Draft, Entry};
+use super::draft::{Draft, Entry, Guess};
 use super::wrong::Wrong;
+use crate::near::is_near;
 
 /// A key that is there in place of another one.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,13 +103,4 @@ fn differs_in_one<'m>(written: &str, meant: &'m str) -> Option<(String, String, 
     let is_rest_same = written.len() == meant.len() && written[at + 1..] == meant[at + 1..];
     (is_rest_same && is_near(written[at], meant[at]))
         .then(|| (written[..at].join("."), written[at].to_owned(), meant[at]))
-}
-
-/// Whether a key may be another one with one or two letters wrong, missing, too many or in the place of the next one: not where the digits alone
-/// differ.
-pub(crate) fn is_near(written: &str, key: &str) -> bool {
-    const LETTERS: usize = 2;
-    let without_digits = |name: &str| name.chars().filter(|c| !c.is_ascii_digit()).collect::<String>();
-    let (written_letters, key_letters) = (without_digits(written), without_digits(key));
-    written_letters != key_letters && strsim::osa_distance(written, key) <= LETTERS.min(key.chars().count() / 3)
 }

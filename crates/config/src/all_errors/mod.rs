@@ -14,11 +14,9 @@ mod wrong;
 use std::path::PathBuf;
 
 use crate::{ConfigError, Source};
-use draft::Draft;
+use draft::{Draft, Guess};
 use misspelt::Misspelt;
 use wrong::Wrong;
-
-pub(crate) use misspelt::is_near;
 
 /// Most times that a file is read.
 const READINGS: usize = 100;
@@ -27,15 +25,6 @@ const MENDED_MAX: usize = 6;
 
 /// Reads a file of a kind, or of any.
 type Reader<'r> = dyn Fn(Source) -> Result<(), ConfigError> + 'r;
-
-/// What is put in place of what is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Guess {
-    /// One, or the nearest number within the range.
-    Near,
-    /// Two, or the middle of the range.
-    Middle,
-}
 
 /// The errors of a file by its reader, and those of a file that it names and that the reader can read: unknown keys first, then in the order of
 /// their lines; empty for a file without any.

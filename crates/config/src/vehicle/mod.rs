@@ -27,7 +27,7 @@ use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers, significant};
 use crate::source::Layers;
-use crate::study::Change;
+use crate::tree::Change;
 use crate::tree::Tree;
 use crate::{ConfigError, Kind, Source, file_of};
 pub use car::CarFile;

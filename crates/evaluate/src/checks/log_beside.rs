@@ -9,8 +9,8 @@ use observer::gearbox::{GearCommand, MAX_ELEMENTS};
 use plant::car::CarShiftQuality;
 
 use crate::LogStep;
-use crate::drive::ScoredShift;
 use crate::score::within;
+use crate::scored_shift::ScoredShift;
 use crate::{ROUNDING_PA, ShiftScoreRow};
 
 /// Measured pressures are compared up to this age, s.

@@ -178,7 +178,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
         return Err(Failure::Input(message));
     }
     if Source::read(&options.vehicle)?.kind()? != Kind::Car && options.learnt.is_some() {
-        return Err(wetclutch::estimate::one_shift::observer::learnt_without_effect());
+        return Err(wetclutch::learnt_without_effect());
     }
     each_log(options, || setup(options), estimate_log)
 }

@@ -4,7 +4,7 @@ use car::{ErrorBounds, Vehicle};
 use drivetrain::Table1;
 
 use super::DefaultTaken;
-use crate::study::Change;
+use crate::tree::Change;
 use crate::{ConfigError, VehicleFile};
 
 /// By how much the right value of a key may differ from its default: what the two limits do to it.

@@ -22,11 +22,12 @@ use self::columns::{Knows, Row, before_readings, chosen, columns};
 pub use self::learnt::LearntOfDrive;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
+use super::input::{EstimateOptions, LogInput, said_of_origin, say_end_of_followed, shown_from_s};
 use super::log_checks::{WITHOUT_SENSORS, slow_log};
 use super::one_shift::ratios::check_wheel;
+use super::output::Destination;
 use super::output::Output;
 use super::selection::Selection;
-use super::{Destination, EstimateOptions, LogInput, said_of_origin, say_end_of_followed, shown_from_s};
 use crate::{Error, Notes, Table};
 
 /// What is common to all logs of a car.

@@ -14,7 +14,7 @@ use study::log::FIRST_LOOK;
 use trace::{CsvRows, ShownPath as _};
 
 use super::checks::Columns;
-use crate::estimate::LogInput;
+use crate::estimate::input::LogInput;
 use crate::estimate::log_checks::{other_delimiter, report_readings, sent_on_change, warn_of_dbc};
 use crate::{Error, Notes};
 

@@ -12,8 +12,8 @@ use super::measured::{Measured, Step};
 use super::observer::is_open_loop;
 use super::ratios::Ratios;
 
+use crate::estimate::input::{said_of_origin, shown_from_s};
 use crate::estimate::watched::is_looked_at;
-use crate::estimate::{said_of_origin, shown_from_s};
 use crate::{Error, grouped};
 
 /// Summary of the estimates for the user, updated with each estimate.

@@ -14,7 +14,7 @@ use study::gearbox::pressure_command::command_of_valve;
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use trace::{CsvRows, ShownPath as _, signal};
 
-use crate::estimate::LogInput;
+use crate::estimate::input::LogInput;
 use crate::estimate::log_checks::{check_step, other_delimiter, report_readings, sent_on_change};
 use crate::estimate::watched::{WatchedColumn, WatchedColumns};
 use crate::{Error, Notes, grouped};

@@ -24,8 +24,9 @@ use self::measured::{Measured, Step};
 use self::observer::Chosen;
 use self::shifts::Shifts;
 use self::table::{EstimateTable, chosen};
+use super::input::{EstimateOptions, LogInput, say_end_of_followed};
 use super::log_checks::{check_span, old_commands, slow_log, warn_of_dbc};
-use super::{Destination, EstimateOptions, LogInput, say_end_of_followed};
+use super::output::Destination;
 use crate::{Error, Notes, Table};
 
 /// What is common to all logs of a car.

@@ -7,7 +7,8 @@ use report::tables::phase_name;
 use study::AnyObserver;
 
 use super::measured::Measured;
-use crate::estimate::EstimateOptions;
+use crate::estimate::input::EstimateOptions;
+use crate::vehicle::learnt_without_effect;
 use crate::{Error, Notes};
 
 /// An observer for a log.
@@ -36,15 +37,6 @@ pub(crate) fn check_options(options: &EstimateOptions) -> Result<(), Error> {
         return Err(sensors_without_effect());
     }
     Ok(())
-}
-
-/// Refuses what was learnt with a vehicle file that does not use it.
-pub fn learnt_without_effect() -> Error {
-    Error::Input(
-        "--learnt has no effect with the vehicle file of one shift\n\
-         hint: leave it out; the filter of a car with a gearbox, such as vehicles/eight_speed.toml, keeps what it learns"
-            .to_owned(),
-    )
 }
 
 fn sensors_without_effect() -> Error {

@@ -1,0 +1,139 @@
+//! What is estimated, and how.
+
+use std::fs::File;
+use std::io::{self, Cursor, Read};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
+
+use car::{GainMethod, ObserverKind, Sensors};
+use logs::{ChannelMap, Log, LogError};
+use observer::gearbox::Learnt;
+use trace::Following;
+
+use super::selection::ShiftChoice;
+use crate::table_text::TableText;
+use crate::{Error, Notes, Table};
+
+/// How a log is estimated. The default is the best observer, over the whole log, with all columns.
+#[derive(Debug, Clone, Default)]
+pub struct EstimateOptions {
+    /// The observer, for a vehicle file of one shift; the best for the log if none is given. A car with a gearbox has the gearbox filter.
+    pub observer: Option<ObserverKind>,
+    /// The design method of its gains, of the rigid and the compliant observer.
+    pub method: Option<GainMethod>,
+    /// The sensors that the log was recorded with; without them a reading of a speed counts as one of the time of its row.
+    pub sensors: Option<Sensors>,
+    /// Names of the columns, in their order; all of them if empty. The time is always the first.
+    pub columns: Vec<String>,
+    /// The shifts that are wanted.
+    pub shifts: ShiftChoice,
+    /// What was learnt of a car with a gearbox in earlier logs.
+    pub learnt: Option<Learnt<f64>>,
+    /// Threads that read the log; none counts as one.
+    pub threads: usize,
+    /// Shifts of which every row is kept, for a page.
+    pub with_page: bool,
+    /// Set when the estimate is to end with an error, before the end of the log.
+    pub interrupt: Option<Arc<AtomicBool>>,
+    /// For a log that is still being written: set when it is to end.
+    pub follow: Option<Arc<AtomicBool>>,
+}
+
+impl EstimateOptions {
+    pub(crate) fn is_followed(&self) -> bool {
+        self.follow.is_some()
+    }
+
+    /// Ends the estimate if it is to end.
+    pub(crate) fn check_interrupt(&self) -> Result<(), Error> {
+        match &self.interrupt {
+            Some(flag) if flag.load(Ordering::Relaxed) => Err(Error::interrupted()),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A log in memory.
+#[derive(Debug, Clone, Copy)]
+pub enum InMemory<'a> {
+    /// A table.
+    Table(&'a Arc<Table>),
+    /// The text of a file.
+    Text(&'a Arc<[u8]>),
+}
+
+/// A log and how its channels are mapped to signals.
+#[derive(Debug, Clone, Copy)]
+pub struct LogInput<'a> {
+    /// The file; `-` is standard input. For a log in memory, what messages call it.
+    pub path: &'a Path,
+    /// The log, if it is in memory.
+    pub memory: Option<InMemory<'a>>,
+    /// The channel map; an empty one for a table with the names of the program.
+    pub map: &'a ChannelMap,
+}
+
+impl<'a> LogInput<'a> {
+    /// A table in memory, with the names of the program; messages call it so.
+    pub fn of_table(name: &'a str, table: &'a Arc<Table>) -> Self {
+        static NO_MAP: LazyLock<ChannelMap> = LazyLock::new(ChannelMap::default);
+        Self { path: Path::new(name), memory: Some(InMemory::Table(table)), map: &NO_MAP }
+    }
+}
+
+impl LogInput<'_> {
+    /// The text of the log in memory, if it is there.
+    pub(crate) fn text(&self) -> io::Result<Option<Box<dyn Read>>> {
+        Ok(match self.memory {
+            None => None,
+            Some(InMemory::Text(text)) => Some(Box::new(Cursor::new(Arc::clone(text)))),
+            Some(InMemory::Table(table)) => Some(Box::new(TableText::new(Arc::clone(table))?)),
+        })
+    }
+
+    /// Whether its text comes from a pipe or from memory, and not from a file.
+    pub(crate) fn is_stream(&self) -> bool {
+        self.memory.is_some() || self.path == Path::new("-")
+    }
+
+    /// Opens its text.
+    pub(crate) fn reader(&self, stop: Option<&Arc<AtomicBool>>) -> Result<Box<dyn Read>, Error> {
+        let opening = |source| LogError::Io { path: self.path.to_owned(), source };
+        Ok(match (self.text().map_err(opening)?, stop) {
+            (Some(text), _) => text,
+            (None, Some(stop)) => Box::new(Following::open(self.path, Arc::clone(stop)).map_err(opening)?),
+            (None, None) if self.is_stream() => Box::new(io::stdin()),
+            (None, None) => Box::new(File::open(self.path).map_err(opening)?),
+        })
+    }
+
+    /// Opens its channels.
+    pub(crate) fn open(&self, stop: Option<&Arc<AtomicBool>>, threads: usize) -> Result<Log, Error> {
+        let opening = |source| LogError::Io { path: self.path.to_owned(), source };
+        Ok(match (self.text().map_err(opening)?, stop) {
+            (Some(text), _) => Log::of_text(self.path, &self.map.open, text)?,
+            (None, Some(stop)) => Log::follow(self.path, &self.map.open, Arc::clone(stop))?,
+            (None, None) => Log::open(self.path, &self.map.open)?.on_threads(threads.max(1)),
+        })
+    }
+}
+
+/// From which time on the times of a log are shown, s: times of a clock since 1970 from the first one on.
+pub fn shown_from_s(first_s: f64) -> f64 {
+    const LONGEST_S: f64 = 1e7;
+    if first_s.abs() > LONGEST_S { first_s.floor() } else { 0.0 }
+}
+
+/// Says from where on the times in sentences and on the page count, if not from zero of the log's clock.
+pub(crate) fn said_of_origin(origin_s: f64) -> Option<String> {
+    (origin_s != 0.0)
+        .then(|| format!("times from {origin_s:.0} s of the log's clock on; the tables in files keep that clock"))
+}
+
+/// Says that a log which is followed has ended by itself, where it is a file that may grow.
+pub(crate) fn say_end_of_followed(options: &EstimateOptions, path: &Path, say: Notes<'_>) {
+    if options.follow.as_ref().is_some_and(|stop| !stop.load(Ordering::Relaxed)) && path.is_file() {
+        say("warning: the log became shorter or was replaced by another file: the estimate ends there");
+    }
+}
