@@ -72,7 +72,7 @@ pub use self::{
     speed_trace::SpeedTrace,
     template::{CarSize, TemplateError},
     vehicle::{
-        CompliantRequirement, DesignRequirement, FilterSettings, ObserverSettings, PhaseSlips, Requirements,
+        CompliantRequirement, DesignRequirement, FilterSettings, ObserverSettings, PhaseSlips, Requirements, Shaft,
         Uncertainty, ValveUncertainty, Vehicle,
     },
 };

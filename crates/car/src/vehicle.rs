@@ -118,6 +118,15 @@ pub struct ObserverSettings {
     pub shaft_settling_s: f64,
 }
 
+/// A shaft of the gear train with what it adds to the mass matrix of the shift.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shaft {
+    /// Its name.
+    pub name: String,
+    /// Mass matrix, kg m^2, by turbine and output speed.
+    pub mass_kg_m2: [[f64; 2]; 2],
+}
+
 /// A vehicle: everything the plant, the observers and the design need to know.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vehicle {

@@ -29,9 +29,9 @@ pub use error::ConfigError;
 pub use experiment::{ExperimentFile, read_sensors, sensors_of};
 pub use gearbox::GearboxFile;
 pub use learnt::{check_learnt, read_learnt, write_learnt};
-pub use source::{Kind, Source, toml_number};
+pub use source::{Kind, Source};
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
-pub use trace::toml_string;
+pub use trace::{toml_number, toml_string};
 pub use tree::Change;
 pub use vehicle::{CarFile, DefaultTaken, VehicleFile};
 

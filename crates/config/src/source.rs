@@ -5,7 +5,6 @@ use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use drivetrain::Real;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use toml::Spanned;
@@ -74,23 +73,6 @@ impl Kind {
             Self::ChannelMap => "`wetclutch estimate` and `inspect` take it after --map",
             Self::Gearbox => "a vehicle file names it as `gearbox`; `wetclutch check` describes it",
         }
-    }
-}
-
-/// A number with five digits as TOML has it.
-pub fn toml_number(value: f64) -> String {
-    const DIGITS: i32 = 5;
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value:.1}");
-    }
-    let exponent = Real::log10(value.abs()).floor() as i32;
-    if (-3..6).contains(&exponent) {
-        let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);
-        let text = format!("{value:.decimals$}");
-        let trimmed = text.trim_end_matches('0');
-        if trimmed.ends_with('.') { format!("{trimmed}0") } else { trimmed.to_owned() }
-    } else {
-        format!("{value:.4e}")
     }
 }
 
@@ -400,15 +382,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn numbers_keep_five_digits() {
-        let cases =
-            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
-        for (value, text) in cases {
-            assert_eq!(toml_number(value), text);
-            assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
-        }
-    }
     #[test]
     fn a_file_in_utf_16_or_with_a_mark_is_the_same_text() {
         let text = "[engine]\r\nname = \"Öl\"\r\n";

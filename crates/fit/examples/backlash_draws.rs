@@ -8,7 +8,7 @@ mod common;
 
 use std::ops::ControlFlow::Continue;
 
-use common::{Logs, TestCar};
+use common::{Logs, TestCar, given};
 
 fn main() {
     let number = |name: &str, usual: u32| std::env::var(name).map_or(usual, |text| text.parse().unwrap());
@@ -18,7 +18,7 @@ fn main() {
         let mut car = TestCar::drawn(seed).on_another_road().with_reversals();
         let driving = car.collected(&car.driven(minutes), "backlash").driving;
         let shifts = vec![car.shift(0, Logs::SpeedsAndCurrent).record];
-        let fit = fit::fit(&car.file, &shifts, &driving, car.ages(), &mut |_| Continue(())).unwrap();
+        let fit = fit::fit(&given(&car.file), &shifts, &driving, car.ages(), &mut |_| Continue(())).unwrap();
         let truth = car.car.backlash_rad;
         match &fit.backlash {
             Err(reason) => println!("car {seed}: true {truth:.4}: {reason}"),

@@ -13,7 +13,7 @@ use std::ops::ControlFlow::Continue;
 use config::vehicle::short::{Facts, ValveKind, short_file};
 use config::{Source, VehicleFile};
 
-use common::{Logs, TestCar, TestShift};
+use common::{FittedFile as _, Logs, TestCar, TestShift, given};
 use fit::{Map, Parameter};
 
 /// Shifts that are held out: for the errors of the torque, and others with which the fit is checked as `wetclutch fit` does.
@@ -100,7 +100,7 @@ fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
     let driving = driving.map_or_else(Vec::new, |log| car.collected(&log, "draws").driving);
     let begin_s = cpu_s();
     let mut iterations = 0;
-    let fit = fit::fit(&car.file, &records, &driving, ages, &mut |_| {
+    let fit = fit::fit(&given(&car.file), &records, &driving, ages, &mut |_| {
         iterations += 1;
         Continue(())
     })
@@ -112,7 +112,7 @@ fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
         (held_out.iter().map(|shift: &TestShift| shift.errors(vehicle)[at]).sum::<f64>() / HELD_OUT as f64).sqrt()
     };
     let checked: Vec<_> = (200..200 + CHECKED).map(|number| car.shift(number, logs).record).collect();
-    let checked = fit.validate(&car.file, &fitted, &checked, ages).unwrap();
+    let checked = fit.validate(&given(&car.file), &given(&fitted), &checked, ages).unwrap();
     let reason_against = fit.reason_against(checked.as_ref());
     let errors: Vec<_> = (fit.priors.iter().enumerate())
         .map(|(i, prior)| {

@@ -17,7 +17,7 @@ use std::ops::ControlFlow::Continue;
 
 use car::{Car, Drive, DriveSegment};
 use config::DriveFile;
-use drawn::{Case, Drawn, every_fifth};
+use drawn::{Case, Drawn, FittedFile as _, every_fifth};
 use estimated::{Estimated, estimated};
 use fit::Known;
 use fit::gearbox::{Driving, GearboxFit, Quantity};

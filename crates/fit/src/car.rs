@@ -1,10 +1,10 @@
 //! The car of a set of parameters.
 
-use car::Vehicle;
+use car::{Shaft, Vehicle};
 use drivetrain::{Clutch, Converter, Cylinder, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Tyre};
 
 use crate::Parameter;
-use crate::parameters::{Prior, SHAPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S, Shaft};
+use crate::parameters::{Prior, SHAPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S};
 use crate::pressure::Hydraulics;
 use crate::record::{ReadingAges, SegmentKind};
 use crate::shape::{Knots, Map, mapped};

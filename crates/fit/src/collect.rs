@@ -4,7 +4,6 @@ use std::path::Path;
 
 use car::ShiftClutch;
 use car::Vehicle;
-use config::VehicleFile;
 use drivetrain::{ClutchValve, CommandKind};
 use logs::{
     ChannelMap, Direction, Gearbox, Load, Log, LogError, Mapped, Quality, Reading, Readings, Role, Shift, ShiftFinder,
@@ -13,8 +12,7 @@ use trace::{ShownPath as _, Unit, signal};
 
 use crate::drives::driven_car;
 use crate::driving::{Driving, DrivingRecorder, RowState, turns_by};
-use crate::parameters::shafts;
-use crate::{FitError, Series, ShiftKinds, ShiftRecord};
+use crate::{FitError, Given, Series, ShiftKinds, ShiftRecord};
 
 /// Readings are kept from so long before the inertia phase on, s: the commands of the torque phase and of the fill.
 const BEFORE_S: f64 = 2.0;
@@ -100,7 +98,8 @@ pub fn own_names(log: &Log) -> Result<ChannelMap, FitError> {
 ///
 /// # Errors
 /// The log cannot be read, lacks a channel that a fit needs, or the reading was stopped.
-pub fn collect(source: LogSource<'_>, vehicle: &VehicleFile) -> Result<Collected, FitError> {
+pub fn collect(source: LogSource<'_>, given: &Given) -> Result<Collected, FitError> {
+    let vehicle = &given.vehicle;
     let LogSource { path, map, .. } = source;
     if path == Path::new("-") {
         return Err(FitError::input("a fit reads a log twice\nhint: give a file in place of standard input"));
@@ -114,7 +113,7 @@ pub fn collect(source: LogSource<'_>, vehicle: &VehicleFile) -> Result<Collected
     needed(path, &map, commands[0])?;
     let (shifts, mut notes) = find(&mut log, &map, source.is_stopped)?;
     let mut collected = Collected::default();
-    let mut between = BetweenShifts::new(vehicle, &shifts)?;
+    let mut between = BetweenShifts::new(given, &shifts);
     let mut usable = Vec::new();
     for shift in shifts {
         match reason_against(&shift) {
@@ -280,17 +279,17 @@ struct BetweenShifts {
 }
 
 impl BetweenShifts {
-    fn new(vehicle: &VehicleFile, shifts: &[Shift]) -> Result<Self, FitError> {
+    fn new(Given { vehicle, shafts, .. }: &Given, shifts: &[Shift]) -> Self {
         let open = |clutch: &ShiftClutch| (clutch.valve, clutch.clutch.kiss_pressure());
-        Ok(Self {
-            recorder: DrivingRecorder::new(driven_car(vehicle, &shafts(vehicle)?)),
+        Self {
+            recorder: DrivingRecorder::new(driven_car(vehicle, shafts)),
             ratios: [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()],
             open: [open(&vehicle.oncoming), open(&vehicle.offgoing)],
             shifts: Windows::of(shifts),
             speeds: [f64::NAN; 2],
             commands: [f64::NAN; 2],
             lock_up: false,
-        })
+        }
     }
 
     /// Takes a reading of the log.
@@ -341,6 +340,7 @@ fn place(record: &mut ShiftRecord, role: Role, [oncoming, offgoing]: [Role; 2]) 
 
 #[cfg(test)]
 mod tests {
+    use config::VehicleFile;
     use logs::ShiftQuality;
 
     use super::*;
@@ -361,7 +361,8 @@ mod tests {
     /// What a shift has told is not used again, and a clutch that may carry torque makes no gear.
     #[test]
     fn a_gear_is_one_outside_of_shifts_with_the_other_clutch_open() {
-        let vehicle = VehicleFile::built_in().unwrap();
+        let file = VehicleFile::built_in().unwrap();
+        let given = Given { shafts: file.shafts().unwrap(), vehicle: file.vehicle, text: file.source.text };
         let shift = Shift {
             from: 1,
             to: 2,
@@ -372,7 +373,7 @@ mod tests {
             gear_s: None,
             quality: ShiftQuality::default(),
         };
-        let mut between = BetweenShifts::new(&vehicle, &[shift]).unwrap();
+        let mut between = BetweenShifts::new(&given, &[shift]);
         assert_eq!(between.gear(0.0), None);
         between.speeds = [between.ratios[0] * 60.0, 60.0];
         assert_eq!([17.9, 18.1, 21.9, 22.1].map(|time_s| between.gear(time_s)), [Some(0), None, None, Some(0)]);

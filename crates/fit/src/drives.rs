@@ -3,12 +3,12 @@
 //! It adds the torque balance of the car in the gears before and after the shift ([`crate::driving`]) to the normal equations of the shifts. As each shift
 //! has a mass of its own, so has each log: a deviation that is eliminated.
 
-use car::Vehicle;
+use car::{Shaft, Vehicle};
 use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
 use crate::driving::{DrivenCar, Driving, DrivingModel, DrivingWeights, Evaluated, Term, misfit, usable};
-use crate::parameters::{POSSIBLE, Prior, Shaft};
+use crate::parameters::{POSSIBLE, Prior};
 use crate::shape::Map;
 use crate::shift_model::MASS_FRACTION_SD;
 use crate::{FitError, Parameter};

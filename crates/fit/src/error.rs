@@ -1,6 +1,5 @@
 //! Why a fit is not possible.
 
-use config::ConfigError;
 use logs::LogError;
 
 /// Why a fit is not possible.
@@ -9,9 +8,6 @@ pub enum FitError {
     /// A log cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The vehicle file is wrong, or what the fit would write into it.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
     /// The logs or the vehicle are not what a fit can use.
     #[error("{0}")]
     Input(String),

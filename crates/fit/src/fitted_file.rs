@@ -1,27 +1,27 @@
 //! The vehicle file of a fit: the text of the given one with other values.
 
-use config::{Source, VehicleFile};
+use car::Vehicle;
 use drivetrain::Real;
 
 use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_FRACTION_MIN};
 use crate::car::Car;
 use crate::driving::backlash;
 use crate::parameters::HYSTERESIS_UNIT_PA;
-use crate::vehicle_text::{FITTED, Step, VehicleText, headed, kept, keys, number, shaft_inertia};
+use crate::vehicle_text::{FITTED, Step, VehicleText, headed, keys, number, shaft_inertia};
 use crate::verdict::SIDES;
-use crate::{FillFit, Fit, FitError, Map, Parameter, ReadingAges, Verdict, parameters};
+use crate::{FillFit, Fit, FitError, Given, Map, Parameter, ReadingAges, Verdict};
 
 impl Fit {
-    /// The vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the
+    /// The text of the vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the
     /// error budget follows from the intervals; everything else is as in the file. `logs` are named at the head of the file.
     ///
     /// # Errors
-    /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
-    pub fn vehicle_file(&self, vehicle: &VehicleFile, logs: &str) -> Result<VehicleFile, FitError> {
-        let mut text = VehicleText::new(&vehicle.source.text)?;
-        let oncoming = oncoming_name(&vehicle.source.text)?;
-        let shafts = parameters::shafts(vehicle)?;
-        let fitted = Car::of_file(vehicle, ReadingAges::default()).with(&shafts, &self.priors, &self.unknowns);
+    /// The file has a value at another place than the program writes them.
+    pub fn vehicle_text(&self, given: &Given, logs: &str) -> Result<String, FitError> {
+        let Given { vehicle, shafts, text: file } = given;
+        let mut text = VehicleText::new(file)?;
+        let oncoming = oncoming_name(file)?;
+        let fitted = Car::of_file(vehicle, ReadingAges::default()).with(shafts, &self.priors, &self.unknowns);
         for prior in &self.priors {
             self.write(&mut text, &fitted, &oncoming, prior.parameter)?;
         }
@@ -34,23 +34,7 @@ impl Fit {
         self.write_budget(&mut text, vehicle)?;
         let logs = logs.replace(char::is_control, " ");
         let head = format!("values below lines like this one come from {} shifts of {logs}", self.shifts);
-        let source = Source { path: vehicle.source.path.clone(), text: headed(&head, &text.finish()) };
-        VehicleFile::from_source(source).map_err(|error| {
-            FitError::Work(format!(
-                "the fitted values are not those of a possible car: {error}\n\
-                 hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
-            ))
-        })
-    }
-
-    /// The given vehicle file, with the reason why its values are kept in a line at its head.
-    ///
-    /// # Errors
-    /// None that the given file does not have itself.
-    pub fn kept_file(&self, vehicle: &VehicleFile, reason: &str) -> Result<VehicleFile, FitError> {
-        let text = headed(&kept(reason), &vehicle.source.text);
-        let source = Source { path: vehicle.source.path.clone(), text };
-        VehicleFile::from_source(source).map_err(|error| FitError::Work(error.to_string()))
+        Ok(headed(&head, &text.finish()))
     }
 
     fn write(&self, text: &mut VehicleText, fitted: &Car, clutch: &str, parameter: Parameter) -> Result<(), FitError> {
@@ -100,7 +84,7 @@ impl Fit {
     }
 
     /// The error budget: what the fit leaves open of each parameter.
-    fn write_budget(&self, text: &mut VehicleText, vehicle: &VehicleFile) -> Result<(), FitError> {
+    fn write_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
         let bound = |key: &str| keys(&["design", "error_bounds", key]);
         let sd = |parameters: &[Parameter]| {
             parameters.iter().map(|p| Real::powi(self.sd(*p).unwrap_or(0.0), 2)).sum::<f64>().sqrt()
@@ -151,7 +135,7 @@ impl Fit {
     }
 
     /// Writes the stroke of the oncoming clutch's piston, and the preload of its spring, which moves with the fitted kiss point.
-    fn write_fill(&self, text: &mut VehicleText, vehicle: &VehicleFile, clutch: &str) -> Result<(), FitError> {
+    fn write_fill(&self, text: &mut VehicleText, vehicle: &Vehicle, clutch: &str) -> Result<(), FitError> {
         let table = ["clutch", clutch, "fill"];
         let spring = self.value(Parameter::Spring).unwrap_or(1.0);
         let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotIdentifiable) else {
@@ -177,7 +161,7 @@ impl Fit {
     }
 
     /// Factor on the preload beside the kiss point.
-    fn preload_factor(&self, vehicle: &VehicleFile) -> f64 {
+    fn preload_factor(&self, vehicle: &Vehicle) -> f64 {
         /// Most of the force at the kiss point that it may become \[chosen: the limits of the error budget, 10 % to each side, stay below those of
         /// the kiss point\].
         const MAXIMUM: f64 = 0.9;
@@ -187,7 +171,7 @@ impl Fit {
     }
 
     /// The limits of the piston's stroke: pressures move with the spring, the volume has what the fit leaves open of it.
-    fn write_fill_budget(&self, text: &mut VehicleText, vehicle: &VehicleFile) -> Result<(), FitError> {
+    fn write_fill_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
         let Some(given) = &vehicle.error_bounds.fill else { return Ok(()) };
         let bound = |key: &str| keys(&["design", "error_bounds", "fill", key]);
         let spring = self.value(Parameter::Spring).unwrap_or(1.0);

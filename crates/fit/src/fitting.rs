@@ -2,8 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use car::Vehicle;
-use config::VehicleFile;
+use car::{Shaft, Vehicle};
 use drivetrain::Real;
 use nalgebra::DVector;
 
@@ -14,7 +13,7 @@ use crate::fill::{FillFit, FillLog, Filling};
 use crate::freeing::Misfit;
 use crate::intervals::{self, Precision};
 use crate::least_squares::Iterations;
-use crate::parameters::{self, Available, DELAY_UNIT_S, Held, OFFSET_UNIT_PA, Prior, Shaft};
+use crate::parameters::{self, Available, DELAY_UNIT_S, Held, OFFSET_UNIT_PA, Prior};
 use crate::pressure::Hydraulics;
 use crate::record::OutputClock;
 use crate::shape::Map;
@@ -22,7 +21,7 @@ use crate::shift_model::ShiftModel;
 use crate::shift_weights::ShiftWeights;
 use crate::solver::{Problem, Solved, Unknowns};
 use crate::torque_change::TorqueChange;
-use crate::{Channel, FitError, Parameter, ReadingAges, ShiftRecord, freeing};
+use crate::{Channel, FitError, Given, Parameter, ReadingAges, ShiftRecord, freeing};
 
 /// More shifts only shrink what is below the floor of the intervals.
 pub const SHIFTS_MAX: usize = 30;
@@ -102,19 +101,19 @@ pub fn available(shifts: &[ShiftRecord]) -> Available {
 /// # Errors
 /// There is no shift, or no minimum was found.
 pub fn fit(
-    vehicle: &VehicleFile,
+    given: &Given,
     shifts: &[ShiftRecord],
     driving: &[Driving],
     ages: ReadingAges,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Fit, FitError> {
     let (shifts, left_out) = sound(shifts)?;
-    let shafts = parameters::shafts(vehicle)?;
-    let driven = driven_car(vehicle, &shafts);
+    let Given { vehicle, shafts, .. } = given;
+    let driven = driven_car(vehicle, shafts);
     let mut used = UsedDriving::of(&driven, driving);
     loop {
         let drives = Drives::of(&driven, &used);
-        let (mut fit, errors) = fit_with(vehicle, (&shifts, &shafts), &drives, ages, progress)?;
+        let (mut fit, errors) = fit_with(vehicle, (&shifts, shafts), &drives, ages, progress)?;
         if used.leave_out(&errors) {
             continue;
         }

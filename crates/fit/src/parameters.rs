@@ -1,12 +1,10 @@
 //! What is fitted, and what is known of it before.
 
-use car::Vehicle;
-use config::VehicleFile;
+use car::{Shaft, Vehicle};
 use drivetrain::Real;
 
 use crate::driving::{AIR, ROLLING, WIND, rolling_floor};
 use crate::shape::{Knots, Map};
-use crate::{FitError, vehicle_text};
 
 /// Delays are fitted in units of this, s, so that every unknown is of the order of 0.1 to 1.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
@@ -205,32 +203,6 @@ pub struct Available {
 pub(crate) struct Held {
     pub(crate) parameter: Parameter,
     pub(crate) sd: f64,
-}
-
-/// A shaft of the gear train with what it adds to the mass matrix of the shift.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Shaft {
-    pub(crate) name: String,
-    /// kg m^2 by turbine and output speed.
-    pub(crate) mass_kg_m2: [[f64; 2]; 2],
-}
-
-/// The shafts of a vehicle file: each inertia is doubled in the text, and the change of the mass matrix is its fraction.
-pub(crate) fn shafts(vehicle: &VehicleFile) -> Result<Vec<Shaft>, FitError> {
-    let names = vehicle_text::shaft_names(&vehicle.source.text)?;
-    let shaft = |(i, name): (usize, String)| {
-        let path = vehicle_text::shaft_inertia(i);
-        let mut text = vehicle_text::VehicleText::new(&vehicle.source.text)?;
-        text.scale(&path, 2.0)?;
-        let heavier =
-            VehicleFile::from_source(config::Source { path: vehicle.source.path.clone(), text: text.finish() })?;
-        let mut mass_kg_m2 = heavier.shift.mass_kg_m2;
-        for (row, base) in mass_kg_m2.iter_mut().zip(vehicle.shift.mass_kg_m2) {
-            row.iter_mut().zip(base).for_each(|(cell, base)| *cell -= base);
-        }
-        Ok(Shaft { name, mass_kg_m2 })
-    };
-    names.into_iter().enumerate().map(shaft).collect()
 }
 
 /// Minimum standard deviation of the zero offset of a pressure sensor, Pa \[chosen: what a valve at rest may leave in an open clutch\].

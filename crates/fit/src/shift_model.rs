@@ -1,11 +1,12 @@
 //! A shift as the fit sees it: its readings against the motion of a car, and their derivatives.
 
+use car::Shaft;
 use nalgebra::{DMatrix, DVector};
 
 use crate::car::Car;
 use crate::fill::{FillLog, fill_begin_s};
 use crate::motion::{Circumstances, Inputs, Motion, Part, Run, STEP_S, State};
-use crate::parameters::{Prior, Shaft};
+use crate::parameters::Prior;
 use crate::pressure::{Grid, pressures};
 use crate::record::{SHORTEST_S, Segment, SegmentKind, ShiftRecord, age_s};
 use crate::shape::Map;

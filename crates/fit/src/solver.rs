@@ -3,6 +3,7 @@
 //! Each shift has unknowns of its own (load, start of each segment). They are eliminated by their Schur complement, so the
 //! cost grows linearly with the shifts, and a step has only as many unknowns as there are parameters.
 
+use car::Shaft;
 use std::ops::ControlFlow;
 
 use drivetrain::Real;
@@ -12,7 +13,7 @@ use crate::FitError;
 use crate::car::Car;
 use crate::drives::{DriveNormal, Drives};
 use crate::least_squares::{Equations, Iterations, Minimum, Objective, minimised};
-use crate::parameters::{Prior, Shaft};
+use crate::parameters::Prior;
 use crate::shift_model::{Block, Changed, Linearised, ShiftModel};
 use crate::shift_weights::ShiftWeights;
 

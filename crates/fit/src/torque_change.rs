@@ -1,11 +1,12 @@
 //! What a fit changes of the clutch torque, and how much of that it leaves open.
 
+use car::Shaft;
 use nalgebra::DVector;
 
 use crate::Parameter as P;
 use crate::car::Car;
 use crate::intervals::Precision;
-use crate::parameters::{Prior, Shaft};
+use crate::parameters::Prior;
 use crate::shape::Map;
 use crate::shift_model::ShiftModel;
 

@@ -3,16 +3,15 @@
 use std::ops::ControlFlow;
 
 use car::Vehicle;
-use config::VehicleFile;
 
 use crate::car::Car;
 use crate::drives::Drives;
 use crate::fitting::DECREASE;
 use crate::least_squares::Iterations;
-use crate::parameters::{self, HYSTERESIS_UNIT_PA, Prior};
+use crate::parameters::{HYSTERESIS_UNIT_PA, Prior};
 use crate::shift_model::ShiftModel;
 use crate::solver::{Problem, Unknowns};
-use crate::{Channel, Fit, FitError, Parameter, ReadingAges, ShiftRecord, open_loop};
+use crate::{Channel, Fit, FitError, Given, Parameter, ReadingAges, ShiftRecord, open_loop};
 
 /// Errors over shifts that were held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,8 +38,8 @@ impl Fit {
     /// A shift cannot be computed with either vehicle.
     pub fn validate(
         &self,
-        given: &VehicleFile,
-        fitted: &VehicleFile,
+        given: &Given,
+        fitted: &Given,
         held_out: &[ShiftRecord],
         ages: ReadingAges,
     ) -> Result<Option<HeldOut>, FitError> {
@@ -61,7 +60,8 @@ impl Fit {
             });
             rms(errors)
         };
-        let pressure_pa = pressure(given).zip(pressure(fitted)).map(|(given, fitted)| [given, fitted]);
+        let pressure_pa =
+            pressure(&given.vehicle).zip(pressure(&fitted.vehicle)).map(|(given, fitted)| [given, fitted]);
         let turbine_rad_s = turbine_rad_s.map(|error| error.unwrap_or(f64::NAN));
         Ok(Some(HeldOut { shifts: held_out.len(), turbine_rad_s, pressure_pa }))
     }
@@ -69,12 +69,11 @@ impl Fit {
     /// RMS of the one-step errors of the turbine speed with a vehicle file, and the fitted delays and scales of the signals.
     fn turbine_error(
         &self,
-        vehicle: &VehicleFile,
+        Given { vehicle, shafts, .. }: &Given,
         held_out: &[ShiftRecord],
         ages: ReadingAges,
     ) -> Result<Option<f64>, FitError> {
         let file = Car::of_file(vehicle, ages);
-        let shafts = parameters::shafts(vehicle)?;
         let of_file = |(prior, x): (&Prior, &f64)| match prior.parameter {
             parameter if parameter.is_of_signals() => *x,
             Parameter::Hysteresis => vehicle.oncoming.hysteresis_pa / HYSTERESIS_UNIT_PA,
@@ -83,8 +82,8 @@ impl Fit {
         let unknowns: Vec<f64> = self.priors.iter().zip(&self.unknowns).map(of_file).collect();
         let models: Vec<ShiftModel> = held_out.iter().map(|record| ShiftModel::new(record.clone(), &file)).collect();
         // No parameter is free, the own unknowns of the shifts are.
-        let car = file.with(&shafts, &self.priors, &unknowns);
-        let problem = Problem { file: &car, shafts: &shafts, priors: &[], drives: &Drives::NONE };
+        let car = file.with(shafts, &self.priors, &unknowns);
+        let problem = Problem { file: &car, shafts, priors: &[], drives: &Drives::NONE };
         let own = models.iter().map(ShiftModel::start).collect();
         let start = Unknowns { shared: Vec::new(), own, drives: Vec::new() };
         const STARTS: Iterations = Iterations { reweighted: 0, maximum: 6, decrease: DECREASE };

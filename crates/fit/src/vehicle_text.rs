@@ -2,7 +2,7 @@
 
 use toml::de::{DeTable, DeValue};
 
-pub(crate) use config::toml_number as number;
+pub(crate) use trace::toml_number as number;
 
 use crate::FitError;
 
@@ -21,9 +21,9 @@ pub(crate) fn headed(head: &str, text: &str) -> String {
     format!("{FITTED}{head}\n{rest}")
 }
 
-/// The head of a file with the given values: the reason why they are kept.
-pub(crate) fn kept(reason: &str) -> String {
-    format!("{KEPT}{}", reason.replace(char::is_control, " "))
+/// The text of a given file, with the reason why its values are kept in a line at its head.
+pub fn kept_text(text: &str, reason: &str) -> String {
+    headed(&format!("{KEPT}{}", reason.replace(char::is_control, " ")), text)
 }
 
 /// A step of the way to a value.
@@ -74,11 +74,6 @@ impl VehicleText {
             toml::Value::Array(items) => items.iter().map(|item| number(item).ok_or_else(|| missing(path))).collect(),
             other => Ok(vec![number(other).ok_or_else(|| missing(path))?]),
         }
-    }
-
-    /// Multiplies a number, or every number of an array.
-    pub(crate) fn scale(&mut self, path: &[Step], factor: f64) -> Result<(), FitError> {
-        self.map(path, |value| factor * value, None)
     }
 
     /// Replaces a number, or every number of an array, and says why in a comment on the line above.
@@ -236,14 +231,6 @@ fn name_of(table: &[Step]) -> String {
     names.collect::<Vec<&str>>().join(".")
 }
 
-/// Names of the shafts of the gear train, in the order of the file.
-pub(crate) fn shaft_names(text: &str) -> Result<Vec<String>, FitError> {
-    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| FitError::input(error.to_string()))?;
-    let shafts = table.get("gear_train").and_then(|train| train.get("shaft")).and_then(toml::Value::as_array);
-    let name = |shaft: &toml::Value| shaft.get("name").and_then(toml::Value::as_str).unwrap_or("").to_owned();
-    Ok(shafts.into_iter().flatten().map(name).collect())
-}
-
 fn missing(path: &[Step]) -> FitError {
     let steps = path.iter().map(|step| match step {
         Step::Key(key) => key.clone(),
@@ -278,8 +265,8 @@ mod tests {
             "# head\n[a.b]\nx = 2 # [chapter]\ny = { p = [1.0, 2.0], q = [3.0,\n  4.0] }\n[[s]]\nz = 5\n[[s]]\nz = 6\n";
         let mut edited = VehicleText::new(text).unwrap();
         edited.map(&keys(&["a", "b", "x"]), |x| 1.5 * x, Some("x 1.5")).unwrap();
-        edited.scale(&keys(&["a", "b", "y", "q"]), 2.0).unwrap();
-        edited.scale(&[Step::Key("s".into()), Step::Item(1), Step::Key("z".into())], 0.5).unwrap();
+        edited.map(&keys(&["a", "b", "y", "q"]), |value| 2.0 * value, None).unwrap();
+        edited.map(&[Step::Key("s".into()), Step::Item(1), Step::Key("z".into())], |value| 0.5 * value, None).unwrap();
         let expected = "# head\n[a.b]\n# fit: x 1.5; before: 2\nx = 3.0 # [chapter]\ny = { p = [1.0, 2.0], q = [6.0, 8.0] }\n[[s]]\nz = 5\n[[s]]\nz = 3.0\n";
         assert_eq!(edited.finish(), expected);
         let mut again = VehicleText::new(expected).unwrap();
@@ -288,6 +275,6 @@ mod tests {
             again.finish(),
             expected.replace("# fit: x 1.5; before: 2\nx = 3.0", "# fit: x 2; before: 3.0\nx = 6.0")
         );
-        assert!(VehicleText::new(text).unwrap().scale(&keys(&["a", "c"]), 2.0).is_err());
+        assert!(VehicleText::new(text).unwrap().map(&keys(&["a", "c"]), |value| value, None).is_err());
     }
 }

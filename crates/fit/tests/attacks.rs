@@ -1,7 +1,7 @@
 //! Logs that a fit should not have to see: it says what is wrong, or its result stays one that can be used.
 use std::ops::ControlFlow::Continue;
 
-use crate::common::{Logs, TestCar};
+use crate::common::{FittedFile as _, Logs, TestCar, given};
 use fit::{Collected, Driving, Fit, FitError, HeldOut, Map, Parameter, Series, ShiftRecord, Verdict};
 
 fn shifts(car: &mut TestCar, count: u64, logs: Logs) -> Vec<ShiftRecord> {
@@ -9,7 +9,7 @@ fn shifts(car: &mut TestCar, count: u64, logs: Logs) -> Vec<ShiftRecord> {
 }
 
 fn fitted(car: &TestCar, shifts: &[ShiftRecord]) -> Result<Fit, FitError> {
-    fit::fit(&car.file, shifts, &[], car.ages(), &mut |_| Continue(()))
+    fit::fit(&given(&car.file), shifts, &[], car.ages(), &mut |_| Continue(()))
 }
 
 /// Error of the open loop's torque on two other shifts, N m: given file, fitted file.
@@ -77,8 +77,9 @@ fn a_file_that_is_worse_on_held_out_shifts_is_not_offered() {
     assert_eq!(fit.reason_against(Some(&checked([0.2, 0.1]))), None);
     assert!(fit.reason_against(Some(&checked([0.2, f64::NAN]))).is_some());
     let reason = fit.reason_against(Some(&checked([0.1, 0.2]))).unwrap();
-    let kept = fit.kept_file(&car.file, &format!("{reason}\n[driveline]")).unwrap();
-    let (head, rest) = kept.source.text.split_once('\n').unwrap();
+    let kept = fit::kept_text(&car.file.source.text, &format!("{reason}\n[driveline]"));
+    assert!(kept.parse::<toml::Table>().is_ok());
+    let (head, rest) = kept.split_once('\n').unwrap();
     assert!(head.starts_with("# fit: all values are those of the given file") && head.contains("0.200"), "{head}");
     assert_eq!(rest, car.file.source.text);
 }

@@ -1,6 +1,6 @@
 //! The backlash of a driveline from drives in which the accelerator is pressed and released.
 
-use crate::common::{Logs, TestCar, column, fitted};
+use crate::common::{FittedFile as _, Logs, TestCar, column, fitted};
 use fit::{BacklashFit, ShiftRecord, Verdict};
 use trace::{Trace, signal};
 

@@ -1,7 +1,7 @@
 //! The fill volume of a clutch whose piston has a stroke, and logs with which it is not told.
 use std::ops::ControlFlow::Continue;
 
-use crate::common::{Logs, TestCar, fitted};
+use crate::common::{FittedFile as _, Logs, TestCar, fitted, given};
 use car::Vehicle;
 use config::{Source, VehicleFile};
 use fit::{Parameter, Series, ShiftRecord, Verdict};
@@ -128,7 +128,7 @@ fn a_wrong_pressure_channel_is_not_believed() {
         ("of the other clutch", with_pressure(&good, other)),
     ];
     for (case, shifts) in cases {
-        let fit = match fit::fit(&car.file, &shifts, &[], car.ages(), &mut |_| Continue(())) {
+        let fit = match fit::fit(&given(&car.file), &shifts, &[], car.ages(), &mut |_| Continue(())) {
             Ok(fit) => fit,
             Err(error) => {
                 assert!(error.to_string().contains("hint"), "{case}: {error}");

@@ -1,14 +1,14 @@
 //! One car of the many of `draws.rs`, with few shifts: what CI has time for.
 use std::ops::ControlFlow::Continue;
 
-use crate::common::{Logs, TestCar, TestShift};
+use crate::common::{FittedFile as _, Logs, TestCar, TestShift, given};
 use fit::{Fit, Parameter, Series, Verdict};
 
 /// A car fitted to shifts, and the error of its torque on other shifts over that with the given file.
 fn fitted(seed: u64, logs: Logs, count: u64) -> (TestCar, Fit, f64) {
     let mut car = TestCar::drawn(seed);
     let shifts: Vec<_> = (0..count).map(|number| car.shift(number, logs).record).collect();
-    let fit = fit::fit(&car.file, &shifts, &[], car.ages(), &mut |_| Continue(())).unwrap();
+    let fit = fit::fit(&given(&car.file), &shifts, &[], car.ages(), &mut |_| Continue(())).unwrap();
     let vehicle = fit.vehicle_file(&car.file, "a simulation").unwrap();
     let others: Vec<TestShift> = (100..103).map(|number| car.shift(number, logs)).collect();
     let [before, after] =
@@ -69,7 +69,7 @@ fn the_zero_offset_of_a_pressure_sensor_is_not_taken_for_valve_gain() {
         let fit_with = |offset_pa: f64| {
             let mut car = TestCar::drawn(4);
             let shifts = with_offset(&mut car, offset_pa, from_s);
-            (fit::fit(&car.file, &shifts, &[], car.ages(), &mut |_| Continue(())).unwrap(), car)
+            (fit::fit(&given(&car.file), &shifts, &[], car.ages(), &mut |_| Continue(())).unwrap(), car)
         };
         let (right, car) = fit_with(0.0);
         let [gain, offset] = [Parameter::Gain, Parameter::PressureOffset].map(|p| right.place(p).unwrap());

@@ -1,5 +1,5 @@
 //! Driving between the shifts of a car whose file has one shift.
-use crate::common::{Logs, TestCar, column, fitted};
+use crate::common::{FittedFile as _, Logs, TestCar, column, fitted};
 use fit::{Driving, Fit, Parameter, Verdict};
 use trace::{Column, Trace, Values, signal};
 

@@ -59,9 +59,37 @@ impl Display for Lossy<'_> {
     }
 }
 
+/// A number with five digits as TOML has it.
+pub fn toml_number(value: f64) -> String {
+    const DIGITS: i32 = 5;
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value:.1}");
+    }
+    let scientific = format!("{value:e}");
+    let exponent = scientific.rsplit_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
+    if (-3..6).contains(&exponent) {
+        let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);
+        let text = format!("{value:.decimals$}");
+        let trimmed = text.trim_end_matches('0');
+        if trimmed.ends_with('.') { format!("{trimmed}0") } else { trimmed.to_owned() }
+    } else {
+        format!("{value:.4e}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_keep_five_digits() {
+        let cases =
+            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
+        for (value, text) in cases {
+            assert_eq!(toml_number(value), text);
+            assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
+        }
+    }
 
     #[test]
     fn what_is_not_printed_is_escaped_and_the_rest_stays() {

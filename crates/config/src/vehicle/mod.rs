@@ -17,7 +17,7 @@ use std::path::Path;
 
 use ::car::{
     CompliantRequirement, DesignRequirement, FilterSettings, OIL_TEMPERATURES_DEGC, ObserverSettings, PhaseSlips,
-    Requirements, Vehicle,
+    Requirements, Shaft, Vehicle,
 };
 use drivetrain::{Converter, Driveline, Engine, RoadLoad, Table2, TableError, Tyre};
 
@@ -138,11 +138,33 @@ impl VehicleFile {
     /// # Errors
     /// There is no such value, or the changed one is not one that a vehicle file may have.
     pub fn changed(&self, key: &str, change: Change, value: f64) -> Result<Vehicle, ConfigError> {
+        self.changed_at(&key.split('.').collect::<Vec<_>>(), change, value)
+    }
+
+    /// The same at a path of keys.
+    fn changed_at(&self, path: &[&str], change: Change, value: f64) -> Result<Vehicle, ConfigError> {
         let mut tree = Tree::of(&self.source)?;
-        let path: Vec<String> = key.split('.').map(str::to_owned).collect();
-        let wrong = |message| Check::of(&self.source).meaning(key, 0, message, None);
-        tree.change(&path, change, value).map_err(wrong)?;
+        let keys: Vec<String> = path.iter().map(|key| (*key).to_owned()).collect();
+        let wrong = |message| Check::of(&self.source).meaning(path.join("."), 0, message, None);
+        tree.change(&keys, change, value).map_err(wrong)?;
         of_tree(&self.source, &tree)
+    }
+
+    /// The shafts of the gear train, each with what twice its inertia adds to the mass matrix of the shift.
+    ///
+    /// # Errors
+    /// A shaft with twice its inertia is not one that a vehicle file may have.
+    pub fn shafts(&self) -> Result<Vec<Shaft>, ConfigError> {
+        let raw: RawVehicleFile = self.source.parse_as(Kind::Vehicle)?;
+        let shaft = |name: &str| {
+            let path = ["gear_train", "shaft", name, "inertia_kg_m2"];
+            let mut mass_kg_m2 = self.changed_at(&path, Change::Scale, 2.0)?.shift.mass_kg_m2;
+            for (row, base) in mass_kg_m2.iter_mut().zip(self.shift.mass_kg_m2) {
+                row.iter_mut().zip(base).for_each(|(cell, base)| *cell -= base);
+            }
+            Ok(Shaft { name: name.to_owned(), mass_kg_m2 })
+        };
+        raw.gear_train.shaft.get_ref().iter().map(|raw| shaft(raw.name.get_ref())).collect()
     }
 
     /// The same of a file with these values in place of its own.

@@ -2,37 +2,50 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use config::{CarFile, Source, toml_string};
+use car::Car;
 use drivetrain::{ClutchValve, Real, Table1};
+use trace::toml_string;
 
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
 use super::validation::HeldOut;
 use crate::driving::DRAG_UNIT_N_M;
 use crate::fitted_file::fill_comment;
-use crate::vehicle_text::{FITTED, Step, VehicleText, headed, kept, keys, number};
+use crate::vehicle_text::{FITTED, Step, VehicleText, headed, keys, number};
 use crate::verdict::SIDES;
 use crate::{FitError, Verdict};
 
 /// A clutch that sticks holds at least so much more than it carries as it begins to slip, as a factor.
 const STATIC_OVER_SLIDING: f64 = 1.0001;
 
+/// The vehicle file that is given.
+#[derive(Debug, Clone, Copy)]
+pub struct GivenFile<'a> {
+    /// Where it stands.
+    pub path: &'a Path,
+    /// Its text.
+    pub text: &'a str,
+    /// Where the gearbox file that it names stands.
+    pub gearbox: &'a Path,
+}
+
 impl GearboxFit {
-    /// The vehicle file with the fitted values, as it is to stand at `path`. Elements and pairs of gears without a fitted shift stay as they
-    /// are. What is not told singly changes too: its ratio to the others may be told. Every value that changes has a comment with its
-    /// interval. An inertia that the logs do not tell and draw far off stays too. `logs` are named at the head of the file.
-    /// Where shifts were held out, `checked` says how far the filter of `estimate` may trust the valves.
+    /// The text of the vehicle file with the fitted values, as it is to stand at `path`. Elements and pairs of gears without a fitted
+    /// shift stay as they are. What is not told singly changes too: its ratio to the others may be told. Every value that changes has a
+    /// comment with its interval. An inertia that the logs do not tell and draw far off stays too. `logs` are named at the head of the
+    /// file. Where shifts were held out, `checked` says how far the filter of `estimate` may trust the valves.
     ///
     /// # Errors
-    /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
-    pub fn vehicle_file(
+    /// The file has a value at another place than the program writes them, or names no gearbox file.
+    pub fn vehicle_text(
         &self,
-        car: &CarFile,
+        car: &Car,
+        file: GivenFile<'_>,
         path: &Path,
         logs: &str,
         checked: Option<&HeldOut>,
-    ) -> Result<CarFile, FitError> {
-        let mut text = Written::new(&car.source.text)?;
+    ) -> Result<String, FitError> {
+        let mut text = Written::new(file.text)?;
         self.write_converter(&mut text, car)?;
         self.write_drag(&mut text, car)?;
         self.write_vehicle(&mut text, car)?;
@@ -55,20 +68,14 @@ impl GearboxFit {
         }
         self.write_budget(&mut text, car, checked)?;
         let logs = logs.replace(char::is_control, " ");
-        let head = format!("values below lines like this one come from {} shifts of {logs}", self.shifts);
-        written(text, car, path, &head)
+        text.at(file, path)?;
+        Ok(headed(
+            &format!("values below lines like this one come from {} shifts of {logs}", self.shifts),
+            &text.finish(),
+        ))
     }
 
-    /// The given vehicle file as it is to stand at `path`, with the reason why its values are kept in a line at its head.
-    ///
-    /// # Errors
-    /// None that the given file does not have itself.
-    pub fn kept_file(&self, car: &CarFile, path: &Path, reason: &str) -> Result<CarFile, FitError> {
-        let text = Written::new(&car.source.text)?;
-        written(text, car, path, &kept(reason))
-    }
-
-    fn write_converter(&self, text: &mut Written, car: &CarFile) -> Result<(), FitError> {
+    fn write_converter(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
         let Some(converter) = &car.converter else { return Ok(()) };
         let capacity = converter.capacity_n_m_s2.scaled(Real::exp(self.unknown(Quantity::Input)));
         let ratio = Real::exp(self.unknown(Quantity::TorqueRatio));
@@ -78,7 +85,7 @@ impl GearboxFit {
     }
 
     /// The drag of the elements of which the logs tell it.
-    fn write_drag(&self, text: &mut Written, car: &CarFile) -> Result<(), FitError> {
+    fn write_drag(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
         for (place, name) in self.quantities.elements.iter().enumerate() {
             let element = car.gearbox.elements.iter().position(|element| element.name == *name);
             let known = element.and_then(|at| car.clutches[at].as_ref());
@@ -92,7 +99,7 @@ impl GearboxFit {
     }
 
     /// Mass, road load and engine, where driving between shifts tells them: no ratio between torques in shifts depends on them.
-    fn write_vehicle(&self, text: &mut Written, car: &CarFile) -> Result<(), FitError> {
+    fn write_vehicle(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
         let values = [
             (Quantity::Mass, "vehicle", "mass_kg", car.road.mass_kg),
             (Quantity::Rolling, "vehicle", "rolling_moment_n_m", car.road.rolling_moment_n_m),
@@ -121,7 +128,7 @@ impl GearboxFit {
         self.verdict(quantity) != Verdict::NotIdentifiable
     }
 
-    fn write_element(&self, text: &mut Written, car: &CarFile, element: usize, place: usize) -> Result<(), FitError> {
+    fn write_element(&self, text: &mut Written, car: &Car, element: usize, place: usize) -> Result<(), FitError> {
         let Some(Some(known)) = car.clutches.get(element) else { return Ok(()) };
         let name = car.gearbox.elements[element].name.as_str();
         let table = ["clutch", name];
@@ -245,16 +252,14 @@ impl GearboxFit {
     }
 }
 
-/// The file with a text, as it is to stand at `path`, with a line at its head.
-fn written(mut text: Written, car: &CarFile, path: &Path, head: &str) -> Result<CarFile, FitError> {
-    text.set_gearbox(car, path)?;
-    let source = Source { path: path.to_owned(), text: headed(head, &text.finish()) };
-    CarFile::from_sources(source, car.gearbox_source.clone()).map_err(|error| {
-        FitError::Work(format!(
-            "the fitted values are not those of a possible car: {error}\n\
-             hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
-        ))
-    })
+/// The text of a given vehicle file, as it is to stand at `path`, with the reason why its values are kept in a line at its head.
+///
+/// # Errors
+/// The file names no gearbox file.
+pub fn kept_text(file: GivenFile<'_>, path: &Path, reason: &str) -> Result<String, FitError> {
+    let mut text = Written::new(file.text)?;
+    text.at(file, path)?;
+    Ok(crate::kept_text(&text.finish(), reason))
 }
 
 /// What a fitted factor says of itself.
@@ -311,15 +316,15 @@ impl Written {
         self.put(table, key, &inline, comment)
     }
 
-    /// Keeps the gearbox file where it is when the vehicle file moves to another folder.
-    fn set_gearbox(&mut self, car: &CarFile, path: &Path) -> Result<(), FitError> {
-        let gearbox = car.gearbox_source.path.as_path();
+    /// Keeps the gearbox file where it is when the vehicle file `from` moves to another folder.
+    fn at(&mut self, from: GivenFile<'_>, to: &Path) -> Result<(), FitError> {
+        let gearbox = from.gearbox;
         let folder = |path: &Path| match path.parent() {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
             _ => PathBuf::from("."),
         };
         let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let (from, to) = (whole(&folder(&car.source.path)), whole(&folder(path)));
+        let (from, to) = (whole(&folder(from.path)), whole(&folder(to)));
         if from == to || !gearbox.exists() {
             return Ok(());
         }

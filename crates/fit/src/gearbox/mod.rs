@@ -31,6 +31,7 @@ mod zero_offset;
 
 pub use crate::driving::Driving;
 pub use channels::ChannelFits;
+pub use file::{GivenFile, kept_text};
 pub use fitting::{GearboxFit, Progress, fit};
 pub use quantities::{Quantities, Quantity};
 pub use recorder::{Recorded, Recorder};

@@ -7,7 +7,7 @@ use car::ShiftClutch;
 use car::{Sensors, Vehicle};
 use config::{ExperimentFile, Source, VehicleFile};
 use drivetrain::{ClutchValve, Table1};
-use fit::{Driving, Fit, Map, Parameter, ReadingAges, Series, ShiftRecord};
+use fit::{Driving, Fit, FitError, Given, Map, Parameter, ReadingAges, Series, ShiftRecord};
 use plant::hybrid::RELATIVE_TOLERANCE;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64Mcg;
@@ -15,9 +15,27 @@ use study::sampling::through_sensors;
 use study::simulate_shift_within;
 use trace::{Trace, Values, signal};
 
+/// The vehicle of a file as a fit takes it.
+pub(crate) fn given(file: &VehicleFile) -> Given {
+    Given { vehicle: file.vehicle.clone(), shafts: file.shafts().unwrap(), text: file.source.text.clone() }
+}
+
+/// Files of a fit.
+pub(crate) trait FittedFile {
+    /// The file with the fitted values.
+    fn vehicle_file(&self, file: &VehicleFile, logs: &str) -> Result<VehicleFile, FitError>;
+}
+
+impl FittedFile for Fit {
+    fn vehicle_file(&self, file: &VehicleFile, logs: &str) -> Result<VehicleFile, FitError> {
+        let text = self.vehicle_text(&given(file), logs)?;
+        Ok(VehicleFile::from_source(Source { text, ..file.source.clone() }).unwrap())
+    }
+}
+
 /// The fit of a car to shifts, and to driving between them.
 pub(crate) fn fitted(car: &TestCar, shifts: &[ShiftRecord], driving: &[Driving]) -> Fit {
-    fit::fit(&car.file, shifts, driving, car.ages(), &mut |_| Continue(())).unwrap()
+    fit::fit(&given(&car.file), shifts, driving, car.ages(), &mut |_| Continue(())).unwrap()
 }
 
 /// The numbers of a signal of a log.
@@ -505,7 +523,7 @@ impl TestCar {
         let map = logs::ChannelMap::default();
         let open = || logs::Log::open(&path, &map.open);
         let source = fit::LogSource { path: &path, map: &map, open: &open, is_stopped: &|| false };
-        let collected = fit::collect(source, &self.file);
+        let collected = fit::collect(source, &given(&self.file));
         std::fs::remove_file(&path).unwrap();
         collected.unwrap()
     }

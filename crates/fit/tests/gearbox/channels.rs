@@ -9,7 +9,7 @@ use fit::{Known, ReadingAges, Verdict};
 use observer::Reading;
 use observer::gearbox::{GearCommand, ShiftInput};
 
-use super::drawn::{Case, Drawn, car, city, hilly, with_tip_ins};
+use super::drawn::{Case, Drawn, FittedFile as _, car, city, hilly, with_tip_ins};
 
 fn drawn(seed: u64) -> Drawn {
     Drawn::of(car("eight_speed.toml"), seed, Case::Usual).with_channels()

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use car::ErrorBudget;
 use car::{Car, Drive, DriveSegment, Sensors};
-use config::{CarFile, DriveFile};
-use fit::gearbox::{Quantities, Quantity, Recorded, Recorder, ShiftLog};
-use fit::{ReadingAges, Series};
+use config::{CarFile, DriveFile, Source};
+use fit::gearbox::{GearboxFit, GivenFile, HeldOut, Quantities, Quantity, Recorded, Recorder, ShiftLog};
+use fit::{FitError, ReadingAges, Series};
 use observer::Reading;
 use observer::ShiftTables;
 use observer::gearbox::ShiftInput;
@@ -57,6 +57,20 @@ const ROW_S: f64 = 0.01;
 
 pub(crate) fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+/// Files of a fit.
+pub(crate) trait FittedFile {
+    /// The file with the fitted values, as it is to stand at this path.
+    fn vehicle_file(&self, car: &CarFile, path: &Path, logs: &str, of: Option<&HeldOut>) -> Result<CarFile, FitError>;
+}
+
+impl FittedFile for GearboxFit {
+    fn vehicle_file(&self, car: &CarFile, path: &Path, logs: &str, of: Option<&HeldOut>) -> Result<CarFile, FitError> {
+        let given = GivenFile { path: &car.source.path, text: &car.source.text, gearbox: &car.gearbox_source.path };
+        let source = Source { path: path.to_owned(), text: self.vehicle_text(car, given, path, logs, of)? };
+        Ok(CarFile::from_sources(source, car.gearbox_source.clone()).unwrap())
+    }
 }
 
 /// A car of the repository.

@@ -7,7 +7,7 @@ use fit::{ReadingAges, Verdict};
 use observer::Reading;
 use observer::gearbox::{GearCommand, ShiftInput};
 
-use super::drawn::{self, Case, Drawn, car, city, hilly};
+use super::drawn::{self, Case, Drawn, FittedFile as _, car, city, hilly};
 
 /// Of a car drawn by this seed, with a reported engine torque.
 fn drawn_with_reported(seed: u64) -> Drawn {

@@ -11,7 +11,7 @@ use std::path::Path;
 use car::ErrorBudget;
 use car::{Car, CarErrorBounds};
 use config::{CarFile, Source};
-use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
+use drawn::{Case, Drawn, FittedFile as _, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;

@@ -6,7 +6,7 @@ use fit::{ReadingAges, Series};
 use observer::Reading;
 use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 
-use super::drawn::{self, Case, Drawn, Truth, car, city, every_fifth, hilly};
+use super::drawn::{self, Case, Drawn, FittedFile as _, Truth, car, city, every_fifth, hilly};
 use super::{fitted, rows};
 
 /// The quantities of the elements that lie outside of their intervals, with errors in standard deviations.

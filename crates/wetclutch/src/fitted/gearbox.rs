@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use car::Car;
-use config::CarFile;
-use fit::gearbox::{HeldOut, Recorded, Recorder, ShiftLog};
+use config::{CarFile, Source};
+use fit::gearbox::{GivenFile, HeldOut, Recorded, Recorder, ShiftLog};
 use fit::{FitError, ReadingAges};
 use observer::ShiftTables;
 use report::sheet::Part;
@@ -13,8 +13,8 @@ use study::gearbox::logged::LoggedDrive;
 use trace::ShownPath as _;
 
 use super::{
-    FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, names, nothing_held_out,
-    say_reasons,
+    FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, impossible, names,
+    nothing_held_out, say_reasons,
 };
 use crate::estimate::gearbox::check_ratios;
 use crate::estimate::gearbox::source::{CarReading, CarSource};
@@ -57,14 +57,20 @@ pub(super) fn fit(
     })?;
     progress(FitProgress::Validating);
     let output = options.output.as_deref().unwrap_or(&file.source.path);
-    let fitted_file = |checked: Option<&HeldOut>| found.vehicle_file(file, output, &names(logs), checked);
+    let given = GivenFile { path: &file.source.path, text: &file.source.text, gearbox: &file.gearbox_source.path };
+    let read = |text: String| {
+        let source = Source { path: output.to_owned(), text };
+        CarFile::from_sources(source, file.gearbox_source.clone()).map_err(|error| impossible(&error))
+    };
+    let fitted_file =
+        |checked: Option<&HeldOut>| read(found.vehicle_text(file, given, output, &names(logs), checked)?);
     let fitted = fitted_file(None)?;
     let checked = found.validate((file, &tables), (&fitted, &LoggedDrive::tables(&fitted, sensors)?), &held_out);
     let fitted = fitted_file(checked.as_ref())?;
     let kept = found.reason_against(checked.as_ref());
     let written = match &kept {
         None => fitted,
-        Some(reason) => found.kept_file(file, output, reason)?,
+        Some(reason) => read(fit::gearbox::kept_text(given, output, reason)?)?,
     };
     let [scale, gain] = found.scale_and_gain;
     let statements = [format!("turbine speed: one-step error {scale:.3} rad/s, g {gain:.2}")].into_iter();

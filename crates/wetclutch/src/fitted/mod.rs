@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use car::Sensors;
+use config::ConfigError;
 use report::sheet::{Part, Sheet};
 use trace::ShownPath as _;
 
@@ -172,6 +173,14 @@ impl Fitted {
 /// The names of the logs.
 fn names(logs: &[LogInput<'_>]) -> String {
     logs.iter().map(|log| log.path.shown().to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// Why a file with fitted values is none.
+fn impossible(error: &ConfigError) -> Error {
+    Error::Work(format!(
+        "the fitted values are not those of a possible car: {error}\n\
+         hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
+    ))
 }
 
 /// What is said where nothing is held out.

@@ -3,15 +3,15 @@
 use std::ops::ControlFlow;
 
 use car::Vehicle;
-use config::VehicleFile as OneShiftFile;
-use fit::{Channel, Collected, FitError, HeldOut, LogSource, ReadingAges, SHIFTS_MAX, ShiftRecord};
+use config::{Source, VehicleFile as OneShiftFile};
+use fit::{Channel, Collected, FitError, Given, HeldOut, LogSource, ReadingAges, SHIFTS_MAX, ShiftRecord};
 use logs::{Log, LogError};
 use report::sheet::Part;
 use trace::ShownPath as _;
 
 use super::{
-    FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, names, nothing_held_out,
-    say_reasons,
+    FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, impossible, names,
+    nothing_held_out, say_reasons,
 };
 use crate::{Error, LogInput, Notes, VehicleFile, shell_quoted};
 
@@ -23,7 +23,8 @@ pub(super) fn fit(
     say: Notes<'_>,
 ) -> Result<(Fitted, Part), Error> {
     let ages = options.sensors.as_ref().map(ReadingAges::of).unwrap_or_default();
-    let collected = collect(file, logs, options, progress)?;
+    let given = given(file)?;
+    let collected = collect(&given, logs, options, progress)?;
     collected.notes.iter().for_each(|note| say(&format!("warning: {note}")));
     say_reasons("not used", &collected.skipped, say);
     let kinds = collected.kinds.statement();
@@ -31,18 +32,21 @@ pub(super) fn fit(
     if fitted_shifts.is_empty() {
         return Err(no_shift(file, logs, &kinds));
     }
-    let found = fit::fit(file, &fitted_shifts, &collected.driving, ages, &mut |at| {
+    let found = fit::fit(&given, &fitted_shifts, &collected.driving, ages, &mut |at| {
         progress(FitProgress::Fitting { shifts: at.shifts, iteration: at.iteration + 1 });
         if options.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     progress(FitProgress::Validating);
     say_reasons("not fitted", &found.unusable, say);
-    let fitted = found.vehicle_file(file, &names(logs))?;
-    let checked = found.validate(file, &fitted, &held_out, ages)?;
+    let read = |text: String| {
+        OneShiftFile::from_source(Source { text, ..file.source.clone() }).map_err(|error| impossible(&error))
+    };
+    let fitted = read(found.vehicle_text(&given, &names(logs))?)?;
+    let checked = found.validate(&given, &self::given(&fitted)?, &held_out, ages)?;
     let kept = found.reason_against(checked.as_ref());
     let written = match &kept {
         None => fitted,
-        Some(reason) => found.kept_file(file, reason)?,
+        Some(reason) => read(fit::kept_text(&given.text, reason))?,
     };
     let fitted = Fitted {
         vehicle: VehicleFile::OneShift(Box::new(written)),
@@ -56,6 +60,11 @@ pub(super) fn fit(
     Ok((fitted, report::fit_page::intervals(&found)))
 }
 
+/// The vehicle of a file as a fit takes it.
+fn given(file: &OneShiftFile) -> Result<Given, Error> {
+    Ok(Given { vehicle: file.vehicle.clone(), shafts: file.shafts()?, text: file.source.text.clone() })
+}
+
 /// One-step error and gain of a channel, in words.
 fn channel_error((channel, scale, gain): &(Channel, f64, f64)) -> String {
     let (scale, unit) = if *channel == Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
@@ -64,7 +73,7 @@ fn channel_error((channel, scale, gain): &(Channel, f64, f64)) -> String {
 
 /// The shifts of all logs.
 fn collect(
-    file: &OneShiftFile,
+    given: &Given,
     logs: &[LogInput<'_>],
     options: &FitOptions,
     progress: FitProgressTaker<'_>,
@@ -75,7 +84,7 @@ fn collect(
         progress(FitProgress::Reading { log: log.path, time_s: None });
         let open = || opened(*log);
         let source = LogSource { path: log.path, map: log.map, open: &open, is_stopped: &is_stopped };
-        let mut one = fit::collect(source, file)?;
+        let mut one = fit::collect(source, given)?;
         one.notes.iter_mut().for_each(|note| *note = format!("{}: {note}", log.path.shown()));
         all.add(one);
     }

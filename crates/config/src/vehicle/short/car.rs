@@ -16,10 +16,9 @@ use super::complete::{DefaultTaken, Leaf, leaves, number_of, taken_of};
 use super::facts::{ENGINE_TORQUES_N_M, located};
 use super::first_file::exact;
 use crate::check::Check;
-use crate::source::toml_number;
 use crate::vehicle::car::CarFile;
 use crate::vehicle::{FINAL_RATIOS, MASSES_KG, WHEEL_RADII_M};
-use crate::{ConfigError, GearboxFile, Source, toml_string};
+use crate::{ConfigError, GearboxFile, Source, toml_number, toml_string};
 
 /// Ratio from engine to wheels that no car's lowest gear has \[chosen\]: trucks have 60 with 16 gears, cars 8 to 25.
 const MAX_RATIO: f64 = 40.0;

@@ -2,8 +2,7 @@
 
 use super::complete::{complete, find};
 use super::{Facts, Short, ValveKind, text_of};
-use crate::source::toml_number;
-use crate::{ConfigError, Source, VehicleFile, toml_string};
+use crate::{ConfigError, Source, VehicleFile, toml_number, toml_string};
 
 /// Defaults of a table that stand in a short file as comments: what an estimate uses and somebody may know.
 struct Shown {

@@ -21,8 +21,8 @@ use toml::de::DeValue;
 
 use super::budget;
 use crate::check::Check;
-use crate::source::{Layers, misspelt, toml_number};
-use crate::{ConfigError, Source, VehicleFile};
+use crate::source::{Layers, misspelt};
+use crate::{ConfigError, Source, VehicleFile, toml_number};
 pub use car::{CarFacts, short_car_file, sized_gearbox};
 pub(super) use car::{car_defaults, car_defaults_taken};
 pub use complete::DefaultTaken;
