@@ -70,6 +70,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Sensitivity(options) => commands::sensitivity(&options),
         Command::WorstCase(options) => commands::worst_case(&options),
         Command::Check(options) => commands::check(&options),
+        Command::Export(options) => commands::export(&options),
         Command::Completions(options) => commands::completions(&options),
         Command::Man(options) => commands::man(&options),
     }

@@ -184,13 +184,19 @@ impl<T: Real> Table1<T> {
         if let Some(at) = values.iter().position(|y| !y.is_finite()) {
             return Err(TableError::NotFinite(at));
         }
-        let axis = Axis::new(axis)?;
-        let mut table = Self { axis, values: [T::zero(); MAX_POINTS], slopes: [T::zero(); MAX_POINTS] };
-        table.values[..values.len()].copy_from_slice(values);
-        for i in 0..values.len() - 1 {
-            table.slopes[i] = (values[i + 1] - values[i]) / (axis.points[i + 1] - axis.points[i]);
+        let mut held = [T::zero(); MAX_POINTS];
+        held.iter_mut().zip(values).for_each(|(held, value)| *held = *value);
+        Ok(Self::with_slopes(Axis::new(axis)?, held))
+    }
+
+    /// The table of these values, with the slopes that follow from them.
+    fn with_slopes(axis: Axis<T, MAX_POINTS>, values: [T; MAX_POINTS]) -> Self {
+        let mut slopes = [T::zero(); MAX_POINTS];
+        let points = axis.points.windows(2).zip(values.windows(2));
+        for (slope, (x, y)) in slopes.iter_mut().zip(points).take(axis.len - 1) {
+            *slope = (y[1] - y[0]) / (x[1] - x[0]);
         }
-        Ok(table)
+        Self { axis, values, slopes }
     }
 
     /// The same value everywhere.
@@ -276,14 +282,10 @@ impl<T: Real> Table1<T> {
         self.values().iter().fold((self.values[0], self.values[0]), |(lo, hi), &y| (lo.at_most(y), hi.at_least(y)))
     }
 
-    /// The same table in another precision.
+    /// The same table in another precision: through the same points, as [`Self::new`] would make it of them.
     pub fn cast<U: Real>(&self) -> Table1<U> {
         let to = |x: T| U::of(x.to_f64_exact());
-        Table1 {
-            axis: Axis::with_bins(self.axis.points.map(to), self.axis.len),
-            values: self.values.map(to),
-            slopes: self.slopes.map(to),
-        }
+        Table1::with_slopes(Axis::with_bins(self.axis.points.map(to), self.axis.len), self.values.map(to))
     }
 }
 
@@ -383,6 +385,12 @@ mod tests {
         let table = Table1::new(&[0.0, 1.0, 3.0], &[10.0, 20.0, 0.0]).unwrap();
         assert_eq!([0.0, 1.0, 3.0].map(|x| table.at(x)), [10.0, 20.0, 0.0]);
         assert_eq!(table.at(2.0), 10.0);
+    }
+
+    #[test]
+    fn a_table_in_single_precision_is_the_one_through_its_points() {
+        let table = Table1::new(&[0.1, 0.35, 1.7, 2.0], &[3.3e5, 4.1e5, 2.7e6, 1.9e6]).unwrap().cast::<f32>();
+        assert_eq!(Table1::new(table.axis(), table.values()), Ok(table));
     }
 
     #[test]

@@ -53,8 +53,10 @@ impl<T: Real> Commands<T> {
             (before.age_s, before.early_s) = (last.age_s, before.early_s.at_least(last.early_s));
         }
         let kept = if full { REMEMBERED - 1 } else { kept };
-        for at in (1..=kept.min(REMEMBERED - 1)).rev() {
-            self.sent[at] = self.sent[at - 1];
+        // A slice of its own, so that on every target the optimiser sees that the places are within it.
+        let moved = self.sent.get_mut(..=kept).unwrap_or_default();
+        for at in (1..moved.len()).rev() {
+            moved[at] = moved[at - 1];
         }
         self.sent[0] = Sent { age_s, early_s, lowest, highest };
         self.count = kept + 1;

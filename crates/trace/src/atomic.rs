@@ -108,11 +108,12 @@ impl WholeFile {
     ///
     /// # Errors
     /// Writing or renaming fails.
-    pub fn finish_all<const N: usize>(mut files: [Self; N]) -> io::Result<()> {
-        for file in &mut files {
+    pub fn finish_all(mut files: impl AsMut<[Self]>) -> io::Result<()> {
+        let files = files.as_mut();
+        for file in files.iter_mut() {
             file.complete()?;
         }
-        for file in &mut files {
+        for file in files {
             if let Some(Replacement { partial, target }) = &file.replaces {
                 fs::rename(partial, target)?;
                 unfinished().retain(|other| other != partial);

@@ -274,6 +274,25 @@ pub(crate) enum Command {
     ///   gear_NAME.svg  the same in a gear: engaged elements, shaft speeds, levers of the sets
     #[command(verbatim_doc_comment)]
     Check(Check),
+    /// Write the observer of a car for a transmission controller
+    ///
+    /// Writes the gearbox filter of a car in single precision into a folder, for a controller that links the static library
+    /// libwetclutch.a with C code:
+    ///
+    ///   wetclutch.h                     functions, input, estimate and status, with units
+    ///   wetclutch_CAR.h                 places of elements and gears, memory, the parameters as a struct
+    ///   wetclutch_CAR_parameters.c      the parameters as a constant
+    ///   wetclutch_CAR_parameters.bin    the same bytes as an image, with version, size and checksum
+    ///   wetclutch_CAR_selftest.c        a simulated shift and its estimates to the last bit
+    ///   example.c, README.md            the observer in a task, and how it is built
+    ///   certificate.md, report.md       what the ranges assume; sizes
+    ///
+    /// The same car gives the same bytes. The library is built from the sources, once for each controller; README.md says how.
+    ///
+    ///   wetclutch export vehicles/eight_speed.toml -o out
+    ///   wetclutch export vehicles/eight_speed.toml --shift 1-2 -o out
+    #[command(verbatim_doc_comment)]
+    Export(Export),
     /// Print completions for a shell
     #[command(hide = true)]
     Completions(Completions),
@@ -350,6 +369,24 @@ pub(crate) struct Check {
     /// Print kind, errors, warnings and defaults of each file as JSON
     #[arg(long, conflicts_with_all = ["sensors", "output", "all", "page"])]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Export {
+    /// Vehicle file of a car with a gearbox
+    pub(crate) vehicle: PathBuf,
+    /// One shift by its gears; without it all shifts of the car
+    #[arg(long, value_name = "FROM-TO")]
+    pub(crate) shift: Option<String>,
+    /// All shifts of the car, as without --shift
+    #[arg(long, conflicts_with = "shift")]
+    pub(crate) all: bool,
+    /// File whose table `sensors` describes how the speeds are read; default: readings of the moment with usual noise
+    #[arg(long, value_name = "SENSORS.toml")]
+    pub(crate) sensors: Option<PathBuf>,
+    /// Folder for the files
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
 }
 
 /// A page of what a command prints.

@@ -37,9 +37,10 @@ const RESTS_PA: f64 = 1.0;
 /// A piston with a stroke, as the filter knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piston<T> {
-    cylinder: Cylinder<T>,
+    /// The nominal cylinder.
+    pub cylinder: Cylinder<T>,
     /// Of each of the pistons that are carried the volume of the stroke, m^3, and the pressure in its standard deviations.
-    each: [[T; 2]; POINTS],
+    pub each: [[T; 2]; POINTS],
 }
 
 impl Piston<f64> {

@@ -1,0 +1,51 @@
+//! `wetclutch export`.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use trace::{ShownPath as _, WholeFile};
+use wetclutch::{ExportOptions, ExportedFile, VehicleFile, read_sensors};
+
+use super::{not_an_input, writable};
+use crate::args::Export;
+use crate::failure::Failure;
+use crate::output;
+
+pub(crate) fn export(options: &Export) -> Result<(), Failure> {
+    let vehicle = VehicleFile::read(&options.vehicle)?;
+    let sensors = options.sensors.as_deref().map(read_sensors).transpose()?;
+    writable(&options.output, &[])?;
+    let files = wetclutch::export(&vehicle, &ExportOptions { shift: options.shift.clone(), sensors })
+        .map_err(|error| named(&options.vehicle, error))?;
+    for file in &files {
+        not_an_input(Some(&options.output.join(&file.name)), [&options.vehicle])?;
+    }
+    write_all(&options.output, &files)?;
+    for file in &files {
+        output::line(&format!("{:>9} bytes  {}", file.bytes.len(), options.output.join(&file.name).shown()))?;
+    }
+    Ok(())
+}
+
+/// An error of the car with the name of its file.
+fn named(path: &Path, error: Failure) -> Failure {
+    match error {
+        Failure::Input(message) => Failure::Input(format!("{}: {message}", path.shown())),
+        other => other,
+    }
+}
+
+/// Writes all of the files, or none.
+fn write_all(folder: &Path, files: &[ExportedFile]) -> Result<(), Failure> {
+    let mut written = Vec::new();
+    for file in files {
+        let path = folder.join(&file.name);
+        let write = || {
+            let mut whole = WholeFile::create(&path)?;
+            whole.write_all(&file.bytes)?;
+            Ok(whole)
+        };
+        written.push(write().map_err(|error| Failure::writing(&path, &error))?);
+    }
+    WholeFile::finish_all(written).map_err(|error| Failure::writing(folder, &error))
+}

@@ -1,0 +1,151 @@
+//! A car's observer for a transmission controller, as files: parameters as C and as an image, header, example, self-test, certificate.
+//!
+//! The code is `libwetclutch.a` (`embedded/library`), the same for all cars; what is written here is of one car. Nothing here writes to the
+//! disk: a caller gets names and bytes.
+
+mod c_text;
+mod certificate;
+mod error;
+mod header;
+mod parameters;
+mod readme;
+mod self_test;
+mod shift_inputs;
+mod units;
+
+use car::{Car, ErrorBudget, Sensors};
+use config::CarFile;
+use observer::gearbox::{GearboxTables, MAX_ELEMENTS, ShiftRow};
+use observer::{GearboxFilter, ShiftTables, gearbox_filter};
+
+pub use error::ExportError;
+pub use parameters::{Entry, Image, Values};
+pub use shift_inputs::{shift_inputs, single};
+
+/// What is exported of a car.
+#[derive(Debug, Clone, Default)]
+pub struct ExportOptions {
+    /// One shift by its gears, such as `1-2`; without it all shifts of the car.
+    pub shift: Option<String>,
+    /// How the speeds are read; without it as usual sensors read them.
+    pub sensors: Option<Sensors>,
+}
+
+/// A file that is to be written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExportedFile {
+    /// Its name, without a folder.
+    pub name: String,
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+impl ExportedFile {
+    fn text(name: String, text: String) -> Self {
+        Self { name, bytes: text.into_bytes() }
+    }
+}
+
+/// The filter of a car in single precision, and where it is from.
+#[derive(Debug, Clone)]
+pub struct ExportedFilter {
+    /// The car.
+    pub car: Car,
+    /// Bounds of its errors.
+    pub budget: ErrorBudget,
+    /// The tables in double precision, by which steps are made.
+    pub tables: ShiftTables<f64>,
+    single: ShiftTables<f32>,
+    filter: GearboxFilter<'static, f32>,
+    shifts: Vec<ShiftRow<f32>>,
+    /// Name of the car in C: lower case, digits, underscores.
+    pub name: String,
+    /// SHA-256 of its vehicle file.
+    pub vehicle_sha256: String,
+    /// That of its gearbox file.
+    pub gearbox_sha256: String,
+}
+
+/// Of no gearbox.
+const NO_TABLES: GearboxTables<'static, f32> = GearboxTables { elements: &[], gears: &[], shifts: &[] };
+
+impl ExportedFilter {
+    /// The filter of a car's file.
+    ///
+    /// # Errors
+    /// The gearbox has more clutches than the filter has room for; there is no such shift, or none between two clutches.
+    pub fn new(file: &CarFile, options: &ExportOptions) -> Result<Self, ExportError> {
+        let car = file.car.clone();
+        let sensors = options.sensors.as_ref();
+        let budget = ErrorBudget::of_logged_car(&car).read_by(&car, sensors);
+        let too_many = |elements| ExportError::TooManyElements { elements, most: MAX_ELEMENTS };
+        let tables = ShiftTables::of_car(&car, &budget).map_err(too_many)?;
+        let single = tables.cast::<f32>();
+        let filter = gearbox_filter(&car, &tables, &budget, sensors).cast(NO_TABLES);
+        let mut shifts = single.tables().shifts.to_vec();
+        if let Some(name) = &options.shift {
+            let [from, to] = car.shift_named(name).map_err(|error| ExportError::Shift(error.to_string()))?;
+            shifts.retain(|shift| (shift.from, shift.to) == (from, to));
+        }
+        if shifts.is_empty() {
+            return Err(ExportError::NoShift(options.shift.clone()));
+        }
+        let [vehicle_sha256, gearbox_sha256] = [&file.source, &file.gearbox_source].map(|source| source.sha256());
+        let name = c_text::identifier(&file_name(file));
+        Ok(Self { car, budget, tables, single, filter, shifts, name, vehicle_sha256, gearbox_sha256 })
+    }
+
+    /// The filter with its tables.
+    pub fn filter(&self) -> GearboxFilter<'_, f32> {
+        GearboxFilter { tables: GearboxTables { shifts: &self.shifts, ..self.single.tables() }, ..self.filter }
+    }
+
+    /// The shifts as pairs of places of gears.
+    pub fn shifts(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        self.shifts.iter().map(|shift| [shift.from, shift.to])
+    }
+
+    /// Name of a gear.
+    fn gear(&self, place: usize) -> &str {
+        self.car.gearbox.gears.get(place).map_or("", |gear| gear.name.as_str())
+    }
+
+    /// Names of the elements, in the order of the tables.
+    fn elements(&self) -> Vec<&str> {
+        let elements = self.car.gearbox.elements.iter().enumerate();
+        let mut named: Vec<_> =
+            elements.filter_map(|(at, element)| Some((self.tables.place(at)?, element.name.as_str()))).collect();
+        named.sort_unstable();
+        named.into_iter().map(|(_, name)| name).collect()
+    }
+}
+
+/// The name of a file without its ending; of a text that came from no file, that of the car.
+fn file_name(file: &CarFile) -> String {
+    let stem = file.source.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    stem.filter(|stem| !stem.is_empty()).unwrap_or_else(|| file.car.name.clone())
+}
+
+/// The files of a car's observer.
+///
+/// # Errors
+/// As [`ExportedFilter::new`]; or a number of the car has no place in single precision, or the shift of the self-test cannot be simulated.
+pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFile>, ExportError> {
+    let filter = ExportedFilter::new(file, options)?;
+    let image = Image::of(&filter)?;
+    let test = self_test::SelfTest::of(&filter, &image, options.sensors.as_ref())?;
+    let name = &filter.name;
+    let texts = [
+        ("wetclutch.h".to_owned(), header::library()),
+        (format!("wetclutch_{name}.h"), header::of_car(&filter, &image)),
+        (format!("wetclutch_{name}_parameters.c"), image.c_source(&filter)),
+        (format!("wetclutch_{name}_selftest.c"), test.c_source(&filter)),
+        ("example.c".to_owned(), readme::example(name)),
+        ("certificate.md".to_owned(), certificate::certificate(&filter)),
+        ("report.md".to_owned(), readme::report(&filter, &image, &test)),
+        ("README.md".to_owned(), readme::readme(&filter)),
+    ];
+    let mut files: Vec<_> = texts.into_iter().map(|(name, text)| ExportedFile::text(name, text)).collect();
+    files.push(ExportedFile { name: format!("wetclutch_{name}_parameters.bin"), bytes: image.bytes() });
+    Ok(files)
+}

@@ -1,0 +1,9 @@
+//! Exported observers: their bits, their C, and wrong use.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod c_program;
+mod image;
+mod readings;
+mod same_bits;
+mod wrong_use;
