@@ -37,6 +37,28 @@ pub struct ShiftSchedule {
     pub time_in_gear_s: f64,
 }
 
+/// Calibration of the shift controller of a simulated car.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ControllerCalibration {
+    /// Short shifts, one set of numbers for all of them: that of all documented estimates.
+    Bench,
+    /// For the comfort of the occupants.
+    Comfort,
+}
+
+impl ControllerCalibration {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Bench, Self::Comfort];
+
+    /// Its name in a drive file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bench => "bench",
+            Self::Comfort => "comfort",
+        }
+    }
+}
+
 /// A drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
@@ -56,6 +78,8 @@ pub struct Drive {
     pub repetitions: u32,
     /// When the gearbox shifts.
     pub shifts: ShiftPlan,
+    /// How it shifts.
+    pub controller: ControllerCalibration,
     /// The sensors that the measured signals go through; without them a car measures exactly.
     pub sensors: Option<Sensors>,
 }

@@ -60,7 +60,7 @@ pub use step::{Commands, ShiftCommand, Speeds, Step};
 pub use self::{
     car::{Car, LockUp},
     clutch::ShiftClutch,
-    drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule},
+    drive::{ControllerCalibration, Drive, DriveSegment, ShiftPlan, ShiftSchedule},
     error_bounds::{CarErrorBounds, ElementErrorBounds, ErrorBounds},
     error_budget::{ElementErrors, ErrorBudget},
     experiment::{Experiment, FastFill, Profile, Scenario, ShiftCalibration},

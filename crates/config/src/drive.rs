@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use car::{Drive, DriveSegment, ShiftPlan, ShiftSchedule, SpeedTrace};
+use car::{ControllerCalibration, Drive, DriveSegment, ShiftPlan, ShiftSchedule, SpeedTrace};
 use drivetrain::Table1;
 use serde::Deserialize;
 use toml::Spanned;
@@ -96,6 +96,7 @@ impl DriveFile {
             trace: trace.map(|(_, trace)| trace),
             repetitions,
             shifts,
+            controller: raw.controller.into(),
         };
         Ok(Self { drive, vehicle, speeds, source })
     }
@@ -110,11 +111,30 @@ struct RawDrive {
     repetitions: Option<Number>,
     #[serde(default)]
     start: RawStart,
+    #[serde(default)]
+    controller: RawController,
     schedule: Option<RawSchedule>,
     shift: Option<Spanned<Vec<RawShift>>>,
     segment: Option<Spanned<Vec<RawSegment>>>,
     trace: Option<RawTrace>,
     sensors: Option<Spanned<RawSensors>>,
+}
+
+#[derive(Deserialize, Clone, Copy, Default)]
+#[serde(rename_all = "lowercase")]
+enum RawController {
+    #[default]
+    Bench,
+    Comfort,
+}
+
+impl From<RawController> for ControllerCalibration {
+    fn from(raw: RawController) -> Self {
+        match raw {
+            RawController::Bench => Self::Bench,
+            RawController::Comfort => Self::Comfort,
+        }
+    }
 }
 
 #[derive(Deserialize)]

@@ -1,6 +1,6 @@
 //! Vehicle files with a gearbox file, and drive files.
 
-use car::{Car, CarSize, ErrorBudget, ShiftPlan};
+use car::{Car, CarSize, ControllerCalibration, ErrorBudget, ShiftPlan};
 use config::gearbox::SHIPPED;
 use config::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
 use config::{CarFile, DriveFile, GearboxFile, Source, VehicleFile};
@@ -15,6 +15,19 @@ fn car(text: &str) -> Result<CarFile, String> {
 
 fn drive(text: &str) -> Result<DriveFile, String> {
     DriveFile::from_source(Source::built_in("drive.toml", text)).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_drive_names_the_calibration_of_its_shift_controller() {
+    let of = |line: &str| drive(&format!("name = \"d\"\n{line}\n[[segment]]\nduration_s = 3\nthrottle = 0.1\n"));
+    let read = |line: &str| of(line).unwrap().drive.controller;
+    assert_eq!(read(""), ControllerCalibration::Bench);
+    for calibration in ControllerCalibration::ALL {
+        assert_eq!(read(&format!("controller = \"{}\"", calibration.name())), calibration);
+    }
+    let error = of("controller = \"sport\"").unwrap_err();
+    assert!(error.contains("drive.toml:2") && error.contains("`bench` or `comfort`"), "{error}");
+    assert!(of("controller = 1").is_err());
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! How every shift between neighbouring gears of the shipped cars feels, by kind.
 //!
 //! ```text
-//! cargo run --release -p study --example shift_comfort -- eight_speed six_speed
+//! cargo run --release -p study --example shift_comfort -- comfort eight_speed six_speed
 //! ```
 //!
-//! drives the nominal cars of these vehicle files, without names all with a whole gearbox. Each line is a shift with what the occupants feel
+//! drives the nominal cars of these vehicle files with this calibration, without names all with a whole gearbox. Each line is a shift with what the occupants feel
 //! ([`evaluate::shift_comfort`]); a star marks a quantity beyond its bar. Power-on upshifts are made with 30 % throttle, power-on downshifts
 //! with 50 %.
 
@@ -22,7 +22,13 @@ const CARS: [&str; 7] =
     ["eight_speed", "eight_speed_stroke", "six_speed", "four_speed", "four_speed_one_way", "ten_speed", "dual_clutch"];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let names: Vec<String> = std::env::args().skip(1).collect();
+    let mut arguments = std::env::args().skip(1);
+    let calibration = match arguments.next().as_deref() {
+        Some("comfort") => CarCalibration::COMFORT,
+        None | Some("bench") => CarCalibration::STANDARD,
+        Some(other) => return Err(format!("there is no calibration \"{other}\"; there are bench and comfort").into()),
+    };
+    let names: Vec<String> = arguments.collect();
     let names = if names.is_empty() { CARS.map(str::to_owned).to_vec() } else { names };
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut all: Vec<(String, Felt)> = Vec::new();
@@ -37,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 [pair[1], pair[0]]
             };
             let label = format!("{name} {}-{}", car.gearbox.gears[from].name, car.gearbox.gears[to].name);
-            match drive(&model, &car, CarCalibration::STANDARD, kind, [from, to]) {
+            match drive(&model, &car, calibration, kind, [from, to]) {
                 Ok(felt) => all.push((label, felt)),
                 Err(error) => println!("{label}, {}: {error}", kind.name()),
             }

@@ -63,7 +63,7 @@ pub fn simulate_rows(
     let recorded_s = sensed.as_ref().map_or(drive.sample_time_s, SensedDrive::record_s);
     let recorded = Drive { sample_time_s: recorded_s, ..drive.clone() };
     let mut taken = Ok(());
-    let summary = simulate_car_drive(&model, car, CarCalibration::STANDARD, &recorded, |sample| {
+    let summary = simulate_car_drive(&model, car, CarCalibration::of(drive.controller), &recorded, |sample| {
         // After an error the simulation continues to its end without rows: this takes seconds.
         if taken.is_ok() {
             taken = match &mut sensed {

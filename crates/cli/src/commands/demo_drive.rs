@@ -44,7 +44,9 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
         Some(drive) => {
             output::note(&format!("driving \"{}\", {:.0} s", drive.name, drive.duration_s()));
             let drive = Drive { sample_time_s: RECORD_S, ..drive.drive.clone() };
-            simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| recording.push(sample))?;
+            simulate_car_drive(&model, &car, CarCalibration::of(drive.controller), &drive, |sample| {
+                recording.push(sample)
+            })?;
             drive.name
         }
         None => {

@@ -33,7 +33,10 @@ mod start;
 mod valves;
 
 pub use contacts::{ContactState, Contacts};
-pub use controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftProgress, ShiftStage};
+pub use controller::{
+    CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftProgress, ShiftStage, SlipCurve, SlipTarget,
+    SlipTargets,
+};
 pub use drive::{CarDriveSummary, OverSpeed, simulate_car_drive};
 pub use energy::{CarPowers, stored_car_energy};
 pub use follow::SpeedError;

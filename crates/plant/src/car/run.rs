@@ -188,7 +188,7 @@ fn measure(model: &CarModel, state: &CarState, driver: Driver) -> CarMeasured {
 fn inputs(model: &CarModel, valves: &mut CarValves, commands: &CarCommands, driver: Driver, now_s: f64) -> CarInputs {
     let car = &model.car;
     CarInputs {
-        throttle: driver.throttle,
+        throttle: driver.throttle.max(commands.engine_throttle),
         engine_share: commands.engine_share,
         brake_n_m: driver.brake * BRAKE_OVER_TYRES * car.tyre.max_force_n * car.road.wheel_radius_m,
         grade_rad: driver.grade_rad,

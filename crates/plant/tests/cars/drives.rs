@@ -9,20 +9,26 @@ fn drive(text: &str) -> Drive {
 }
 
 fn samples(car: &Car, drive: &Drive) -> Result<Vec<CarSample>, CarError> {
+    samples_with(CarCalibration::STANDARD, car, drive)
+}
+
+fn samples_with(calibration: CarCalibration, car: &Car, drive: &Drive) -> Result<Vec<CarSample>, CarError> {
     let model = CarModel::new(car.clone())?;
     let mut samples = Vec::new();
-    simulate_car_drive(&model, car, CarCalibration::STANDARD, drive, |sample| samples.push(*sample))?;
+    simulate_car_drive(&model, car, calibration, drive, |sample| samples.push(*sample))?;
     Ok(samples)
 }
 
 #[test]
 fn an_hour_in_town_uses_the_gears_and_shifts_more_than_200_times() {
     let drive = drive(include_str!("../../../../drives/city.toml"));
-    for car in super::runs(super::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)) {
+    for (calibration, car) in
+        super::calibrated(super::runs(super::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)))
+    {
         let model = CarModel::new(car.clone()).unwrap();
         let (mut count, mut used) = (0, vec![false; car.gearbox.gears.len()]);
         let begin = std::time::Instant::now();
-        let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
+        let summary = simulate_car_drive(&model, &car, calibration, &drive, |sample| {
             count += 1;
             used[sample.gear] = true;
             assert!(sample.vehicle_m_s.is_finite() && sample.torques.engine_rad_s > 60.0, "{}", sample.time_s);
@@ -77,14 +83,19 @@ fn a_car_that_is_braked_on_a_hill_stands() {
 
 #[test]
 fn a_dual_clutch_launches_shifts_up_comes_to_rest_and_launches_again() {
-    let car = super::dual_clutch();
+    for (calibration, car) in super::calibrated([super::dual_clutch()]) {
+        launch_and_stop(calibration, &car);
+    }
+}
+
+fn launch_and_stop(calibration: CarCalibration, car: &Car) {
     let text = "name = \"d\"\nrepetitions = 2\n[[segment]]\nduration_s = 1\nthrottle = 0.0\nbrake = 0.15\n\
                 [[segment]]\nduration_s = 1\nthrottle = 0.0\nbrake = [0.15, 0.0]\n\
                 [[segment]]\nduration_s = 1\nthrottle = [0.0, 0.1]\n\
                 [[segment]]\nduration_s = 24\nthrottle = [0.1, 0.4]\n\
                 [[segment]]\nduration_s = 1\nthrottle = [0.4, 0.0]\n\
                 [[segment]]\nduration_s = 19\nthrottle = 0.0\nbrake = [0.0, 0.3]\n";
-    let driven = samples(&car, &drive(text)).unwrap();
+    let driven = samples_with(calibration, car, &drive(text)).unwrap();
     let minimum = driven.iter().map(|sample| sample.torques.engine_rad_s).fold(f64::INFINITY, f64::min);
     let jerk = driven.windows(2).map(|pair| (pair[1].vehicle_m_s2 - pair[0].vehicle_m_s2).abs() / 0.01);
     let jerk = jerk

@@ -3,7 +3,7 @@
 use car::Car;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, Driver};
 
-use super::{HeldGear, cars, with_stroke};
+use super::{HeldGear, calibrated, cars, with_stroke};
 
 const STANDING: Driver = Driver { throttle: 0.0, brake: 0.6, grade_rad: 0.0 };
 
@@ -49,12 +49,12 @@ impl Engaged {
 fn a_gear_is_engaged_from_neutral_and_from_the_other_direction() {
     let (mut longest, mut overshoot, mut jolt) = (0.0_f64, 0.0_f64, [0.0_f64; 2]);
     let automatics = || cars().into_iter().take(4).chain([super::one_way()]);
-    for car in automatics().chain(automatics().map(with_stroke)) {
+    for (calibration, car) in calibrated(automatics().chain(automatics().map(with_stroke))) {
         let model = CarModel::new(car.clone()).unwrap();
         let (first, reverse) = (car.gearbox.gear("1").unwrap(), car.gearbox.gear("R").unwrap());
         let state = model.in_gear(first, None, 0.0, 0.0).unwrap();
         let start = (STANDING, 0.01);
-        let mut run = CarRun::new(&model, &car, CarCalibration::STANDARD, first, state, start).unwrap();
+        let mut run = CarRun::new(&model, &car, calibration, first, state, start).unwrap();
         run.request_neutral().unwrap();
         let neutral = Engaged::after(&car, &mut run, 3.0);
         let last = neutral.samples.last().unwrap();

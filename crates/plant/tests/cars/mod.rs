@@ -57,6 +57,14 @@ fn with_stroke(mut car: Car) -> Car {
     car
 }
 
+/// Both calibrations of the shift controller.
+const CALIBRATIONS: [CarCalibration; 2] = [CarCalibration::STANDARD, CarCalibration::COMFORT];
+
+/// Each of these with both calibrations.
+fn calibrated<T: Clone>(all: impl IntoIterator<Item = T>) -> impl Iterator<Item = (CarCalibration, T)> {
+    all.into_iter().flat_map(|one| CALIBRATIONS.map(|calibration| (calibration, one.clone())))
+}
+
 /// Of many runs all in an optimised build, every fifth one in a debug build, which is too slow for them.
 fn runs<T>(all: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
     all.into_iter().step_by(if cfg!(debug_assertions) { 5 } else { 1 })
@@ -68,6 +76,8 @@ fn runs<T>(all: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
 struct HeldGear {
     /// Pressures at which the valves settled in the sample before, Pa.
     before_pa: Option<Vec<f64>>,
+    /// Whether the clutch of a car without a converter was opened, until it is closed again.
+    is_opened: bool,
 }
 
 impl HeldGear {
@@ -83,7 +93,11 @@ impl HeldGear {
         let gear = &car.gearbox.gears[sample.gear];
         let input_rad_s = gear.ratio * car.driveline.final_ratio * sample.wheel_rad_s;
         // The gearbox output swings about the speed of the wheels by a few per cent.
-        let may_open = car.converter.is_none() && input_rad_s < 1.1 * CarCalibration::STANDARD.launch_open_rad_s;
+        let opens_rad_s = CarCalibration::STANDARD.launch_open_rad_s;
+        self.is_opened |= gear.ratio * sample.torques.output_rad_s < opens_rad_s;
+        let may_open = car.converter.is_none() && (self.is_opened || input_rad_s < 1.1 * opens_rad_s);
+        let is_closed = |holding: &geartrain::Holding| settled_pa[holding.element] > 0.999 * car.line_pressure_pa;
+        self.is_opened &= !gear.holding.iter().any(is_closed);
         for (at, element) in car.gearbox.elements.iter().enumerate() {
             let holds = gear.holding.iter().any(|holding| holding.element == at);
             if car.clutches[at].is_none() || (holds && may_open) {

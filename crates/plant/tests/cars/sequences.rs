@@ -3,13 +3,15 @@
 use car::Car;
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 
-use super::{HeldGear, cars, neighbours, runs, with_stroke};
+use super::{HeldGear, calibrated, cars, neighbours, runs, with_stroke};
 
 /// Time of the request, s.
 const REQUEST_S: f64 = 1.0;
 /// Speed of the gearbox input in the lower gear of [`CarShift::usual`], and the minimum in the higher one, rad/s.
 const INPUT_RAD_S: f64 = 230.0;
 const MIN_INPUT_RAD_S: f64 = 120.0;
+/// The same where the car coasts before it is driven, rad/s.
+const COASTING_INPUT_RAD_S: f64 = 160.0;
 /// Time in which the driver moves the pedal, s.
 const PEDAL_S: f64 = 0.15;
 
@@ -25,12 +27,17 @@ struct Run {
 
 /// Simulates the shift, where `asked` says which gear is wanted at a time after the request, and `throttle` how far the pedal
 /// is pressed.
-fn run(model: &CarModel, shift: &CarShift, asked: impl Fn(f64) -> usize, throttle: impl Fn(f64) -> f64) -> Run {
+fn run(
+    (model, calibration): (&CarModel, CarCalibration),
+    shift: &CarShift,
+    asked: impl Fn(f64) -> usize,
+    throttle: impl Fn(f64) -> f64,
+) -> Run {
     let car = &model.car;
     let driver = |time_s: f64| Driver { throttle: throttle(time_s - REQUEST_S), brake: 0.0, grade_rad: 0.0 };
     let state = model.in_gear(shift.from, Some(shift.to), shift.vehicle_m_s, shift.throttle).unwrap();
     let start = (driver(0.0), 0.01);
-    let mut run = CarRun::new(model, car, CarCalibration::STANDARD, shift.from, state, start).unwrap();
+    let mut run = CarRun::new(model, car, calibration, shift.from, state, start).unwrap();
     run.preselect(Some(shift.to));
     let ratios = [shift.from, shift.to].map(|gear| car.gearbox.gears[gear].ratio);
     let (low, high) = (ratios[0].min(ratios[1]), ratios[0].max(ratios[1]));
@@ -104,6 +111,12 @@ impl Worst {
     }
 }
 
+/// Speed of the gearbox input in the higher of two gears at the usual speed of a shift, rad/s.
+fn slowest_rad_s(car: &Car, (from, to): (usize, usize)) -> f64 {
+    let ratios = [from, to].map(|gear| car.gearbox.gears[gear].ratio);
+    INPUT_RAD_S * ratios[0].min(ratios[1]) / ratios[0].max(ratios[1])
+}
+
 /// Every forward gear to those two and three further on, in both directions.
 fn skips(car: &Car) -> Vec<(usize, usize)> {
     let forward = car.gearbox.forward_gears();
@@ -119,18 +132,16 @@ fn label(car: &Car, (from, to): (usize, usize), more: &str) -> String {
 #[test]
 fn skip_shifts_run_through_gears_between_and_end_well() {
     let mut worst = Worst::default();
-    for car in cars().into_iter().chain(cars().into_iter().map(with_stroke)) {
+    for (calibration, car) in calibrated(cars().into_iter().chain(cars().into_iter().map(with_stroke))) {
         let model = CarModel::new(car).unwrap();
         for pair in runs(skips(&model.car)) {
             for throttle in [0.0, 0.2, 0.5] {
                 let mut shift = CarShift::usual(&model.car, pair.0, pair.1, throttle);
                 // Without a converter fast enough for the engine in both gears.
-                let ratio = |gear: usize| model.car.gearbox.gears[gear].ratio;
-                let slowest_rad_s = INPUT_RAD_S * ratio(pair.0).min(ratio(pair.1)) / ratio(pair.0).max(ratio(pair.1));
                 if model.car.converter.is_none() {
-                    shift.vehicle_m_s *= (MIN_INPUT_RAD_S / slowest_rad_s).max(1.0);
+                    shift.vehicle_m_s *= (MIN_INPUT_RAD_S / slowest_rad_s(&model.car, pair)).max(1.0);
                 }
-                let run = run(&model, &shift, |_| pair.1, |_| throttle);
+                let run = run((&model, calibration), &shift, |_| pair.1, |_| throttle);
                 worst.push(&label(&model.car, pair, &format!("throttle {throttle}")), &run);
             }
         }
@@ -143,14 +154,14 @@ fn skip_shifts_run_through_gears_between_and_end_well() {
 fn a_request_that_is_withdrawn_ends_in_the_old_gear() {
     for (title, with) in [("withdrawn", None), ("withdrawn, with stroke", Some(with_stroke as fn(Car) -> Car))] {
         let mut worst = Worst::default();
-        for car in cars() {
+        for (calibration, car) in calibrated(cars()) {
             let model = CarModel::new(with.map_or(car.clone(), |with| with(car))).unwrap();
             for pair in runs(neighbours(&model.car)) {
                 for throttle in [0.0, 0.25] {
                     for after_s in [0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.7] {
                         let shift = CarShift::usual(&model.car, pair.0, pair.1, throttle);
                         let asked = |time_s: f64| if time_s < after_s { pair.1 } else { pair.0 };
-                        let run = run(&model, &shift, asked, |_| throttle);
+                        let run = run((&model, calibration), &shift, asked, |_| throttle);
                         let more = format!("throttle {throttle}, after {after_s} s");
                         worst.push(&label(&model.car, pair, &more), &run);
                     }
@@ -165,7 +176,7 @@ fn a_request_that_is_withdrawn_ends_in_the_old_gear() {
 /// It goes back to line pressure from where it is, and not from the pressure at which a clutch closes.
 #[test]
 fn a_request_that_is_withdrawn_in_the_fill_lets_no_command_of_the_old_gear_drop() {
-    for car in cars() {
+    for (calibration, car) in calibrated(cars()) {
         let model = CarModel::new(car).unwrap();
         let line_pa = model.car.line_pressure_pa;
         for (from, to) in runs(neighbours(&model.car)) {
@@ -173,8 +184,7 @@ fn a_request_that_is_withdrawn_in_the_fill_lets_no_command_of_the_old_gear_drop(
                 let shift = CarShift::usual(&model.car, from, to, throttle);
                 let driver = Driver { throttle, brake: 0.0, grade_rad: 0.0 };
                 let state = model.in_gear(from, Some(to), shift.vehicle_m_s, throttle).unwrap();
-                let nominal = CarCalibration::STANDARD;
-                let mut run = CarRun::new(&model, &model.car, nominal, from, state, (driver, 0.01)).unwrap();
+                let mut run = CarRun::new(&model, &model.car, calibration, from, state, (driver, 0.01)).unwrap();
                 // Pressures at which the valves of the old gear's elements settle, Pa.
                 let mut before: Option<Vec<f64>> = None;
                 while run.time_s() < REQUEST_S + after_s + 0.4 {
@@ -211,15 +221,19 @@ fn a_change_of_throttle_in_mid_shift_ends_well() {
         [("throttle moved", None), ("throttle moved, with stroke", Some(with_stroke as fn(Car) -> Car))]
     {
         let mut worst = Worst::default();
-        for car in cars() {
+        for (calibration, car) in calibrated(cars()) {
             let model = CarModel::new(with.map_or(car.clone(), |with| with(car))).unwrap();
             for pair in runs(neighbours(&model.car)) {
                 for [before, after] in [[0.0, 0.25], [0.25, 0.0]] {
                     for after_s in [0.1, 0.3, 0.45, 0.6] {
-                        let shift = CarShift::usual(&model.car, pair.0, pair.1, before);
+                        let mut shift = CarShift::usual(&model.car, pair.0, pair.1, before);
+                        if model.car.converter.is_none() {
+                            // The car coasts for 1.6 s before the pedal moves: its clutch is not to open.
+                            shift.vehicle_m_s *= (COASTING_INPUT_RAD_S / slowest_rad_s(&model.car, pair)).max(1.0);
+                        }
                         let pedal =
                             |time_s: f64| before + (after - before) * ((time_s - after_s) / PEDAL_S).clamp(0.0, 1.0);
-                        let run = run(&model, &shift, |_| pair.1, pedal);
+                        let run = run((&model, calibration), &shift, |_| pair.1, pedal);
                         let more = format!("throttle {before} to {after} after {after_s} s");
                         worst.push(&label(&model.car, pair, &more), &run);
                     }

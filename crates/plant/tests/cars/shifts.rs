@@ -4,7 +4,7 @@ use car::Car;
 use config::Source;
 use plant::car::{CarCalibration, CarModel, CarShift, CarShiftQuality, simulate_car_shift};
 
-use super::{HeldGear, cars, neighbours, runs};
+use super::{HeldGear, calibrated, cars, neighbours, runs};
 
 /// Without power, and from little to much.
 const THROTTLES: [f64; 5] = [0.0, 0.1, 0.2, 0.4, 0.7];
@@ -27,15 +27,17 @@ fn numbers(q: &CarShiftQuality) -> Limits {
 fn each_shift(title: &str, cars: Vec<Car>, friction: f64, limits: Limits) {
     let mut worst: [(f64, String); NUMBERS.len()] = std::array::from_fn(|_| (0.0, String::new()));
     let (mut shifts, mut beyond) = (0, Vec::new());
-    for nominal in cars {
+    for (calibration, nominal) in calibrated(cars) {
         let model = CarModel::new(nominal.clone().with_friction(friction)).unwrap();
         for (from, to) in runs(neighbours(&nominal)) {
             for throttle in THROTTLES {
                 let shift = CarShift::usual(&nominal, from, to, throttle);
                 let name = |gear: usize| nominal.gearbox.gears[gear].name.as_str();
-                let label = format!("{} {}-{}, throttle {throttle}", nominal.gearbox.name, name(from), name(to));
+                let more = if calibration == CarCalibration::COMFORT { ", comfort" } else { "" };
+                let (from_name, to_name) = (name(from), name(to));
+                let label = format!("{} {from_name}-{to_name}, throttle {throttle}{more}", nominal.gearbox.name);
                 let mut held = HeldGear::default();
-                let quality = simulate_car_shift(&model, &nominal, CarCalibration::STANDARD, &shift, |sample| {
+                let quality = simulate_car_shift(&model, &nominal, calibration, &shift, |sample| {
                     held.check(&nominal, sample, &label);
                 });
                 let quality = quality.unwrap_or_else(|error| panic!("{label}: {error}"));
@@ -104,10 +106,10 @@ fn pulse_width_valves_shift_too() {
          delay = { duty_percent = [0.0, 100.0], delay_s = [0.01, 0.01] }\n"
     );
     let model = CarModel::new(car).unwrap();
-    for (from, to) in neighbours(&model.car) {
+    for (calibration, (from, to)) in calibrated(neighbours(&model.car)) {
         for throttle in [0.0, 0.2] {
             let shift = CarShift::usual(&model.car, from, to, throttle);
-            let quality = simulate_car_shift(&model, &model.car, CarCalibration::STANDARD, &shift, |_| {}).unwrap();
+            let quality = simulate_car_shift(&model, &model.car, calibration, &shift, |_| {}).unwrap();
             assert!(quality.complete_s.is_some_and(|time_s| time_s < 2.0), "{from}-{to} {throttle}: {quality:?}");
             assert!(quality.flare_rad_s < 15.0, "{from}-{to} {throttle}: {quality:?}");
         }

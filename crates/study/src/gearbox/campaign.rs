@@ -209,7 +209,7 @@ impl CarCampaign {
         let mut sensed = SensedDrive::new(known, sensors, SAMPLE_S);
         let drive = Drive { sample_time_s: sensed.record_s(), ..drive.clone() };
         let mut scorer = DriveScorer::new(known, &model, &tables, &filter);
-        simulate_car_drive(&model, known, CarCalibration::STANDARD, &drive, |sample| {
+        simulate_car_drive(&model, known, CarCalibration::of(drive.controller), &drive, |sample| {
             sensed.each(sample, |row| scorer.push(&row.sample, &row.input(known, &tables)));
         })?;
         sensed.last(|row| scorer.push(&row.sample, &row.input(known, &tables)));

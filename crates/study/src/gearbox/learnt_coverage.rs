@@ -318,6 +318,6 @@ fn record(known: &Car, sampled: &SampledCar, drive: &Drive) -> Result<Recording,
     let drive = Drive { sample_time_s: RECORD_S, ..drive.clone() };
     let model = CarModel::new(sampled.car.clone())?;
     let mut recording = Recording::default();
-    simulate_car_drive(&model, known, CarCalibration::STANDARD, &drive, |sample| recording.push(sample))?;
+    simulate_car_drive(&model, known, CarCalibration::of(drive.controller), &drive, |sample| recording.push(sample))?;
     Ok(recording)
 }

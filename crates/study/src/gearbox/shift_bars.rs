@@ -13,6 +13,9 @@ const SAMPLE_S: f64 = 0.005;
 const UP_THROTTLE: f64 = 0.3;
 const DOWN_THROTTLE: f64 = 0.5;
 
+/// The gearbox input turns at least so fast in the higher gear, rad/s: no engine is brought below its idle speed.
+const SLOWEST_RAD_S: f64 = 150.0;
+
 /// A shift as it went and as it felt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Felt {
@@ -97,8 +100,12 @@ pub fn drive(
     kind: ShiftKind,
     [from, to]: [usize; 2],
 ) -> Result<Felt, CarError> {
-    let shift = CarShift { sample_time_s: SAMPLE_S, ..CarShift::usual(nominal, from, to, throttle(kind)) };
     let ratios = [from, to].map(|gear| nominal.gearbox.gears[gear].ratio);
+    let usual = CarShift::usual(nominal, from, to, throttle(kind));
+    let higher_rad_s =
+        ratios[0].min(ratios[1]) * usual.vehicle_m_s / nominal.road.wheel_radius_m * nominal.driveline.final_ratio;
+    let vehicle_m_s = usual.vehicle_m_s * (SLOWEST_RAD_S / higher_rad_s).max(1.0);
+    let shift = CarShift { vehicle_m_s, sample_time_s: SAMPLE_S, ..usual };
     let mut samples = Vec::new();
     let quality = simulate_car_shift(model, nominal, calibration, &shift, |sample| {
         let (turbine, output) = (sample.torques.turbine_rad_s, sample.torques.output_rad_s);

@@ -21,6 +21,7 @@ mod one_way;
 mod ratios;
 mod ratios_alone;
 mod sensitivity;
+mod shift_bars;
 mod strokes;
 mod valve_timing;
 mod wheel;

@@ -1,6 +1,8 @@
 //! Numbers of the shift controller.
 
-use car::FastFill;
+use car::{ControllerCalibration, FastFill};
+
+use super::target::{SlipCurve, SlipTarget, SlipTargets};
 
 /// Calibration of the shift controller: one set for all gearboxes and all kinds of shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,6 +11,9 @@ pub struct CarCalibration {
     pub control_period_s: f64,
     /// Time to bring the oncoming clutch to its kiss point and the offgoing one to what it must hold, s.
     pub fill_s: f64,
+    /// The offgoing clutch goes to what it must hold in this time, s, if that is shorter than the fill and the inertia phase comes first: the
+    /// oncoming clutch is needed at its end only.
+    pub lowering_s: f64,
     /// The fill of a clutch whose piston has a stroke.
     pub fast_fill: FastFill,
     /// Most torque that such a clutch is to carry at the end of its fill, N m at the turbine.
@@ -35,17 +40,14 @@ pub struct CarCalibration {
     pub sign_n_m: f64,
     /// Time in which the offgoing clutch gives up the turbine torque, until the old gear slips (inertia phase first), s.
     pub release_s: f64,
+    /// The slip is seen so long after the command of the torque at which the old gear slips, s.
+    pub release_seen_s: f64,
     /// Slip of the old gear at which it is left, rad/s at the turbine.
     pub release_slip_rad_s: f64,
-    /// Duration of the inertia phase at 120 rad/s of slip where the turbine torque drives the change and the oncoming clutch
-    /// controls it, s.
-    pub inertia_phase_s: f64,
-    /// The same of power-on downshifts, s.
-    pub power_on_down_s: f64,
-    /// The same of power-off upshifts, s.
-    pub power_off_up_s: f64,
-    /// The same from neutral to a gear at rest.
-    pub from_neutral_s: f64,
+    /// Targets of the slip in the inertia phase.
+    pub targets: SlipTargets,
+    /// Whether the inertia of an engine without a converter counts in the slip controller; else its feedback makes up for it.
+    pub counts_engine: bool,
     /// Time in neutral between the directions, s: the turbine comes up.
     pub neutral_s: f64,
     /// The reference of the slip ends this far past zero, rad/s.
@@ -119,11 +121,23 @@ pub struct CarCalibration {
     pub pressure_lead_pa: f64,
 }
 
+/// The curve of comfortable shifts.
+const SOFT: SlipCurve = SlipCurve::Trapezoid { rise: 0.2, fall: 0.3 };
+
 impl CarCalibration {
+    /// The numbers of a calibration.
+    pub fn of(calibration: ControllerCalibration) -> Self {
+        match calibration {
+            ControllerCalibration::Bench => Self::STANDARD,
+            ControllerCalibration::Comfort => Self::COMFORT,
+        }
+    }
+
     /// Numbers that give a good shift in every gearbox that ships with the program.
     pub const STANDARD: Self = Self {
         control_period_s: 0.01,
         fill_s: 0.20,
+        lowering_s: f64::INFINITY,
         fast_fill: FastFill { hold_s: 0.14, ..FastFill::STANDARD },
         filled_n_m: 6.0,
         below_kiss_pa: 4e3,
@@ -137,11 +151,16 @@ impl CarCalibration {
         flare_holding: 0.5,
         sign_n_m: 5.0,
         release_s: 0.5,
+        release_seen_s: 0.0,
         release_slip_rad_s: 3.0,
-        inertia_phase_s: 0.40,
-        power_on_down_s: 0.72,
-        power_off_up_s: 0.70,
-        from_neutral_s: 0.8,
+        targets: SlipTargets {
+            power_on_up: SlipTarget::lasting(0.40, SlipCurve::HalfCosine),
+            power_off_up: SlipTarget::lasting(0.70, SlipCurve::HalfCosine),
+            power_on_down: SlipTarget::lasting(0.72, SlipCurve::HalfCosine),
+            coast_down: SlipTarget::lasting(0.40, SlipCurve::HalfCosine),
+            from_neutral: SlipTarget::lasting(0.8, SlipCurve::HalfCosine),
+        },
+        counts_engine: false,
         neutral_s: 0.7,
         past_synchronous_rad_s: 2.5,
         proportional_per_s: 9.0,
@@ -177,5 +196,49 @@ impl CarCalibration {
         output_filter_s: 0.04,
         pressure_follow_s: 0.02,
         pressure_lead_pa: 0.3e6,
+    };
+
+    /// Numbers for comfort: the torque for the change of speed is limited to what the occupants accept, and the engine takes part of it.
+    pub const COMFORT: Self = Self {
+        targets: SlipTargets {
+            power_on_up: SlipTarget {
+                within_s: [0.35, 0.70],
+                engine: 0.35,
+                ..SlipTarget::lasting(0.45, SlipCurve::Trapezoid { rise: 0.35, fall: 0.3 })
+            },
+            power_off_up: SlipTarget {
+                curve: SOFT,
+                duration_s: 0.6,
+                within_s: [0.35, 0.65],
+                inertia_fraction: 0.0,
+                inertia_m_s2: 0.35,
+                engine: 0.0,
+            },
+            power_on_down: SlipTarget {
+                curve: SOFT,
+                duration_s: 0.6,
+                within_s: [0.45, 0.90],
+                inertia_fraction: 0.4,
+                inertia_m_s2: 0.2,
+                engine: 0.5,
+            },
+            coast_down: SlipTarget {
+                curve: SOFT,
+                duration_s: 0.6,
+                within_s: [0.55, 0.70],
+                inertia_fraction: 0.0,
+                inertia_m_s2: 0.2,
+                engine: 0.6,
+            },
+            from_neutral: SlipTarget::lasting(0.9, SOFT),
+        },
+        counts_engine: true,
+        lowering_s: 0.1,
+        release_seen_s: 0.06,
+        down_engine_fraction: 1.0,
+        hand_over_s: 0.16,
+        lock_ramp_s: 0.10,
+        hand_over_lead_s: 0.04,
+        ..Self::STANDARD
     };
 }

@@ -21,6 +21,7 @@ mod lock_up;
 mod pressure;
 mod shift;
 mod strokes;
+mod target;
 mod track;
 
 use std::collections::VecDeque;
@@ -36,9 +37,10 @@ use engine::EngineControl;
 use launch::Launch;
 use lock_up::LockUpControl;
 use pressure::Controlled;
-use shift::ActiveShift;
 pub use shift::ShiftStage;
+use shift::{ActiveShift, ShiftVehicle};
 use strokes::Strokes;
+pub use target::{SlipCurve, SlipTarget, SlipTargets};
 use track::Track;
 
 /// Offgoing and oncoming clutch of a shift, with their places among the elements, and the reduced shift. One of them may be a
@@ -75,6 +77,8 @@ pub struct CarCommands {
     pub dogs: [bool; MAX_ELEMENTS],
     /// Fraction of the engine torque that the driver asks for.
     pub engine_share: f64,
+    /// Throttle that the engine has at least, 0 to 1: a shift may need more torque than the driver asks for.
+    pub engine_throttle: f64,
     /// Torque that the lock-up clutch is to hold, N m.
     pub lock_up_n_m: f64,
 }
@@ -354,7 +358,16 @@ impl CarShiftController {
         let offgoing = Controlled::new(offgoing, off, reduced.slip_offgoing, line_pa);
         let on = Controlled::new(oncoming, on, reduced.slip_oncoming, 0.0);
         let oncoming = on.filled_from(self.strokes.of(oncoming), &self.calibration);
-        Some(ActiveShift::new(to, [offgoing, oncoming], reduced.mass_kg_m2, line_pa, time_s))
+        let shift = ActiveShift::new(to, [offgoing, oncoming], reduced.mass_kg_m2, line_pa, time_s);
+        let (car, road) = (&self.car, &self.car.road);
+        let engine_kg_m2 = car.engine.inertia_kg_m2;
+        let is_behind_converter = car.converter.is_some();
+        let is_counted = !is_behind_converter && self.calibration.counts_engine;
+        Some(shift.in_vehicle(ShiftVehicle {
+            output_n_m_per_m_s2: road.mass_kg * road.wheel_radius_m / car.driveline.final_ratio,
+            engine_kg_m2: if is_behind_converter { engine_kg_m2 } else { 0.0 },
+            engine_at_turbine_kg_m2: if is_counted { engine_kg_m2 } else { 0.0 },
+        }))
     }
 
     /// Commands for the period that begins at `time_s`.
@@ -366,8 +379,8 @@ impl CarShiftController {
         }
         let period_s = self.calibration.control_period_s;
         self.output.follow(measured.wheel_rad_s * self.car.driveline.final_ratio, period_s);
-        let stage_fraction = self.active.as_ref().map(ActiveShift::engine_share);
-        let engine_share = self.engine.step((&self.car, &self.calibration), throttle, stage_fraction, measured);
+        let request = self.active.as_ref().map(ActiveShift::engine);
+        let engine = self.engine.step((&self.car, &self.calibration), throttle, request, measured);
         let turbine_n_m = self.engine.turbine_n_m(&self.car, measured);
         let (mut elements, dogs) = self.held();
         let line_pa = self.car.line_pressure_pa;
@@ -388,7 +401,7 @@ impl CarShiftController {
             for (clutch, pressure_pa) in [&shift.offgoing, &shift.oncoming].into_iter().zip(pressures) {
                 elements[clutch.element] = clutch.valve_command(pressure_pa.clamp(0.0, line_pa));
             }
-            shift.choose_engine_fraction(&self.calibration, turbine_n_m, measured);
+            shift.choose_engine(&self.calibration, turbine_n_m, measured);
             if shift.stage == ShiftStage::Done {
                 self.gear = shift.to;
                 self.active = None;
@@ -399,7 +412,7 @@ impl CarShiftController {
         let in_gear = self.active.is_none().then_some(self.gear).filter(|_| !self.is_neutral);
         let lock_up_n_m = self.lock_up.torque_n_m((&self.car, &self.calibration), in_gear, engine_n_m, measured);
         self.strokes.follow(&self.car, &elements, period_s);
-        CarCommands { elements, dogs, engine_share, lock_up_n_m }
+        CarCommands { elements, dogs, engine_share: engine.fraction, engine_throttle: engine.throttle, lock_up_n_m }
     }
 
     /// Commands of the elements that the gear holds, and the dogs that are in; the clutches of a shift are open.

@@ -1,8 +1,12 @@
 //! One shift: its stages and the pressures of both clutches.
 
+mod slip;
+
 use drivetrain::{PhaseOrder, Real};
 
+use super::engine::EngineRequest;
 use super::pressure::Controlled;
+use super::target::{SlipCurve, SlipTarget};
 use super::track::Track;
 use super::{CarCalibration, CarMeasured};
 
@@ -29,6 +33,17 @@ pub enum ShiftStage {
     Done,
 }
 
+/// What a shift knows of the vehicle around the gearbox.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct ShiftVehicle {
+    /// Torque at the gearbox output for an acceleration by 1 m/s^2, N m.
+    pub(super) output_n_m_per_m_s2: f64,
+    /// Inertia of an engine that follows the turbine through a converter, kg m^2.
+    pub(super) engine_kg_m2: f64,
+    /// Inertia of an engine without converter as far as the slip controller counts it, kg m^2.
+    pub(super) engine_at_turbine_kg_m2: f64,
+}
+
 /// A shift that is under way.
 #[derive(Debug, Clone)]
 pub(super) struct ActiveShift {
@@ -47,12 +62,17 @@ pub(super) struct ActiveShift {
     begun_s: f64,
     since_s: f64,
     is_filled_by_plan: bool,
+    /// Whether the inertia phase comes first, so that the offgoing clutch is lowered before the oncoming one is filled.
+    lowers_first: bool,
     /// Fraction of the load that the oncoming clutch has taken in the torque phase.
     transferred: f64,
     has_flared: bool,
     /// Size of the torque that the offgoing clutch is to hold, N m at the turbine.
     held_n_m: f64,
     is_slipping: bool,
+    vehicle: ShiftVehicle,
+    /// Target of the inertia phase.
+    target: SlipTarget,
     /// Oncoming slip at the start of the inertia phase, and its duration.
     from_rad_s: f64,
     duration_s: f64,
@@ -67,7 +87,9 @@ pub(super) struct ActiveShift {
     handed_n_m: f64,
     /// Offgoing and oncoming slip one period before, with the output speed of the wheels, rad/s.
     slips_before_rad_s: Option<[f64; 2]>,
-    engine_share: f64,
+    engine: EngineRequest,
+    /// Rate of the reference of the slip when the clutches answer, rad/s^2.
+    reference_rad_s2: f64,
 }
 
 /// What a step of the controller looks at.
@@ -107,10 +129,13 @@ impl ActiveShift {
             begun_s: time_s,
             since_s: time_s,
             is_filled_by_plan: false,
+            lowers_first: false,
             transferred: 0.0,
             has_flared: false,
             held_n_m: 0.0,
             is_slipping: false,
+            vehicle: ShiftVehicle::default(),
+            target: SlipTarget::lasting(1.0, SlipCurve::HalfCosine),
             from_rad_s: 0.0,
             duration_s: 1.0,
             slipping_since_s: time_s,
@@ -120,7 +145,8 @@ impl ActiveShift {
             locked_since_s: None,
             handed_n_m: 0.0,
             slips_before_rad_s: None,
-            engine_share: 1.0,
+            engine: EngineRequest { fraction: 1.0, added_n_m: 0.0 },
+            reference_rad_s2: 0.0,
         }
     }
 
@@ -128,6 +154,11 @@ impl ActiveShift {
     /// the time `neutral_s`.
     pub(super) fn out_of_neutral(self, neutral_s: f64) -> Self {
         Self { is_from_neutral: true, neutral_s, direction: 1.0, ..self }
+    }
+
+    /// The same in this vehicle.
+    pub(super) fn in_vehicle(self, vehicle: ShiftVehicle) -> Self {
+        Self { vehicle, ..self }
     }
 
     /// Whether it begins in neutral.
@@ -142,7 +173,7 @@ impl ActiveShift {
             return None;
         }
         let clutches = [self.oncoming.clone(), self.offgoing.clone()];
-        let mut back = Self::new(from, clutches, self.mass_kg_m2, self.line_pa, time_s);
+        let mut back = Self::new(from, clutches, self.mass_kg_m2, self.line_pa, time_s).in_vehicle(self.vehicle);
         match self.stage {
             // The turbine has fallen behind the one-way clutch: the next step begins its inertia phase.
             ShiftStage::TorquePhase if self.oncoming.is_one_way() => back.since_s = f64::NEG_INFINITY,
@@ -161,7 +192,8 @@ impl ActiveShift {
             ShiftStage::Fill => {
                 // The clutch that was to open goes back to line pressure from where it is.
                 back.stage = ShiftStage::Lock;
-                let opened = ((time_s - self.since_s) / self.fill_s(c)).clamp(0.0, 1.0);
+                let lowering_s = if self.lowers_first { self.lowering_s(c) } else { self.fill_s(c) };
+                let opened = ((time_s - self.since_s) / lowering_s).clamp(0.0, 1.0);
                 back.since_s = time_s - (1.0 - opened) * c.lock_ramp_s;
             }
             ShiftStage::InertiaPhase => back.stage = ShiftStage::Lock,
@@ -230,13 +262,16 @@ impl ActiveShift {
             ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) && self.is_free(c, now) => {
                 ShiftStage::InertiaPhase
             }
-            ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) => match self.order(now.turbine_n_m) {
-                PhaseOrder::TorqueFirst => ShiftStage::TorquePhase,
-                PhaseOrder::InertiaFirst => ShiftStage::InertiaPhase,
+            ShiftStage::Fill => match self.order(now.turbine_n_m) {
+                PhaseOrder::TorqueFirst if passed(self.since_s, self.fill_s(c)) => ShiftStage::TorquePhase,
+                PhaseOrder::InertiaFirst if passed(self.since_s, self.lowering_s(c)) => ShiftStage::InertiaPhase,
+                _ => ShiftStage::Fill,
             },
             // The turbine torque has changed its sign: the other clutch will control the inertia phase.
             ShiftStage::TorquePhase if now.turbine_n_m * direction < -c.sign_n_m => ShiftStage::InertiaPhase,
-            ShiftStage::InertiaPhase if !self.is_slipping && now.turbine_n_m * direction > c.sign_n_m => {
+            ShiftStage::InertiaPhase
+                if !self.is_slipping && self.is_filled(c, now) && now.turbine_n_m * direction > c.sign_n_m =>
+            {
                 ShiftStage::TorquePhase
             }
             ShiftStage::TorquePhase if now.y * direction < -c.release_slip_rad_s => ShiftStage::InertiaPhase,
@@ -283,41 +318,6 @@ impl ActiveShift {
         self.is_from_neutral || (self.offgoing.is_one_way() && now.y < -c.release_slip_rad_s)
     }
 
-    /// The old gear slips: from now on the slip follows its reference.
-    fn begin_slip(&mut self, c: &CarCalibration, now: &Now) {
-        self.is_slipping = true;
-        self.from_rad_s = now.z_wheels;
-        self.slipping_since_s = now.time_s;
-        let at_full = match (self.order(now.turbine_n_m), self.direction > 0.0) {
-            _ if self.is_from_neutral => c.from_neutral_s,
-            (PhaseOrder::TorqueFirst, _) => c.inertia_phase_s,
-            (PhaseOrder::InertiaFirst, true) => c.power_off_up_s,
-            (PhaseOrder::InertiaFirst, false) => c.power_on_down_s,
-        };
-        // A slip that still grows, after a change of mind, has further to go: with a cubic reference of the same start, end and
-        // duration by 4/27 of rate and duration.
-        let growth = (self.slip_rate(c, now) * self.from_rad_s.signum()).max(0.0) * 4.0 / 27.0 * at_full;
-        let growth = if self.taken_over_n_m.is_some() { growth } else { 0.0 };
-        self.duration_s = at_full * ((self.from_rad_s.abs() + growth) / 120.0).clamp(0.55, 1.3);
-    }
-
-    /// The same, with this torque of the slip controller, N m at the turbine.
-    fn begin_slip_with(&mut self, c: &CarCalibration, now: &Now, torque_n_m: f64) {
-        self.begin_slip(c, now);
-        let without = self.slip_controlled_n_m(c, now);
-        self.integral_rad = (torque_n_m - without) / (c.integral_per_s2 * self.mass_kg_m2[0][0]);
-    }
-
-    /// Whether the slip reaches zero soon.
-    fn nears(&self, c: &CarCalibration, now: &Now) -> bool {
-        (now.z + c.hand_over_lead_s * self.slip_rate(c, now)) * self.direction <= 0.0
-    }
-
-    /// Rate of the oncoming slip, rad/s^2; zero in the first period.
-    fn slip_rate(&self, c: &CarCalibration, now: &Now) -> f64 {
-        self.slips_before_rad_s.map_or(0.0, |[_, before]| (now.z_wheels - before) / c.control_period_s)
-    }
-
     /// Pressure with which the oncoming clutch waits, Pa: just below its kiss point, or on the plan of its fill and then with
     /// the piston at the end of its stroke.
     fn waiting_pa(&mut self, c: &CarCalibration, now: &Now) -> f64 {
@@ -334,6 +334,17 @@ impl ActiveShift {
         fill_s.max(self.neutral_s)
     }
 
+    /// Time in which the offgoing clutch goes to what it must hold, s.
+    fn lowering_s(&self, c: &CarCalibration) -> f64 {
+        let fill_s = self.fill_s(c);
+        if self.is_from_neutral { fill_s } else { fill_s.min(c.lowering_s) }
+    }
+
+    /// Whether the oncoming clutch is at its kiss point.
+    fn is_filled(&self, c: &CarCalibration, now: &Now) -> bool {
+        now.time_s - self.begun_s >= self.fill_s(c) - 1e-9
+    }
+
     /// Pressure of a clutch that opens into neutral, Pa: its torque goes in the first third of the time.
     fn opening_pa(&self, now: &Now) -> f64 {
         let left = 1.0 - 3.0 * (now.time_s - self.begun_s) / self.neutral_s;
@@ -341,9 +352,12 @@ impl ActiveShift {
     }
 
     fn fill(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let fraction = ((now.time_s - self.since_s + c.control_period_s) / self.fill_s(c)).min(1.0);
+        let elapsed_s = now.time_s - self.since_s + c.control_period_s;
+        let fraction = (elapsed_s / self.fill_s(c)).min(1.0);
+        self.lowers_first |= self.order(now.turbine_n_m) == PhaseOrder::InertiaFirst;
+        let lowered = if self.lowers_first { (elapsed_s / self.lowering_s(c)).min(1.0) } else { fraction };
         let held = self.offgoing.pressure_for(c.holding_margin * self.held_n_m, 0.0);
-        let offgoing_pa = self.line_pa.min(held + (1.0 - fraction) * (self.line_pa - held).max(0.0));
+        let offgoing_pa = self.line_pa.min(held + (1.0 - lowered) * (self.line_pa - held).max(0.0));
         if self.oncoming.fill.is_some() {
             return [offgoing_pa, self.waiting_pa(c, now)];
         }
@@ -366,49 +380,6 @@ impl ActiveShift {
             self.offgoing.pressure_for(held * self.held_n_m, now.y),
             self.oncoming.pressure_for(c.taking_margin * taken * now.turbine_n_m + caught, now.z),
         ]
-    }
-
-    /// The sum of the torques of both clutches that makes the slip follow its reference, N m at the turbine.
-    fn slip_controlled_n_m(&mut self, c: &CarCalibration, now: &Now) -> f64 {
-        let end = -c.past_synchronous_rad_s * self.direction;
-        let elapsed_s = now.time_s - self.slipping_since_s;
-        let (reference, _) = half_cosine(self.from_rad_s, end, elapsed_s, self.duration_s);
-        let (_, rate) = half_cosine(self.from_rad_s, end, elapsed_s + c.lead_s, self.duration_s);
-        let error = now.z_wheels - reference;
-        self.integral_rad += error * c.control_period_s;
-        let [[m11, m12], _] = self.mass_kg_m2;
-        let wanted_rad_s2 = rate + self.oncoming.ratio * now.output_rad_s2;
-        self.controlled_n_m = now.turbine_n_m - m11 * wanted_rad_s2 - m12 * now.output_rad_s2
-            + m11 * (c.proportional_per_s * error + c.integral_per_s2 * self.integral_rad);
-        self.controlled_n_m
-    }
-
-    fn slip_control(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        if !self.is_slipping {
-            // Inertia phase first: the offgoing clutch gives way by and by until the old gear slips.
-            let margin = (c.holding_margin - (now.time_s - self.since_s) / c.release_s).max(0.0);
-            self.controlled_n_m = margin * now.turbine_n_m;
-            if now.y * self.direction < -c.release_slip_rad_s || margin <= 0.0 {
-                // What slipped tells the friction: the controller begins with the torque at which it did.
-                self.begin_slip_with(c, now, self.controlled_n_m);
-            } else {
-                return [self.offgoing.pressure_for(self.controlled_n_m, 0.0), self.waiting_pa(c, now)];
-            }
-        }
-        if let Some(torque_n_m) = self.taken_over_n_m {
-            self.begin_slip_with(c, now, torque_n_m);
-            self.taken_over_n_m = None;
-        }
-        let u = self.slip_controlled_n_m(c, now);
-        if u * self.direction > 0.0 {
-            // Beyond the old gear the offgoing clutch brings the turbine back too.
-            let beyond = (now.y * self.direction - c.release_slip_rad_s).max(0.0);
-            let caught_n_m = c.flare_per_s * self.mass_kg_m2[0][0] * beyond;
-            let offgoing_pa = if beyond > 0.0 { self.offgoing.pressure_for(caught_n_m, now.y) } else { 0.0 };
-            [offgoing_pa, self.oncoming.pressure_for(u, now.z)]
-        } else {
-            [self.offgoing.pressure_for(u, now.y), self.waiting_pa(c, now)]
-        }
     }
 
     /// Torque of the closed oncoming clutch, N m at the turbine.
@@ -437,41 +408,4 @@ impl ActiveShift {
         let fraction = ((now.time_s - self.since_s) / c.lock_ramp_s).min(1.0);
         closing + fraction * (self.line_pa - closing).max(0.0)
     }
-
-    /// Fraction of the engine torque that suits the stage.
-    pub(super) fn engine_share(&self) -> f64 {
-        self.engine_share
-    }
-
-    pub(super) fn choose_engine_fraction(&mut self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) {
-        self.engine_share = self.suitable_engine_fraction(c, turbine_n_m, measured);
-    }
-
-    fn suitable_engine_fraction(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
-        if !self.is_slipping || self.is_from_neutral {
-            return 1.0;
-        }
-        let z = self.oncoming.slip_at_turbine(measured.turbine_rad_s, measured.output_rad_s);
-        let way = 1.0 - z / self.from_rad_s;
-        match self.stage {
-            ShiftStage::InertiaPhase if turbine_n_m > 0.0 && self.direction > 0.0 && way < c.engine_way => {
-                c.up_engine_fraction
-            }
-            ShiftStage::InertiaPhase | ShiftStage::HandOver
-                if turbine_n_m > 0.0 && self.direction < 0.0 && way > c.engine_way =>
-            {
-                c.down_engine_fraction
-            }
-            _ => 1.0,
-        }
-    }
-}
-
-/// Half a cosine between two values: value and rate after `elapsed_s` of `duration_s`.
-fn half_cosine(from: f64, to: f64, elapsed_s: f64, duration_s: f64) -> (f64, f64) {
-    let fraction = (elapsed_s / duration_s).clamp(0.0, 1.0);
-    let angle = std::f64::consts::PI * fraction;
-    let running = if fraction < 1.0 { 1.0 } else { 0.0 };
-    let half = 0.5 * (from - to);
-    (to + half * (1.0 + Real::cos(angle)), -half * std::f64::consts::PI / duration_s * Real::sin(angle) * running)
 }
