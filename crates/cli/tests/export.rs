@@ -19,6 +19,7 @@ fn export_writes_all_files_of_a_car_and_lists_them() {
         "wetclutch_eight_speed_parameters.c",
         "wetclutch_eight_speed_parameters.bin",
         "wetclutch_eight_speed_selftest.c",
+        "wetclutch_eight_speed.a2l",
         "example.c",
         "certificate.md",
         "report.md",
@@ -46,6 +47,8 @@ fn export_names_what_is_wrong_and_writes_nothing() {
     assert!(said.contains("cannot be used with"), "{said}");
     let said = wrong(&[&car(), "--sensors", VEHICLE]);
     assert!(said.contains("[sensors]"), "{said}");
+    let said = wrong(&[&car(), "--check-elf", VEHICLE]);
+    assert!(said.contains("not a program") && said.contains("ELF"), "{said}");
     let files = std::fs::read_dir(&out).map(Iterator::count).unwrap_or(0);
     assert_eq!(files, 0);
 }

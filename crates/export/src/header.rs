@@ -57,6 +57,8 @@ pub(crate) fn of_car(filter: &ExportedFilter, image: &Image) -> String {
          /* The image, as wetclutch_init takes it. */\n\
          #define WETCLUTCH_{macros}_IMAGE ((const uint32_t *)(const void *)&wetclutch_{name}_parameters)\n\
          #define WETCLUTCH_{macros}_IMAGE_BYTES {}u\n\n\
+         /* The estimate that wetclutch_{name}.a2l describes, where a program defines it. */\n\
+         extern wetclutch_estimate wetclutch_{name}_estimate;\n\n\
          /* Runs the observer over a simulated shift in this memory. Returns 0 if every estimate has the right bits; else the step, from 1 on, with\n   \
          a wrong one, -1 if the image is refused, -2 if a value that is not compared one by one is wrong. */\n\
          int32_t wetclutch_{name}_selftest(uint64_t *memory, uint32_t memory_bytes);\n\n\

@@ -1,11 +1,15 @@
-//! A car's observer for a transmission controller, as files: parameters as C and as an image, header, example, self-test, certificate.
+//! A car's observer for a transmission controller, as files: parameters as C and as an image, header, description for calibration tools,
+//! example, self-test, certificate.
 //!
 //! The code is `libwetclutch.a` (`embedded/library`), the same for all cars; what is written here is of one car. Nothing here writes to the
 //! disk: a caller gets names and bytes.
 
+mod a2l;
 mod c_text;
 mod certificate;
+mod elf;
 mod error;
+mod estimate_members;
 mod header;
 mod parameters;
 mod readme;
@@ -18,6 +22,8 @@ use config::CarFile;
 use observer::gearbox::{GearboxTables, MAX_ELEMENTS, ShiftRow};
 use observer::{GearboxFilter, ShiftTables, gearbox_filter};
 
+pub use a2l::{Addresses, a2l};
+pub use elf::addresses;
 pub use error::ExportError;
 pub use parameters::{Entry, Image, Values};
 pub use shift_inputs::{shift_inputs, single};
@@ -29,6 +35,8 @@ pub struct ExportOptions {
     pub shift: Option<String>,
     /// How the speeds are read; without it as usual sensors read them.
     pub sensors: Option<Sensors>,
+    /// A linked program with the parameters: its addresses go into the description for calibration tools.
+    pub program: Option<Vec<u8>>,
 }
 
 /// A file that is to be written.
@@ -133,6 +141,10 @@ fn file_name(file: &CarFile) -> String {
 pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFile>, ExportError> {
     let filter = ExportedFilter::new(file, options)?;
     let image = Image::of(&filter)?;
+    let addresses = match &options.program {
+        Some(program) => addresses(program, &filter, &image)?,
+        None => Addresses::default(),
+    };
     let test = self_test::SelfTest::of(&filter, &image, options.sensors.as_ref())?;
     let name = &filter.name;
     let texts = [
@@ -140,6 +152,7 @@ pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFil
         (format!("wetclutch_{name}.h"), header::of_car(&filter, &image)),
         (format!("wetclutch_{name}_parameters.c"), image.c_source(&filter)),
         (format!("wetclutch_{name}_selftest.c"), test.c_source(&filter)),
+        (format!("wetclutch_{name}.a2l"), a2l(&filter, &image, &addresses)),
         ("example.c".to_owned(), readme::example(name)),
         ("certificate.md".to_owned(), certificate::certificate(&filter)),
         ("report.md".to_owned(), readme::report(&filter, &image, &test)),

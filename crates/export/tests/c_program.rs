@@ -10,10 +10,10 @@ use observer::gearbox::ShiftInput;
 use crate::readings::{car_file, city, filter_of, root, sampled_shifts};
 
 /// A folder that goes away with the test.
-struct Folder(PathBuf);
+pub(crate) struct Folder(pub(crate) PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("wetclutch-export-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
@@ -31,6 +31,11 @@ fn run(command: &mut Command) -> String {
     let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
     assert!(output.status.success(), "{command:?}:\n{}", &text[..text.len().min(1500)]);
     text
+}
+
+/// What a program says in a folder.
+pub(crate) fn run_in(folder: &Path, program: &str, arguments: &[&str]) -> String {
+    run(Command::new(program).args(arguments).current_dir(folder))
 }
 
 /// Builds the library for this machine; a panic that can be reached would let the C programs not link.
@@ -53,7 +58,7 @@ fn compilers() -> Vec<&'static str> {
     ["gcc", "clang", "cc"].into_iter().filter(is_there).take(2).collect()
 }
 
-fn build(folder: &Path, compiler: &str, options: &[&str], main: &str, car: &str) {
+pub(crate) fn build(folder: &Path, compiler: &str, options: &[&str], main: &str, car: &str) {
     let sources = [main.to_owned(), format!("wetclutch_{car}_parameters.c"), format!("wetclutch_{car}_selftest.c")];
     run(Command::new(compiler)
         .args(["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-pedantic", "-Werror"])
@@ -64,7 +69,7 @@ fn build(folder: &Path, compiler: &str, options: &[&str], main: &str, car: &str)
         .current_dir(folder));
 }
 
-fn exported(folder: &Folder, vehicle: &str) {
+pub(crate) fn exported(folder: &Folder, vehicle: &str) {
     for file in export(&car_file(vehicle), &ExportOptions::default()).unwrap() {
         std::fs::write(folder.0.join(file.name), file.bytes).unwrap();
     }

@@ -36,7 +36,9 @@ fn every_vehicle_with_a_gearbox_has_an_image_that_a_controller_takes() {
 #[test]
 fn one_shift_is_a_smaller_image_and_another_shift_is_none() {
     let file = car_file("eight_speed.toml");
-    let of = |shift: &str| ExportedFilter::new(&file, &ExportOptions { shift: Some(shift.to_owned()), sensors: None });
+    let of = |shift: &str| {
+        ExportedFilter::new(&file, &ExportOptions { shift: Some(shift.to_owned()), ..ExportOptions::default() })
+    };
     let one = Image::of(&of("1-2").unwrap()).unwrap();
     assert_eq!(one.header().unwrap().shifts, 1);
     assert!(one.words.len() < Image::of(&filter_of("eight_speed.toml")).unwrap().words.len());
@@ -47,7 +49,7 @@ fn one_shift_is_a_smaller_image_and_another_shift_is_none() {
 #[test]
 fn the_same_car_gives_the_same_bytes() {
     let file = car_file("six_speed.toml");
-    let files = || export(&file, &ExportOptions { shift: Some("2-3".to_owned()), sensors: None }).unwrap();
+    let files = || export(&file, &ExportOptions { shift: Some("2-3".to_owned()), ..ExportOptions::default() }).unwrap();
     let first = files();
     assert_eq!(first, files());
     let names: Vec<&str> = first.iter().map(|file| file.name.as_str()).collect();

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod a2l;
 mod c_program;
 mod image;
 mod readings;

@@ -283,6 +283,7 @@ pub(crate) enum Command {
     ///   wetclutch_CAR.h                 places of elements and gears, memory, the parameters as a struct
     ///   wetclutch_CAR_parameters.c      the parameters as a constant
     ///   wetclutch_CAR_parameters.bin    the same bytes as an image, with version, size and checksum
+    ///   wetclutch_CAR.a2l               parameters and estimate for calibration tools (ASAP2 1.61)
     ///   wetclutch_CAR_selftest.c        a simulated shift and its estimates to the last bit
     ///   example.c, README.md            the observer in a task, and how it is built
     ///   certificate.md, report.md       what the ranges assume; sizes
@@ -291,6 +292,7 @@ pub(crate) enum Command {
     ///
     ///   wetclutch export vehicles/eight_speed.toml -o out
     ///   wetclutch export vehicles/eight_speed.toml --shift 1-2 -o out
+    ///   wetclutch export vehicles/eight_speed.toml --shift 1-2 --check-elf firmware.elf -o out
     #[command(verbatim_doc_comment)]
     Export(Export),
     /// Print completions for a shell
@@ -384,6 +386,9 @@ pub(crate) struct Export {
     /// File whose table `sensors` describes how the speeds are read; default: readings of the moment with usual noise
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
+    /// Linked program of the controller with these parameters: its addresses go into the .a2l; fails if its parameters are others
+    #[arg(long, value_name = "FIRMWARE.elf")]
+    pub(crate) check_elf: Option<PathBuf>,
     /// Folder for the files
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,

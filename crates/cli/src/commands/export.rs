@@ -14,8 +14,9 @@ use crate::output;
 pub(crate) fn export(options: &Export) -> Result<(), Failure> {
     let vehicle = VehicleFile::read(&options.vehicle)?;
     let sensors = options.sensors.as_deref().map(read_sensors).transpose()?;
+    let program = options.check_elf.as_deref().map(read_program).transpose()?;
     writable(&options.output, &[])?;
-    let files = wetclutch::export(&vehicle, &ExportOptions { shift: options.shift.clone(), sensors })
+    let files = wetclutch::export(&vehicle, &ExportOptions { shift: options.shift.clone(), sensors, program })
         .map_err(|error| named(&options.vehicle, error))?;
     for file in &files {
         not_an_input(Some(&options.output.join(&file.name)), [&options.vehicle])?;
@@ -33,6 +34,11 @@ fn named(path: &Path, error: Failure) -> Failure {
         Failure::Input(message) => Failure::Input(format!("{}: {message}", path.shown())),
         other => other,
     }
+}
+
+/// The linked program of a controller.
+fn read_program(path: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|error| Failure::Input(format!("{}: {error}", path.shown())))
 }
 
 /// Writes all of the files, or none.
