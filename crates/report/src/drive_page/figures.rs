@@ -155,6 +155,9 @@ fn friction_power_panel(rows: &[ShiftScoreRow], names: [&str; 2]) -> Panel {
     panel("friction power by the estimate (kW)", 90.0, roles.map(curve).collect())
 }
 
+/// Time between two points of a range, s: a page of an hour has more than three hundred shifts.
+const RANGE_S: f64 = 0.02;
+
 /// Whether a clutch of the shift is a one-way clutch, which has no pressure and no valve model.
 fn is_one_way(rows: &[ShiftScoreRow], c: usize) -> bool {
     rows.iter().any(|row| row.clutches[c].is_one_way)
@@ -224,9 +227,11 @@ fn clutch_panel(
         stroke,
         points: rows.iter().map(|row| (row.time_s, of(&row.clutches[c]).0[which])).collect(),
     };
+    let length_s = rows.last().map_or(0.0, |last| last.time_s - rows[0].time_s);
+    let every = ((RANGE_S * rows.len() as f64 / length_s).round() as usize).clamp(1, 100);
     let ends = |which: usize, end: usize| {
         let value = |row: &ShiftScoreRow| of(&row.clutches[c]).1[which].map_or(f64::NAN, |range| range[end]);
-        rows.iter().map(|row| (row.time_s, value(row))).collect()
+        rows.iter().step_by(every).map(|row| (row.time_s, value(row))).collect()
     };
     // A log may have a measured pressure, and then no torque.
     let known = if rows.iter().any(|row| row.clutches[c].torque_n_m[0].is_finite()) { "true" } else { "measured" };
