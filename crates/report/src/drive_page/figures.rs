@@ -156,7 +156,7 @@ fn friction_power_panel(rows: &[ShiftScoreRow], names: [&str; 2]) -> Panel {
 }
 
 /// Time between two points of a range, s: a page of an hour has more than three hundred shifts.
-const RANGE_S: f64 = 0.02;
+const RANGE_S: f64 = 0.04;
 
 /// Whether a clutch of the shift is a one-way clutch, which has no pressure and no valve model.
 fn is_one_way(rows: &[ShiftScoreRow], c: usize) -> bool {
