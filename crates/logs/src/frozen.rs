@@ -43,7 +43,7 @@ pub const STOPPED_S: f64 = 0.05;
 pub const STOPPED_SAMPLES: u32 = 5;
 
 /// Changes after which a speed is known never to have one value twice in a row \[chosen\].
-const MANY_CHANGES: u32 = 200;
+pub const MANY_CHANGES: u32 = 200;
 
 /// Below this a shaft stands, rad/s.
 const STANDS_RAD_S: f64 = 1.0;

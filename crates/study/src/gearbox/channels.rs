@@ -118,7 +118,7 @@ impl<'a> CarChannels<'a> {
     }
 
     /// Delays by the map of engine, turbine, output and wheel speed, s. They are not in the ages of the readings: the filter takes them
-    /// off ([`evaluate::LoggedDrive::with_speed_delays`]).
+    /// off ([`evaluate::logged::LoggedDrive::with_speed_delays`]).
     pub fn speed_delays_s(&self) -> [f64; 4] {
         self.speed_delays_s
     }
