@@ -82,9 +82,9 @@ impl ClutchRow {
         band(self.torque_n_m[1], self.torque_std_dev_n_m)
     }
 
-    /// The same of the pressure, Pa.
+    /// The same of the pressure, Pa, which is never below zero.
     pub fn pressure_band_pa(&self) -> Option<[f64; 2]> {
-        band(self.pressure_pa[1], self.pressure_std_dev_pa)
+        band(self.pressure_pa[1], self.pressure_std_dev_pa).map(|[low, high]| [low.max(0.0), high])
     }
 
     /// A clutch of which nothing is known but whether it sticks.
