@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 
 use trace::{Cell, ColumnKind, CsvRows, TableWriter};
 
+use crate::any_car::column;
 use crate::support::{BENCH, Folder, ROOT, printed, refused, said, wetclutch};
 
 /// The toothed wheels of the bench, with a current sensor.
@@ -156,6 +157,13 @@ fn a_delay_in_the_channel_map_is_a_delay_of_the_sensor() {
     }
     assert!(folder.read("map.csv") == folder.read("sensors.csv"));
     assert!(folder.read("map.csv") != folder.read("none.csv"));
+    // A speed of a second ago is none: it is not extrapolated.
+    let old = folder.write(
+        "old.toml",
+        map.replace("[channel.wheel_speed]\ndelay_s = 0.02", "[channel.wheel_speed]\ndelay_s = 1.0"),
+    );
+    said(&estimate(&folder, "foreign.mf4", "old.csv", &["--map", &old, "--sensors", &on_time]));
+    assert!(column(&folder.read("old.csv"), "wheel_reading").iter().all(|reading| reading != "good"));
 }
 
 #[test]

@@ -12,8 +12,8 @@
 use super::{GearboxFilter, GearboxState, LOST_S, MAX_ELEMENTS, Reading, ShiftEstimate, ShiftInput};
 use drivetrain::Real;
 
-/// The longest delay that is taken off the readings, s; what is beyond stays their age.
-const LONGEST_S: f64 = 0.05;
+/// The longest delay that the gearbox filter takes off the readings, s; what is beyond stays their age.
+pub const LONGEST_DELAY_S: f64 = 0.05;
 /// Rows are put together until they are as long as this, s. A delay below it stays the age of its readings.
 const SHORTEST_S: f64 = 0.00625;
 /// Steps that are kept: those of the longest delay, one that is not yet full, and one more where a step begins within it.
@@ -102,12 +102,12 @@ impl<T: Real> GearboxFilter<'_, T> {
         let [turbine, output, wheel] = &self.readings;
         let longest =
             [turbine, output, wheel].iter().fold(self.engine.0.delay_s, |longest, of| longest.at_least(of.delay_s));
-        (longest >= T::of(SHORTEST_S)).then(|| longest.at_most(T::of(LONGEST_S)))
+        (longest >= T::of(SHORTEST_S)).then(|| longest.at_most(T::of(LONGEST_DELAY_S)))
     }
 
     /// The same filter of readings that are not late.
     fn on_time(&self) -> Self {
-        let left = |delay_s: T| (delay_s - T::of(LONGEST_S)).at_least(T::zero());
+        let left = |delay_s: T| (delay_s - T::of(LONGEST_DELAY_S)).at_least(T::zero());
         let (mut readings, mut engine) = (self.readings, self.engine);
         for sensor in readings.iter_mut().chain([&mut engine.0]) {
             sensor.delay_s = left(sensor.delay_s);
@@ -138,7 +138,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             (input.wheel_rad_s, wheel, 3),
         ] {
             let Some(reading) = reading else { continue };
-            let delay_s = sensor.delay_s.at_most(T::of(LONGEST_S));
+            let delay_s = sensor.delay_s.at_most(T::of(LONGEST_DELAY_S));
             if let Some((step, before_s)) = state.late.at(delay_s) {
                 let of =
                     [&mut step.engine_rad_s, &mut step.turbine_rad_s, &mut step.output_rad_s, &mut step.wheel_rad_s];
@@ -220,14 +220,14 @@ mod tests {
             for k in 0..2000_u16 {
                 late.push(&input(dt_s, f64::from(k)), dt_s);
                 given_s += dt_s;
-                while let Some(step) = late.pop(LONGEST_S) {
+                while let Some(step) = late.pop(LONGEST_DELAY_S) {
                     taken_s += step.dt_s;
                 }
                 assert!(late.steps[KEPT - 1].is_none(), "{dt_s}: no step is pushed out");
             }
             let waiting_s: f64 = late.steps.iter().flatten().map(|step| step.dt_s).sum();
             assert!((taken_s + waiting_s - given_s).abs() < 1e-6, "{dt_s}: {taken_s} {waiting_s} {given_s}");
-            assert!(waiting_s < LONGEST_S + 2.0 * dt_s.max(SHORTEST_S) + 1e-9, "{dt_s}: {waiting_s}");
+            assert!(waiting_s < LONGEST_DELAY_S + 2.0 * dt_s.max(SHORTEST_S) + 1e-9, "{dt_s}: {waiting_s}");
         }
     }
 

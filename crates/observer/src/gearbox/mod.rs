@@ -75,6 +75,7 @@ use turbine::InputSide;
 pub use at_turbine::ClutchesAtTurbine;
 pub use estimate::{ClutchEstimate, ShiftEstimate};
 pub use input_clutch::InputClutch;
+pub use late::LONGEST_DELAY_S;
 pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
 pub use pistons::Piston;

@@ -9,7 +9,7 @@ use drivetrain::CommandKind;
 use logs::{ChannelMap, Log, LogError, Mapped, OnChange, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
 use observer::ShiftTables;
-use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::gearbox::{GearCommand, LONGEST_DELAY_S, MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
 
 use super::car_log::LogStep;
@@ -117,10 +117,10 @@ impl<'a> CarChannels<'a> {
         self.on_change
     }
 
-    /// Delays by the map of engine, turbine, output and wheel speed, s. They are not in the ages of the readings: the filter takes them
+    /// Delays by the map of engine, turbine, output and wheel speed, s, each up to [`LONGEST_DELAY_S`]. They are not in the ages of the readings: the filter takes them
     /// off ([`evaluate::logged::LoggedDrive::with_speed_delays`]).
     pub fn speed_delays_s(&self) -> [f64; 4] {
-        self.speed_delays_s
+        self.speed_delays_s.map(|delay_s| delay_s.min(LONGEST_DELAY_S))
     }
 
     /// The readings, with their summary and notes.
@@ -152,8 +152,11 @@ impl<'a> CarChannels<'a> {
         let mut changed_gear = [None; 2];
         for (Entry { role, element }, reading) in self.entries.iter().zip(&readings) {
             let Some(reading) = reading else { continue };
-            let taken_s = if SPEEDS.contains(role) { reading.stamp_s } else { reading.time_s };
-            let measured = Measured { value: reading.value, age_s: (time_s - taken_s).max(0.0) };
+            let age_s = match SPEEDS.iter().position(|speed| speed == role) {
+                Some(at) => (time_s - reading.stamp_s).max(0.0) + (self.speed_delays_s[at] - LONGEST_DELAY_S).max(0.0),
+                None => (time_s - reading.time_s).max(0.0),
+            };
+            let measured = Measured { value: reading.value, age_s };
             match role {
                 Role::EngineSpeed => of_role[0] = Some(measured),
                 Role::TurbineSpeed => of_role[1] = Some(measured),
