@@ -452,3 +452,25 @@ fn a_gearbox_whose_first_gear_is_held_by_a_one_way_clutch_is_driven_through_all_
     let rows: Vec<usize> = (0..offgoing.len()).filter(|&row| offgoing[row] == "F1").collect();
     assert!(rows.len() > 30 && rows.iter().all(|&row| !torque[row].is_empty() && pressure[row].is_empty()));
 }
+
+/// Friction and gain that are stated as known leave the filter errors of map and kiss point.
+#[test]
+fn a_car_whose_friction_and_valve_gains_are_known_exactly_is_estimated() {
+    let folder = simulated("known-exactly");
+    let mut text = std::fs::read_to_string(vehicle("four_speed")).unwrap().replace("../", ROOT);
+    for name in ["FWD", "DIR", "REV", "INT", "LR"] {
+        text +=
+            &format!("\n[clutch.{name}.error_bounds]\nfriction_factor = [1.0, 1.0]\nvalve_gain_factor = [1.0, 1.0]\n");
+    }
+    let (known, log, out) =
+        (folder.write("known.toml", text), folder.path("sim/short_measured.csv"), folder.path("o.csv"));
+    said(&wetclutch(&["estimate", &log, "--vehicle", &known, "-o", &out]));
+    let table = folder.read("o.csv");
+    let health = column(&table, "health");
+    assert!(health.iter().all(|health| health != "restarted"), "{health:?}");
+    let in_shift = column(&table, "offgoing_torque_estimate_n_m").iter().filter(|cell| !cell.is_empty()).count();
+    for of in ["torque_deviation_n_m", "pressure_deviation_pa"] {
+        let known = column(&table, &format!("oncoming_{of}")).iter().filter(|cell| !cell.is_empty()).count();
+        assert!(known == in_shift && known > 100, "{of}: {known} of {in_shift}");
+    }
+}

@@ -21,6 +21,9 @@ const WHEEL_QUANTUM_RAD_S: f64 = 0.14;
 /// standard deviation of 12 %.
 const MAP_FRACTION: f64 = 0.06;
 
+/// Lowest part of the squared torque error that lasts \[chosen\]: where friction and gain are stated as known, so that the states keep a variance.
+const MIN_SLOW_PART: f64 = 0.1;
+
 /// Standard deviations of the part of the pressure's error at rest that does not last, as of hysteresis, and of the kiss
 /// point beside the valve's gain, Pa \[chosen\]: 10 kPa together.
 const PRESSURE_PA: f64 = 7e3;
@@ -276,7 +279,7 @@ pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncerta
     let square: f64 = parts.iter().map(|part| part * part).sum();
     ElementUncertainty {
         torque_fraction: scale * square.sqrt(),
-        slow_part: 1.0 - parts[2] * parts[2] / square,
+        slow_part: (1.0 - parts[2] * parts[2] / square).max(MIN_SLOW_PART),
         valve_gain: scale * parts[1],
         kiss_point_pa: scale * KISS_POINT_PA,
         valve_lag_fraction: scale * std_dev_of(errors.valve_lag()),
