@@ -2,10 +2,10 @@
 //!
 //! A gateway that maps a signal wrongly for a while, or a logger that fills a gap, writes the value of one speed into the channel of another. Two
 //! sensors of two shafts agree to the last digit where the shafts turn together, as behind a lock-up clutch, and then their speeds came together by
-//! and by. A channel shows another one that agrees with it to the last digit for [`SAMPLES`] samples, where the difference that was to be expected
-//! from the two before is not zero, by [`SUDDEN`] times what such a difference errs by: the one that jumped is wrong, until they differ again or for
-//! [`LONGEST_S`]. A difference that was closed before says nothing: what begins while both shafts turn together, as in the direct gear, and
-//! goes on after it, is not seen here.
+//! and by. A channel is a copy where three things hold. Both speeds agree to the last digit for [`SAMPLES`] samples. Before that they differed, and a
+//! line through the last two differences does not reach zero: it misses it by [`SUDDEN`] times the usual error of such a line. And one of both speeds
+//! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. A copy that begins while both shafts turn together, as in the direct
+//! gear, is not found.
 
 use crate::Role;
 use crate::speed_faults::LONGEST_S;

@@ -112,13 +112,14 @@ fn wrong(timing: bool, lowest: f64) -> Vec<(&'static str, &'static str)> {
     wrong
 }
 
+/// Of white errors 95 %; the lowest that was measured is 96 %, of power-off upshifts in the torque phase.
 #[test]
 fn two_standard_deviations_hold_the_truth_with_other_friction_gains_and_converter() {
     assert_eq!(wrong(false, 0.93), []);
 }
 
 /// The hard case: a lag, a delay and a hysteresis of a shift are the same throughout, and the filter takes the error of the pressure for one that
-/// fades.
+/// fades. The lowest that was measured is 77 %, of power-off upshifts in the torque phase.
 #[test]
 fn two_standard_deviations_hold_most_of_the_truth_in_cars_of_the_whole_budget() {
     assert_eq!(wrong(true, 0.75), []);
