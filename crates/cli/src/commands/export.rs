@@ -15,9 +15,9 @@ pub(crate) fn export(options: &Export) -> Result<(), Failure> {
     let vehicle = VehicleFile::read(&options.vehicle)?;
     let sensors = options.sensors.as_deref().map(read_sensors).transpose()?;
     let program = options.check_elf.as_deref().map(read_program).transpose()?;
-    writable(&options.output, &[])?;
     let files = wetclutch::export(&vehicle, &ExportOptions { shift: options.shift.clone(), sensors, program })
         .map_err(|error| named(&options.vehicle, error))?;
+    writable(&options.output, &[])?;
     for file in &files {
         not_an_input(Some(&options.output.join(&file.name)), [&options.vehicle])?;
     }
@@ -36,9 +36,20 @@ fn named(path: &Path, error: Failure) -> Failure {
     }
 }
 
+/// The largest program that is read, bytes: far above the memory of any controller.
+const MOST_BYTES: u64 = 1 << 28;
+
 /// The linked program of a controller.
 fn read_program(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|error| Failure::Input(format!("{}: {error}", path.shown())))
+    let failure = |message: String| Failure::Input(format!("{}: {message}", path.shown()));
+    let there = std::fs::metadata(path).map_err(|error| failure(error.to_string()))?;
+    if !there.is_file() || there.len() > MOST_BYTES {
+        return Err(failure(format!(
+            "no linked program: it is a regular file of at most {} MB\nhint: give the ELF file that the linker wrote",
+            MOST_BYTES >> 20
+        )));
+    }
+    std::fs::read(path).map_err(|error| failure(error.to_string()))
 }
 
 /// Writes all of the files, or none.
