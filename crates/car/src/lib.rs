@@ -29,6 +29,8 @@ mod fill_budget;
 mod ids;
 mod input;
 #[cfg(feature = "std")]
+mod no_shift;
+#[cfg(feature = "std")]
 mod observers;
 #[cfg(feature = "std")]
 mod off_nominal;

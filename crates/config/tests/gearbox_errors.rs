@@ -156,13 +156,48 @@ fn shares_and_ratios_give_their_shifts() {
 
 #[test]
 fn teeth_that_are_unusual_are_warned_of_with_their_line() {
-    let file = GearboxFile::from_source(Source::built_in("g.toml", include_str!("gearboxes/fn4a.toml"))).unwrap();
+    let file =
+        GearboxFile::from_source(Source::built_in("g.toml", include_str!("../../../gearboxes/fn4a.toml"))).unwrap();
     assert_eq!(file.warnings.len(), 1);
     assert!(
         file.warnings[0].contains("61 teeth, which is odd") && file.warnings[0].starts_with("g.toml:"),
         "{:?}",
         file.warnings
     );
+}
+
+/// Every shaft of a gearbox with its inertia times a factor: ten times, a thousand times, and the other way.
+#[test]
+fn an_inertia_in_the_wrong_unit_is_questioned_with_the_likely_one() {
+    let sun = "{ name = \"sun12\", inertia_kg_m2 = ";
+    let warnings = |text: &str| GearboxFile::from_source(Source::built_in("g.toml", text)).unwrap().warnings;
+    let with = |inertia: &str| warnings(&EIGHT_SPEED.replacen(&format!("{sun}0.004"), &format!("{sun}{inertia}"), 1));
+    assert_eq!(with("0.004"), Vec::<String>::new());
+    let line =
+        "g.toml:30: `shaft.sun12.inertia_kg_m2`: is 8 kg m2; what turns with it usually has 0.0008 to 0.02 kg m2";
+    assert_eq!(with("8"), [format!("{line}\nhint: 8 g m2 is 0.008 kg m2: check the unit")]);
+    assert!(with("40")[0].ends_with("hint: 40 kg cm2 is 0.004 kg m2: check the unit"));
+    assert!(with("0.1")[0].ends_with("hint: 0.1 lb ft2 is 0.0042 kg m2: check the unit"));
+    assert!(with("4e-5")[0].contains("hint: it is the sum of m r2"));
+    for name in ["in", "sun12", "ring1", "c1", "r2", "r3", "c3", "out"] {
+        for factor in [0.1, 0.5, 2.0, 10.0] {
+            let entry = format!("{{ name = \"{name}\", inertia_kg_m2 = ");
+            let (before, rest) = EIGHT_SPEED.split_once(&entry).unwrap();
+            let (number, after) = rest.split_once(' ').unwrap();
+            let other = factor * number.parse::<f64>().unwrap();
+            let said = warnings(&format!("{before}{entry}{other} {after}"));
+            assert_eq!(said.len(), usize::from(!(0.2..=5.0).contains(&factor)), "{name} times {factor}: {said:?}");
+        }
+    }
+    // Without torques the plates give the size, and without plates it may be any.
+    let bare = |text: &str| text.replace(", turbine_max_n_m = 400", "").replace(", turbine_max_n_m = 250", "");
+    let of_sun = |inertia: &str, text: &str| {
+        warnings(&text.replacen(&format!("{sun}0.004"), &format!("{sun}{inertia}"), 1)).len()
+    };
+    let plates = bare(EIGHT_SPEED);
+    let none: String =
+        plates.lines().filter(|line| !line.starts_with("pack")).map(|line| format!("{line}\n")).collect();
+    assert_eq!([of_sun("0.04", &plates), of_sun("0.04", &none), of_sun("8", &none)], [1, 0, 1]);
 }
 
 #[test]

@@ -104,6 +104,8 @@ pub enum Fault {
     SameElements { gear: String, other: String },
     #[error("the ratio of \"{gear}\" is {ratio:.4}, larger than {before_ratio:.4} of \"{before}\" before it")]
     Order { gear: String, ratio: f64, before: String, before_ratio: f64 },
+    #[error("is {value} kg m2; what turns with it usually has {} to {} kg m2", two_digits(range[0]), two_digits(range[1]))]
+    Inertia { value: f64, range: [f64; 2], unit: Option<(&'static str, f64)> },
     #[error("is missing")]
     Missing(&'static str),
     #[error("the mass of the shift between \"{0}\" and \"{1}\" is not positive definite")]
@@ -163,10 +165,19 @@ impl Fault {
             Self::Unused(_) => "engage it in a gear, or leave it out: it is open in all of them".to_owned(),
             Self::SameElements { .. } => "two names of one gear: check `engaged` of both".to_owned(),
             Self::Order { .. } => "gears are listed from the largest ratio to the smallest, each ratio turbine over output speed".to_owned(),
+            Self::Inertia { value, unit: Some((unit, kg_m2)), .. } => format!("{value} {unit} is {} kg m2: check the unit", two_digits(*kg_m2)),
+            Self::Inertia { .. } => "it is the sum of m r2 of sun, ring, carrier and clutch drums on this shaft: 1 kg at a radius of 70 mm has 0.0049 kg m2; \
+                                     radii in m, not diameters"
+                .to_owned(),
             Self::Missing(why) => (*why).to_owned(),
             Self::Mass(..) => "`turbine_kg_m2` and `output_kg_m2` are positive and their product is larger than the square of `coupling_kg_m2`".to_owned(),
             Self::None | Self::TooMany { .. } | Self::Number { .. } | Self::InputIsOutput(_) => return None,
         };
         Some(hint)
     }
+}
+
+/// A number with two digits that count.
+fn two_digits(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
 }

@@ -5,6 +5,7 @@ use drivetrain::{Clutch, ReducedShift};
 use crate::capacity::{self, Capacity};
 use crate::description::{Description, ElementKind, Given, Ratios, Shares, ShiftMass, StickDiagram};
 use crate::finding::{Fault, Finding, Part};
+use crate::inertia;
 use crate::resolve::{engaged, names, place, positive, train};
 use crate::shift::{Change, Shift, change};
 use crate::train::{GearTrain, NoGear, ZERO};
@@ -238,6 +239,7 @@ fn from_stick_diagram(diagram: &StickDiagram) -> Result<Gearbox, Finding> {
         .collect();
     let mut gearbox = Gearbox::of(elements, gears);
     gearbox.warnings = warnings;
+    gearbox.warnings.extend(inertia::check(diagram, &train));
     gearbox.add_shifts(
         |offgoing, oncoming, held| train.reduce(held, offgoing, oncoming).is_some(),
         |a, b| train.is_beside(a, b),

@@ -13,6 +13,7 @@ pub mod capacity;
 pub mod description;
 pub mod finding;
 pub mod gearbox;
+mod inertia;
 mod linear;
 mod resolve;
 pub mod shift;

@@ -46,15 +46,11 @@ fn above(counts: &MatrixCounts) -> String {
     format!("{} of {}", counts.above, counts.compared)
 }
 
-/// The pairs of gears without tables, in words; none where all have some.
-pub fn without_tables(matrix: &Matrix, car: &Car) -> Option<String> {
-    let pairs: Vec<String> = matrix.without_tables.iter().map(|&pair| gears(car, pair)).collect();
-    (!pairs.is_empty()).then(|| {
-        format!(
-            "not in the matrix, because they are no shift from one clutch with plates and valve to another: {}",
-            pairs.join(", ")
-        )
-    })
+/// The shifts between neighbouring gears that are not made, with the reason of each; none where all are made.
+pub fn not_driven(pairs: &[[usize; 2]], car: &Car) -> Option<String> {
+    let reasons: Vec<String> =
+        pairs.iter().map(|&pair| format!("{} ({})", gears(car, pair), car.why_no_shift(pair))).collect();
+    (!reasons.is_empty()).then(|| format!("not driven: {}", reasons.join("; ")))
 }
 
 /// The runs that failed, in words.
@@ -222,7 +218,7 @@ pub fn matrix_page(matrix: &Matrix, car: &CarFile, seed: u64) -> Result<String, 
                 compared_runs => all.compared_runs, outside => all.outside, values => all.values,
                 slips => all.slips_said, rows => all.rows,
             },
-            without_tables => without_tables(matrix, car),
+            without_tables => not_driven(&matrix.without_tables, car),
             failures => failures(matrix, car),
             inputs => origin(&[&car.source]),
         },

@@ -11,7 +11,7 @@ use trace::ShownPath as _;
 use crate::Error;
 
 /// The gearboxes of the program, by their names.
-pub fn gearboxes() -> [&'static str; 5] {
+pub fn gearboxes() -> [&'static str; config::gearbox::SHIPPED.len()] {
     config::gearbox::SHIPPED.map(|(name, _)| name)
 }
 

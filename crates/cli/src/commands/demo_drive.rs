@@ -7,12 +7,12 @@ use car::{Car, Drive};
 use config::{DriveFile, Source};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
-use report::matrix_page::kind_rows;
+use report::matrix_page::{kind_rows, not_driven};
 use study::gearbox::drive::{ScoredDrive, score_drive};
 use study::gearbox::matrix::{Matrix, Random};
 use study::gearbox::measured::MeasuredRow;
 use study::gearbox::recording::Recording;
-use study::gearbox::tour::{LeftOut, drive_tour};
+use study::gearbox::tour::{self, LeftOut, drive_tour};
 use study::gearbox::{RECORD_S, ShiftDraw};
 use trace::{Cell, ShownPath as _};
 use wetclutch::studies::bench_sensors;
@@ -53,6 +53,8 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
             output::note("driving through all gears, up and down, with power and without");
             let left_out = drive_tour(&model, &car, |sample| recording.push(sample), || ())?;
             say_left_out(&left_out, &car);
+            let not_driven = not_driven(&tour::not_driven(&car)?, &car);
+            not_driven.iter().for_each(|sentence| output::note(&format!("warning: {sentence}")));
             "Through all gears".to_owned()
         }
     };

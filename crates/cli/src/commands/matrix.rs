@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use car::{Car, Sensors};
-use report::matrix_page::{failures, kind_rows, matrix_page, shift_cells, shift_rows, without_tables};
+use report::matrix_page::{failures, kind_rows, matrix_page, not_driven, shift_cells, shift_rows};
 use serde_json::json;
 use study::gearbox::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::{Cell, ShownPath as _};
@@ -81,7 +81,7 @@ fn print(result: &Matrix, car: &Car) -> Result<(), Failure> {
         wetclutch::grouped(counts.slips_said),
         wetclutch::grouped(counts.rows),
     ))?;
-    for sentence in without_tables(result, car).into_iter().chain(failures(result, car)) {
+    for sentence in not_driven(&result.without_tables, car).into_iter().chain(failures(result, car)) {
         output::note(&format!("warning: {sentence}"));
     }
     Ok(())

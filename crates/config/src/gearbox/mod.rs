@@ -18,12 +18,18 @@ const LEVELS: &str = "the levels are \"stick-diagram\" (shafts, sets, elements),
                       \"ratios\" (ratios alone)";
 
 /// The gearbox files of the program, each by its name, for the gasoline engine of `vehicles/eight_speed.toml`.
-pub const SHIPPED: [(&str, &str); 5] = [
+pub const SHIPPED: [(&str, &str); 11] = [
     ("8hp", include_str!("../../../../gearboxes/8hp.toml")),
     ("10_speed", include_str!("../../../../gearboxes/10_speed.toml")),
     ("dual_clutch_7", include_str!("../../../../gearboxes/dual_clutch_7.toml")),
     ("lepelletier_6", include_str!("../../../../gearboxes/lepelletier_6.toml")),
     ("ravigneaux_4", include_str!("../../../../gearboxes/ravigneaux_4.toml")),
+    ("8hp45", include_str!("../../../../gearboxes/8hp45.toml")),
+    ("9g_tronic", include_str!("../../../../gearboxes/9g_tronic.toml")),
+    ("a340e", include_str!("../../../../gearboxes/a340e.toml")),
+    ("a8lr1", include_str!("../../../../gearboxes/a8lr1.toml")),
+    ("fn4a", include_str!("../../../../gearboxes/fn4a.toml")),
+    ("tf80sc", include_str!("../../../../gearboxes/tf80sc.toml")),
 ];
 
 /// A checked gearbox file.

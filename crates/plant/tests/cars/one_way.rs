@@ -179,8 +179,8 @@ fn a_shift_without_a_clutch_that_opens_or_closes_is_refused_with_a_hint() {
 /// Other gearboxes with a one-way clutch beside the brake of 1st gear, given by the members that it connects.
 fn others() -> Vec<car::Car> {
     let files = [
-        (include_str!("../../../config/tests/gearboxes/fn4a.toml"), "LR", "frc"),
-        (include_str!("../../../config/tests/gearboxes/a340e.toml"), "B3", "rcar"),
+        (include_str!("../../../../gearboxes/fn4a.toml"), "LR", "frc"),
+        (include_str!("../../../../gearboxes/a340e.toml"), "B3", "rcar"),
     ];
     let car = |(text, brake, output): (&str, &str, &str)| {
         let first = text.lines().find(|line| line.contains("name = \"1\"")).unwrap();

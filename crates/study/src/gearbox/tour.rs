@@ -5,6 +5,7 @@ use car::ErrorBudget;
 use observer::ShiftTables;
 use plant::car::{CarCalibration, CarError, CarModel, CarRun, CarSample, CarShift, Driver, idle_throttle};
 
+use super::matrix::neighbouring_shifts;
 use super::{EvaluateError, RECORD_S};
 
 /// Throttle at which the car accelerates to the speed of a shift, the one of a car that does not reach it so, and brake at which it
@@ -64,6 +65,15 @@ pub fn legs(car: &Car, tables: &ShiftTables<f64>) -> Vec<Leg> {
     let down: Vec<[usize; 2]> = up.iter().rev().map(|&[from, to]| [to, from]).collect();
     let first = up.iter().map(leg(POWER_ON)).chain(down.iter().map(leg(0.0)));
     first.chain(up.iter().map(leg(0.0))).chain(down.iter().map(leg(POWER_ON))).collect()
+}
+
+/// The shifts between neighbouring forward gears of a car that are neither simulated nor estimated.
+///
+/// # Errors
+/// The gearbox has more clutches than the filter has room for.
+pub fn not_driven(car: &Car) -> Result<Vec<[usize; 2]>, EvaluateError> {
+    let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).map_err(EvaluateError::TooManyElements)?;
+    Ok(neighbouring_shifts(car, &tables).1)
 }
 
 /// A driver on the way through the legs.

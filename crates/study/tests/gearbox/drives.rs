@@ -9,7 +9,7 @@ use plant::car::CarModel;
 use study::gearbox::drive::{ScoredDrive, score_drive};
 use study::gearbox::matrix::{Matrix, Pooled, drawn_car};
 use study::gearbox::recording::Recording;
-use study::gearbox::tour::{drive_tour, legs};
+use study::gearbox::tour::{drive_tour, legs, not_driven};
 use study::gearbox::{SAMPLE_S, TruePhase};
 
 use super::cars::{cars, sensors};
@@ -140,6 +140,37 @@ fn the_pressure_of_every_element_is_within_its_range_in_gears_too() {
         );
         assert!(in_gear > 1000 && filter.pressure_range_pa(&state, usize::MAX).is_none());
     }
+}
+
+/// Without its second and third gear the 8HP goes from 1st to 4th by two elements off and two on.
+#[test]
+fn a_shift_between_neighbouring_gears_that_is_not_driven_is_named_with_its_reason() {
+    let without = |names: &[&str]| {
+        let mut car = CarFile::eight_speed().unwrap().car;
+        car.gearbox.gears.iter_mut().filter(|gear| names.contains(&&*gear.name)).for_each(|gear| gear.ratio *= -1.0);
+        car
+    };
+    let car = without(&["2", "3"]);
+    let pairs = not_driven(&car).unwrap();
+    let [one, four] = ["1", "4"].map(|name| car.gearbox.gear(name).unwrap());
+    assert_eq!(pairs, [[one, four], [four, one]]);
+    let double = "double transition, A C off and D E on: a shift needs one clutch or brake off and one on";
+    assert_eq!(car.why_no_shift([one, four]), double);
+    assert_eq!(not_driven(&without(&[])).unwrap(), Vec::<[usize; 2]>::new());
+    // An element without plates.
+    let mut bare = without(&[]);
+    let element = bare.gearbox.elements.iter().position(|element| element.name == "E").unwrap();
+    (bare.gearbox.elements[element].pack, bare.clutches[element]) = (None, None);
+    let two = bare.gearbox.gear("2").unwrap();
+    assert_eq!(not_driven(&bare).unwrap()[0], [one, two]);
+    assert_eq!(bare.why_no_shift([one, two]), "E has no plates (`pack`) in the gearbox file");
+    // Gears of one clutch of a dual clutch.
+    let dual = cars().pop().unwrap();
+    let [one, three] = ["1", "3"].map(|name| dual.gearbox.gear(name).unwrap());
+    assert_eq!(
+        dual.why_no_shift([one, three]),
+        "only dogs change, D1 off and D3 on: no clutch takes the load over from another"
+    );
 }
 
 /// A gearbox whose third gear can only be reached by two changes at once is driven without it.

@@ -20,6 +20,7 @@ mod noise;
 mod one_way;
 mod ratios;
 mod ratios_alone;
+mod road_cars;
 mod sensitivity;
 mod shift_bars;
 mod strokes;

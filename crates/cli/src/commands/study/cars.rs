@@ -4,9 +4,10 @@ use std::path::Path;
 
 use car::ElementErrors;
 use config::{CarStudy, CarStudyRuns, significant};
-use report::matrix_page::kind_rows;
+use report::matrix_page::{kind_rows, not_driven};
 use study::gearbox::campaign::{CarCampaign, CarSummary};
 use study::gearbox::matrix::Pooled;
+use study::gearbox::tour;
 use trace::ShownPath as _;
 use wetclutch::studies::bench_sensors;
 
@@ -27,6 +28,8 @@ pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
     let campaign = CarCampaign::new(CarStudy::read(&options.study)?, &bench_sensors()?)?;
     warn_of_slipping(&campaign.study.car);
     warn_of_exceeded(&campaign);
+    let not_driven = not_driven(&tour::not_driven(&campaign.study.car)?, &campaign.study.car);
+    not_driven.iter().for_each(|sentence| output::note(&format!("warning: {sentence}")));
     let part = Part { campaign: &campaign, folder: &options.output, shard: options.shard };
     let mut summary = campaign.summary();
     part.make(options, |row| campaign.push(&mut summary, row))?;

@@ -27,10 +27,10 @@ fn published() -> Vec<CarModel> {
         "gearboxes/lepelletier_6.toml",
         "gearboxes/8hp.toml",
         "gearboxes/10_speed.toml",
-        "crates/config/tests/gearboxes/fn4a.toml",
-        "crates/config/tests/gearboxes/a340e.toml",
-        "crates/config/tests/gearboxes/9g.toml",
-        "crates/config/tests/gearboxes/a8lr1_2.0t.toml"
+        "gearboxes/fn4a.toml",
+        "gearboxes/a340e.toml",
+        "gearboxes/9g_tronic.toml",
+        "gearboxes/a8lr1.toml"
     ))
 }
 

@@ -1,0 +1,48 @@
+//! Cars on the road: the drive of `drives/city.toml` in each, simulated and estimated.
+
+use std::path::Path;
+
+use config::{CarFile, DriveFile};
+use observer::Health;
+use plant::car::{CarCalibration, CarModel, simulate_car_drive};
+use study::gearbox::RECORD_S;
+use study::gearbox::drive::score_drive;
+use study::gearbox::recording::Recording;
+
+use super::cars::sensors;
+
+/// The vehicle files with a gearbox that is on the road, but for those that other tests drive.
+const CARS: [&str; 6] = [
+    "eight_speed_8hp45",
+    "eight_speed_a8lr1",
+    "four_speed_fn4a",
+    "four_speed_simpson",
+    "nine_speed_9g",
+    "six_speed_tf80sc",
+];
+
+#[test]
+fn a_city_drive_of_every_car_on_the_road_is_simulated_and_estimated() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut drive = DriveFile::read(&root.join("drives/city.toml")).unwrap().drive;
+    (drive.repetitions, drive.sample_time_s) = (1, RECORD_S);
+    for name in CARS {
+        let car = CarFile::read(&root.join(format!("vehicles/{name}.toml"))).unwrap().car;
+        let model = CarModel::new(car.clone()).unwrap();
+        let mut recording = Recording::default();
+        let calibration = CarCalibration::of(drive.controller);
+        let summary = simulate_car_drive(&model, &car, calibration, &drive, |sample| recording.push(sample)).unwrap();
+        assert!(summary.over_speed.is_none() && summary.shifts >= 10, "{name}: {summary:?}");
+        let scored = score_drive(&car, &model, &recording, &sensors(), 1).unwrap();
+        let restarts = scored.states.iter().skip(100).filter(|state| state.health == Health::Restarted).count();
+        assert_eq!(restarts, 0, "{name}");
+        for shift in &scored.shifts {
+            let label = format!("{name} {} {}-{}", shift.number, shift.from, shift.to);
+            // A change of mind ends a shift, and so does the end of the drive.
+            let ends_s = scored.shifts.iter().map(|next| next.time_s[0]).chain([drive.duration_s()]);
+            let is_cut = ends_s.into_iter().any(|next_s| (shift.time_s[1]..shift.time_s[1] + 0.1).contains(&next_s));
+            assert!(is_cut || shift.quality.complete_s.is_some_and(|time_s| time_s < 2.0), "{label}");
+            assert!(shift.inside().is_none_or(|inside| inside == 1.0), "{label}");
+        }
+    }
+}
