@@ -15,7 +15,7 @@ const LENGTH_S: f64 = 3.6;
 /// The files of a run.
 pub(crate) struct Files {
     /// The car that filter and shift controller know.
-    pub(crate) known: String,
+    pub(crate) known: CarFile,
     /// The car that is driven.
     pub(crate) driven: String,
     /// The drive.
@@ -28,9 +28,8 @@ impl Files {
     /// # Errors
     /// There is no such car or gear, or a value cannot be right.
     pub(crate) fn of(settings: &Settings, car: &ShippedCar) -> Result<Self, Error> {
-        let known = known(settings, car)?;
-        let file = car.read("known.toml", &known)?;
-        Ok(Self { driven: driven(settings, &known)?, drive: drive(settings, &file)?, known })
+        let known = car.read("known.toml", &known(settings, car)?)?;
+        Ok(Self { driven: driven(settings, &known.source.text)?, drive: drive(settings, &known)?, known })
     }
 }
 
@@ -188,7 +187,7 @@ mod tests {
     fn files(settings: &Settings) -> [CarFile; 2] {
         let car = ShippedCar::named(&settings.car).unwrap();
         let files = Files::of(settings, car).unwrap();
-        [files.known, files.driven].map(|text| car.read("car.toml", &text).unwrap())
+        [files.known, car.read("car.toml", &files.driven).unwrap()]
     }
 
     #[test]

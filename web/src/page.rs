@@ -15,10 +15,9 @@ use crate::files::Files;
 /// What messages call the readings of a run.
 const LOG: &str = "live_measured.csv";
 
-/// A simulated drive, and the car as the filter knows it.
+/// A simulated drive, and its files.
 struct Run {
     files: Files,
-    known: CarFile,
     simulation: Simulation,
 }
 
@@ -26,22 +25,24 @@ impl Run {
     fn of(settings: &Settings) -> Result<Self, Error> {
         let car = ShippedCar::named(&settings.car)?;
         let files = Files::of(settings, car)?;
-        let [known, driven] =
-            [("known.toml", &files.known), ("driven.toml", &files.driven)].map(|(name, text)| car.read(name, text));
+        let driven = car.read("driven.toml", &files.driven)?;
         let drive = DriveFile::from_source(Source::built_in("drive.toml", &files.drive))?.drive;
-        let simulation = simulate(&driven?.car, &drive)?;
-        Ok(Self { files, known: known?, simulation })
+        let simulation = simulate(&driven.car, &drive)?;
+        Ok(Self { files, simulation })
     }
 }
 
 /// Figures, table and findings of a run, with its files.
 pub(crate) fn of_run(settings: &Settings) -> Result<Value, Error> {
-    let Run { files, known, simulation } = Run::of(settings)?;
+    let Run { files: Files { known, driven, drive }, simulation } = Run::of(settings)?;
     let (found, notes) = estimated(&known, with_truth(simulation))?;
-    let gearbox = &known.gearbox_source.text;
-    let files = json!({ "known.toml": files.known, "driven.toml": files.driven, "drive.toml": files.drive, "gearbox": gearbox });
     let mut page = page(&known, &found, notes);
-    page["files"] = files;
+    page["files"] = json!({
+        "known.toml": known.source.text,
+        "driven.toml": driven,
+        "drive.toml": drive,
+        "gearbox": known.gearbox_source.text,
+    });
     Ok(page)
 }
 
@@ -52,8 +53,8 @@ pub(crate) fn measured(settings: &Settings) -> Result<Table, Error> {
 
 /// The estimates of that, as `wetclutch estimate` writes them.
 pub(crate) fn estimates(settings: &Settings) -> Result<Table, Error> {
-    let Run { known, simulation, .. } = Run::of(settings)?;
-    let (found, _) = estimated(&known, simulation.measured)?;
+    let Run { files, simulation } = Run::of(settings)?;
+    let (found, _) = estimated(&files.known, simulation.measured)?;
     Ok(found.rows.unwrap_or_default())
 }
 

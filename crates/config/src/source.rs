@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, Deserializer};
+use toml::de::{DeTable, DeValue};
 use trace::text_file::{LARGEST_LIST, LARGEST_TEXT, read_text_of};
 
 use crate::ConfigError;
 use crate::near::is_near;
+use crate::tree::Tree;
 
 /// What a configuration file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -301,12 +302,22 @@ impl Layers<'_> {
 
     /// An error of the parser with its place.
     fn syntax(&self, error: &toml::de::Error) -> ConfigError {
-        let (path, line) = self.place(error.span().map_or(0, |span| span.start));
-        ConfigError::Syntax { path, line, message: trace::printable(error.message()).into_owned() }
+        self.wrong(error.span().map_or(0, |span| span.start), error.message())
+    }
+
+    /// What is wrong at a place.
+    pub(crate) fn wrong(&self, place: usize, message: &str) -> ConfigError {
+        let (path, line) = self.place(place);
+        ConfigError::Syntax { path, line, message: trace::printable(message).into_owned() }
     }
 
     /// Reads the text into raw types.
     pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
+        self.tree()?.read_from(self)
+    }
+
+    /// The values of both texts.
+    pub(crate) fn tree(&self) -> Result<Tree, ConfigError> {
         let wrong = |error| self.syntax(&error);
         let mut table = self.source.table()?;
         // Blanks before its text put every place of the second file behind those of the first.
@@ -314,7 +325,7 @@ impl Layers<'_> {
         if let Some(moved) = &moved {
             lay_over(table.get_mut(), DeTable::parse(moved).map_err(wrong)?.into_inner());
         }
-        T::deserialize(Deserializer::from(table)).map_err(wrong)
+        Tree::of_table(table.get_ref()).map_err(|place| self.wrong(place, "the number is too large"))
     }
 }
 

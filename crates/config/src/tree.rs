@@ -1,16 +1,20 @@
-//! The values of a file, read once: the runs of a study take them with some of them changed.
+//! The values of a file with their places, from which raw types are read. The runs of a study take them with some of them changed.
 
 use std::fmt;
 use std::ops::Range;
+use std::slice::Iter;
 use std::sync::Arc;
 
 use serde::Deserialize;
-use serde::de::value::{MapDeserializer, SeqDeserializer};
-use serde::de::{self, DeserializeOwned, Deserializer, IntoDeserializer, Visitor};
+use serde::de::value::SeqDeserializer;
+use serde::de::{
+    self, DeserializeOwned, DeserializeSeed, Deserializer, IntoDeserializer, MapAccess, Unexpected, Visitor,
+};
 use serde_spanned::de::{SpannedDeserializer, is_spanned};
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeString, DeTable, DeValue};
 
+use crate::source::Layers;
 use crate::{ConfigError, Source};
 
 /// What a factor does to the value in the file.
@@ -42,10 +46,20 @@ struct Node {
 enum Value {
     Float(f64),
     Integer(i64),
+    /// A whole number beyond those, such as a seed.
+    Large(u64),
     Switch(bool),
     Text(Arc<str>),
+    Time,
     List(Vec<Node>),
-    Table(Vec<(Arc<str>, Node)>),
+    Table(Vec<(Key, Node)>),
+}
+
+/// A key, and where it is.
+#[derive(Debug, Clone)]
+struct Key {
+    name: Arc<str>,
+    at: usize,
 }
 
 impl Tree {
@@ -54,23 +68,23 @@ impl Tree {
     /// # Errors
     /// The text is not TOML.
     pub(crate) fn of(source: &Source) -> Result<Self, ConfigError> {
-        let value = table(source.table()?.get_ref()).map_err(|place| ConfigError::Syntax {
-            path: source.path.clone(),
-            line: source.line(place),
-            message: "the number is too large".to_owned(),
-        })?;
-        Ok(Self { root: Node { place: 0..source.text.len(), value } })
+        Layers { source, over: None }.tree()
+    }
+
+    /// The values of a table, or the place of a number that is too large.
+    pub(crate) fn of_table(root: &DeTable<'_>) -> Result<Self, usize> {
+        Ok(Self { root: Node { place: 0..0, value: table(root)? } })
     }
 
     /// Whether the file has this key outside all tables, or this table.
     pub(crate) fn has(&self, key: &str) -> bool {
-        matches!(&self.root.value, Value::Table(table) if table.iter().any(|(name, _)| **name == *key))
+        matches!(&self.root.value, Value::Table(table) if table.iter().any(|(own, _)| *own.name == *key))
     }
 
     /// Takes a key outside all tables, or a table, out of the file.
     pub(crate) fn remove(&mut self, key: &str) {
         if let Value::Table(table) = &mut self.root.value {
-            table.retain(|(name, _)| **name != *key);
+            table.retain(|(own, _)| *own.name != *key);
         }
     }
 
@@ -87,17 +101,19 @@ impl Tree {
     /// # Errors
     /// A key is unknown, or a value has the wrong type.
     pub(crate) fn read<T: DeserializeOwned>(&self, source: &Source) -> Result<T, ConfigError> {
-        T::deserialize(&self.root).map_err(|wrong| ConfigError::Syntax {
-            path: source.path.clone(),
-            line: source.line(wrong.place.unwrap_or(0)),
-            message: wrong.message,
-        })
+        self.read_from(&Layers { source, over: None })
+    }
+
+    /// The same of the files that they were read from.
+    pub(crate) fn read_from<T: DeserializeOwned>(&self, files: &Layers<'_>) -> Result<T, ConfigError> {
+        T::deserialize(&self.root).map_err(|wrong| files.wrong(wrong.place.unwrap_or(0), &wrong.message))
     }
 }
 
 /// The values of a table, or the place of a number that is too large.
 fn table(table: &DeTable<'_>) -> Result<Value, usize> {
-    let entries = table.iter().map(|(key, value)| Ok((Arc::from(&**key.get_ref()), node(value)?)));
+    let key = |key: &Spanned<DeString<'_>>| Key { name: Arc::from(&**key.get_ref()), at: key.span().start };
+    let entries = table.iter().map(|(name, value)| Ok((key(name), node(value)?)));
     entries.collect::<Result<_, usize>>().map(Value::Table)
 }
 
@@ -106,11 +122,16 @@ fn node(spanned: &Spanned<DeValue<'_>>) -> Result<Node, usize> {
     let value = match spanned.get_ref() {
         DeValue::Float(number) => Value::Float(number.as_str().parse().map_err(|_| place.start)?),
         DeValue::Integer(number) => {
-            Value::Integer(i64::from_str_radix(number.as_str(), number.radix()).map_err(|_| place.start)?)
+            let (digits, radix) = (number.as_str(), number.radix());
+            match (i64::from_str_radix(digits, radix), u64::from_str_radix(digits, radix)) {
+                (Ok(number), _) => Value::Integer(number),
+                (_, Ok(number)) => Value::Large(number),
+                _ => return Err(place.start),
+            }
         }
         DeValue::Boolean(on) => Value::Switch(*on),
         DeValue::String(text) => Value::Text(Arc::from(&**text)),
-        DeValue::Datetime(time) => Value::Text(time.to_string().into()),
+        DeValue::Datetime(_) => Value::Time,
         DeValue::Array(list) => Value::List(list.iter().map(node).collect::<Result<_, _>>()?),
         DeValue::Table(inner) => table(inner)?,
     };
@@ -122,14 +143,15 @@ impl Node {
         let Some((step, rest)) = path.split_first() else { return self.value.apply(change, value) };
         match &mut self.value {
             Value::Table(table) => {
-                let at = match table.iter().position(|(key, _)| **key == **step) {
+                let at = match table.iter().position(|(key, _)| *key.name == **step) {
                     Some(at) => at,
                     None if rest.is_empty() && change != Change::Set => {
                         return Err("the file has no value to change; use `change = \"set\"`".to_owned());
                     }
                     None => {
                         let missing = if rest.is_empty() { Value::Float(value) } else { Value::Table(Vec::new()) };
-                        table.push((step.as_str().into(), Self { place: self.place.clone(), value: missing }));
+                        let key = Key { name: step.as_str().into(), at: self.place.start };
+                        table.push((key, Self { place: self.place.clone(), value: missing }));
                         table.len() - 1
                     }
                 };
@@ -141,9 +163,7 @@ impl Node {
                 let at = found.ok_or_else(|| format!("the list has no item `{step}`; items count from 0"))?;
                 list[at].change(rest, change, value)
             }
-            Value::Float(_) | Value::Integer(_) | Value::Switch(_) | Value::Text(_) => {
-                Err(format!("there is no `{step}`: the key before it is a single value"))
-            }
+            _ => Err(format!("there is no `{step}`: the key before it is a single value")),
         }
     }
 }
@@ -153,7 +173,7 @@ impl Value {
     fn name(&self) -> Option<&str> {
         let Self::Table(table) = self else { return None };
         table.iter().find_map(|(key, node)| match &node.value {
-            Self::Text(text) if **key == *"name" => Some(&**text),
+            Self::Text(text) if *key.name == *"name" => Some(&**text),
             _ => None,
         })
     }
@@ -174,11 +194,12 @@ impl Value {
                 }
             }
             Self::Integer(old) => *self = Self::Float(new(*old as f64)),
+            Self::Large(old) => *self = Self::Float(new(*old as f64)),
             Self::List(list) if change != Change::Set => {
                 return list.iter_mut().try_for_each(|item| item.value.apply(change, value));
             }
             Self::List(_) => return Err("a list cannot be set to a number; use `change = \"scale\"`".to_owned()),
-            Self::Text(_) | Self::Table(_) => return Err("the value is not a number".to_owned()),
+            Self::Text(_) | Self::Time | Self::Table(_) => return Err("the value is not a number".to_owned()),
         }
         Ok(())
     }
@@ -199,9 +220,73 @@ impl fmt::Display for Wrong {
 
 impl std::error::Error for Wrong {}
 
+impl Wrong {
+    /// The innermost value that is wrong gives the place.
+    fn at(self, place: usize) -> Self {
+        Self { place: self.place.or(Some(place)), ..self }
+    }
+}
+
 impl de::Error for Wrong {
     fn custom<T: fmt::Display>(message: T) -> Self {
         Self { message: message.to_string(), place: None }
+    }
+}
+
+/// The entries of a table, or of a value with its place: of one type, so that the reading of a raw type is compiled once.
+enum Entries<'de> {
+    Table(Iter<'de, (Key, Node)>, Option<&'de Node>),
+    Place(SpannedDeserializer<'de, &'de Node, Wrong>),
+}
+
+impl<'de> MapAccess<'de> for Entries<'de> {
+    type Error = Wrong;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Wrong> {
+        match self {
+            Self::Table(entries, value) => {
+                let Some((key, node)) = entries.next() else { return Ok(None) };
+                *value = Some(node);
+                seed.deserialize(key).map(Some).map_err(|wrong| wrong.at(key.at))
+            }
+            Self::Place(entries) => entries.next_key_seed(seed),
+        }
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Wrong> {
+        match self {
+            Self::Table(_, value) => match value.take() {
+                Some(node) => seed.deserialize(node).map_err(|wrong| wrong.at(node.place.start)),
+                None => Err(de::Error::custom("a value comes behind its key")),
+            },
+            Self::Place(entries) => entries.next_value_seed(seed),
+        }
+    }
+}
+
+impl<'de> Deserializer<'de> for &'de Key {
+    type Error = Wrong;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Wrong> {
+        visitor.visit_borrowed_str(&self.name)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Wrong> {
+        if is_spanned(name) {
+            visitor.visit_map(SpannedDeserializer::new(&*self.name, self.at..self.at + self.name.len()))
+        } else {
+            self.deserialize_any(visitor)
+        }
+    }
+
+    serde::forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf option unit unit_struct
+        newtype_struct seq tuple tuple_struct map enum identifier ignored_any
     }
 }
 
@@ -220,15 +305,14 @@ impl<'de> Deserializer<'de> for &'de Node {
         let read = match &self.value {
             Value::Float(number) => visitor.visit_f64(*number),
             Value::Integer(number) => visitor.visit_i64(*number),
+            Value::Large(number) => visitor.visit_u64(*number),
             Value::Switch(on) => visitor.visit_bool(*on),
             Value::Text(text) => visitor.visit_str(text),
+            Value::Time => Err(de::Error::invalid_type(Unexpected::Other("date or time"), &visitor)),
             Value::List(list) => visitor.visit_seq(SeqDeserializer::new(list.iter())),
-            Value::Table(table) => {
-                visitor.visit_map(MapDeserializer::new(table.iter().map(|(key, node)| (&**key, node))))
-            }
+            Value::Table(table) => visitor.visit_map(Entries::Table(table.iter(), None)),
         };
-        // The innermost value that is wrong gives the place.
-        read.map_err(|wrong| Wrong { place: wrong.place.or(Some(self.place.start)), ..wrong })
+        read.map_err(|wrong| wrong.at(self.place.start))
     }
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Wrong> {
@@ -246,7 +330,8 @@ impl<'de> Deserializer<'de> for &'de Node {
         visitor: V,
     ) -> Result<V::Value, Wrong> {
         if is_spanned(name) {
-            visitor.visit_map(SpannedDeserializer::new(self, self.place.clone()))
+            let read = visitor.visit_map(Entries::Place(SpannedDeserializer::new(self, self.place.clone())));
+            read.map_err(|wrong| wrong.at(self.place.start))
         } else {
             self.deserialize_any(visitor)
         }
