@@ -124,6 +124,8 @@ pub fn range(vehicle: &Vehicle) -> RangeEstimator<f64> {
         fill: errors.fill,
         pressure_max_pa: errors.pressure_max_pa,
         friction_factor: errors.friction_factor,
+        // The file of a car with two speeds has no drag of open plates.
+        drag_n_m: 0.0,
         slip_rad_s: errors.slip_rad_s,
     };
     let shaft = ShaftErrors {

@@ -42,8 +42,8 @@ pub const SAMPLE_S: f64 = 0.01;
 pub(crate) const CARRIES_N_M: f64 = 2.0;
 /// Pressure that counts as outside its range only beyond rounding, Pa.
 pub const ROUNDING_PA: f64 = 1.0;
-/// Drag of an open clutch, which the range leaves out, N m.
-pub const DRAG_N_M: f64 = 1.2;
+/// Torque that counts as outside its range only beyond rounding, N m.
+pub const ROUNDING_N_M: f64 = 0.01;
 
 /// Why a shift could not be scored.
 #[derive(Debug, Error)]

@@ -24,7 +24,7 @@ use crate::checks::still_commands::StillCommands;
 use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift};
 use crate::learning_count::LearningCount;
 use crate::score::within;
-use crate::{ClutchRow, DRAG_N_M, EvaluateError, ROUNDING_PA, ShiftScoreRow};
+use crate::{ClutchRow, ROUNDING_N_M, EvaluateError, ROUNDING_PA, ShiftScoreRow};
 
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
@@ -443,6 +443,6 @@ fn clutch_row(
         hidden: found.hidden,
         is_one_way: found.element == ONE_WAY,
         in_range: within(found.pressure_range_pa, pressure_pa, ROUNDING_PA)
-            && within(found.torque_range_n_m, torque_n_m, DRAG_N_M),
+            && within(found.torque_range_n_m, torque_n_m, ROUNDING_N_M),
     }
 }

@@ -7,7 +7,7 @@ use observer::{Health, ShiftTables, gearbox_filter};
 use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_shift};
 
 use crate::recording::{Recording, records_in_a_sample};
-use crate::{CARRIES_N_M, DRAG_N_M, EvaluateError, RECORD_S, ROUNDING_PA};
+use crate::{CARRIES_N_M, EvaluateError, RECORD_S, ROUNDING_N_M, ROUNDING_PA};
 
 /// Truth and estimates of one clutch at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -286,7 +286,7 @@ pub fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstima
             hidden: found.hidden,
             is_one_way: found.element == ONE_WAY,
             in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
-                && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
+                && within(found.torque_range_n_m, truth.torque_n_m, ROUNDING_N_M),
         })
     };
     Some(ShiftScoreRow {

@@ -1,11 +1,12 @@
 //! Ranges of pressure and torque, the same for every observer.
 //!
 //! The range of the pressure follows from the command alone ([`crate::pressure_range`]), that of the clutch torque adds
-//! the friction. Both are guaranteed for errors within the [`Budget`]. The range of the shaft torque
+//! the friction and the drag of the oil between the plates. Both are guaranteed for errors within the [`Budget`]. The range of the shaft torque
 //! ([`crate::shaft_range`]) is an expected one: it also rests on the speeds between two readings. The only quantity
 //! beside readings that they use is the phase, which is the same for all observers. Therefore one [`RangeEstimator`]
 //! serves all observers of a run.
 
+use drivetrain::clutch::{DRAG_PEAK_RAD_S, drag_torque};
 use drivetrain::{Clutch, ClutchValve, Real};
 
 use crate::fill_range::FillBudget;
@@ -40,6 +41,8 @@ pub struct Budget<T> {
     pub fill: Option<FillBudget<T>>,
     /// Minimum and maximum factor on the clutch's friction.
     pub friction_factor: [T; 2],
+    /// Maximum peak of the drag of its open plates, N m ([`drag_torque`]).
+    pub drag_n_m: T,
     /// Error of a reading of the slip, rad/s.
     pub slip_rad_s: T,
 }
@@ -231,16 +234,28 @@ pub(crate) fn pressure_and_torque<T: Real>(
     pressure: &PressureRange<T>,
     slip_rad_s: Option<[T; 2]>,
 ) -> ([T; 2], [T; 2]) {
+    let pressure_pa = pressure.pressure_pa(budget);
+    // The sign of a slip that may be zero is not known, nor whether the clutch holds.
+    let slip = slip_rad_s.filter(|[low, high]| *low > T::zero() || *high < T::zero());
+    let [friction, drag] =
+        [friction(clutch, budget, clamp_force(clutch, budget, pressure, pressure_pa), slip), drag(budget, slip)];
+    (pressure_pa, [friction[0] + drag[0], friction[1] + drag[1]])
+}
+
+/// Minimum and maximum torque of the plates that the force presses together, N m, with the minimum and maximum slip if its sign is known.
+#[inline]
+fn friction<T: Real>(
+    clutch: &Clutch<T>,
+    budget: &Budget<T>,
+    [lowest_force, highest_force]: [T; 2],
+    slip_rad_s: Option<[T; 2]>,
+) -> [T; 2] {
     let zero = T::zero();
-    let [lower_pa, upper_pa] = pressure.pressure_pa(budget);
-    let [lowest_force, highest_force] = clamp_force(clutch, budget, pressure, [lower_pa, upper_pa]);
     if highest_force <= zero {
-        return ([lower_pa, upper_pa], [zero; 2]);
+        return [zero; 2];
     }
     let [minimum, maximum] = budget.friction_factor;
-    // The sign of a slip that may be zero is not known, nor whether the clutch holds.
-    let slip = slip_rad_s.filter(|[low, high]| *low > zero || *high < zero);
-    let (lowest, highest) = match slip {
+    let (lowest, highest) = match slip_rad_s {
         Some([low, high]) if low > zero => clutch.friction.range_within(low, high),
         Some([low, high]) => clutch.friction.range_within(-high, -low),
         None => {
@@ -250,12 +265,24 @@ pub(crate) fn pressure_and_torque<T: Real>(
     };
     let at_most = maximum * highest * clutch.lever() * highest_force;
     let at_least = minimum * lowest * clutch.lever() * lowest_force;
-    let torque = match slip {
+    match slip_rad_s {
         None => [-at_most, at_most],
         Some([low, _]) if low > zero => [at_least, at_most],
         Some(_) => [-at_most, -at_least],
-    };
-    ([lower_pa, upper_pa], torque)
+    }
+}
+
+/// Minimum and maximum drag, N m: between none and the budget's at the slip, with its sign if that is known.
+#[inline]
+fn drag<T: Real>(budget: &Budget<T>, slip_rad_s: Option<[T; 2]>) -> [T; 2] {
+    let (zero, peak_rad_s) = (T::zero(), T::of(DRAG_PEAK_RAD_S));
+    // The drag grows with the slip up to its peak, and falls beyond it.
+    let at_most = |low: T, high: T| drag_torque(budget.drag_n_m, peak_rad_s.at_least(low).at_most(high));
+    match slip_rad_s {
+        None => [-budget.drag_n_m, budget.drag_n_m],
+        Some([low, high]) if low > zero => [zero, at_most(low, high)],
+        Some([low, high]) => [-at_most(-high, -low), zero],
+    }
 }
 
 /// Lower bound of the torque up to which the clutch holds, N m.
@@ -356,6 +383,7 @@ impl<T: Real> Budget<T> {
             pressure_max_pa: to(self.pressure_max_pa),
             fill: self.fill.as_ref().map(FillBudget::cast),
             friction_factor: self.friction_factor.map(to),
+            drag_n_m: to(self.drag_n_m),
             slip_rad_s: to(self.slip_rad_s),
         }
     }

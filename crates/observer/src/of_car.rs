@@ -169,6 +169,7 @@ impl ShiftTables<f64> {
                     pressure_max_pa: errors.pressure_max_pa,
                     fill,
                     friction_factor: errors.friction_factor,
+                    drag_n_m: clutch.drag_n_m,
                     slip_rad_s: 0.0,
                 };
                 Some(FrictionElement {

@@ -321,6 +321,7 @@ mod tests {
             pressure_max_pa: 1.2e6,
             fill: None,
             friction_factor: [0.8, 1.2],
+            drag_n_m: 0.0,
             slip_rad_s: 0.6,
         }
     }

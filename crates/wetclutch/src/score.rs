@@ -142,7 +142,7 @@ fn clutch_row([pressure_pa, torque_n_m, slip_rad_s]: [f64; 3], found: &[f64]) ->
     let range = |low: f64, high: f64| (!low.is_nan() && !high.is_nan()).then_some([low, high]);
     let (pressure_range_pa, torque_range_n_m) = (range(low_pa, high_pa), range(low_n_m, high_n_m));
     let in_range = evaluate::score::within(pressure_range_pa, pressure_pa, evaluate::ROUNDING_PA)
-        && evaluate::score::within(torque_range_n_m, torque_n_m, evaluate::DRAG_N_M);
+        && evaluate::score::within(torque_range_n_m, torque_n_m, evaluate::ROUNDING_N_M);
     Some(ClutchRow {
         // The valve model knows no direction: it is given the true one.
         torque_n_m: [torque_n_m, estimate_n_m, valve_n_m.abs().copysign(torque_n_m)],

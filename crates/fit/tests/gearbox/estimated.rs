@@ -8,7 +8,7 @@ use study::gearbox::drive::{DriveScorer, ScoredDrive};
 
 use super::drawn::{Drawn, sensors, tables};
 
-/// Largest drag of an open element in the drawn cars, N m; the ranges leave it out.
+/// Largest drag of an open element in the drawn cars, N m; the ranges hold that of the given file alone.
 const DRAG_N_M: f64 = 1.7;
 
 /// Sums over rows in which a clutch of a shift slips.

@@ -116,6 +116,7 @@ impl Car {
             pressure_max_pa: LINE_PA,
             fill: Some(self.limits),
             friction_factor: [1.0; 2],
+            drag_n_m: 0.0,
             slip_rad_s: 0.0,
         }
     }
