@@ -24,7 +24,7 @@ use crate::checks::still_commands::StillCommands;
 use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift};
 use crate::learning_count::LearningCount;
 use crate::score::within;
-use crate::{ClutchRow, ROUNDING_N_M, EvaluateError, ROUNDING_PA, ShiftScoreRow};
+use crate::{ClutchRow, EvaluateError, ROUNDING_N_M, ROUNDING_PA, ShiftScoreRow};
 
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
@@ -391,7 +391,7 @@ impl<'c> LoggedDrive<'c> {
         warnings.extend(self.converter.warning(self.car));
         warnings.extend(self.lock_up.warning());
         warnings.extend(self.still.warnings(self.car, self.tables));
-        warnings.extend(self.held.warning(self.car, self.tables));
+        warnings.extend(self.held.warnings(self.car, self.tables));
         if self.holes.count > 0 {
             warnings.push(format!(
                 "warning: {} shifts have a hole of more than {HOLE_S} s in the recording: they end with it and count as not completed",

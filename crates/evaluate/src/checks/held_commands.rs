@@ -1,6 +1,7 @@
-//! Commands that change more rarely than their readings come: a logger that repeats a slow message in each row.
+//! Commands that are recorded too rarely: a logger that repeats a slow message in each row, or that leaves the rows between empty.
 //!
-//! A command then may have changed up to one message before the row that shows it first, and the guaranteed range allows for one row alone.
+//! A repeated command may have changed up to one message before the row that shows it first, and the guaranteed range allows for one row alone.
+//! Between two messages it may have changed and come back, and the range allows for no more than what lies between both.
 
 use car::Car;
 use observer::Reading;
@@ -19,11 +20,16 @@ const RESOLUTIONS: f64 = 3.0;
 /// Width of a class of times, s.
 const CLASS_S: f64 = 0.01;
 const CLASSES: usize = 51;
+/// Longest time between two readings of a command that are not too rare, s \[chosen\]: a pulse that fills a clutch takes 0.1 to 0.2 s.
+const APART_S: f64 = 0.1;
+/// Fraction by which times of rows are rounded.
+const ROUNDING: f64 = 1e-3;
 
 /// The changes of one command.
 #[derive(Clone)]
 struct Changes {
     newest: Option<f64>,
+    read_s: f64,
     changed_s: f64,
     /// Readings since the last change.
     repeated: u32,
@@ -31,6 +37,8 @@ struct Changes {
     /// Changes from one reading to the next, and those after repeated readings by the time since the change before.
     at_once: u64,
     later: [u64; CLASSES],
+    /// Readings by the time since the one before.
+    apart: [u64; CLASSES],
 }
 
 /// The changes of all commands of a log.
@@ -42,11 +50,13 @@ impl Default for HeldCommands {
     fn default() -> Self {
         let none = Changes {
             newest: None,
+            read_s: f64::NEG_INFINITY,
             changed_s: f64::NEG_INFINITY,
             repeated: 0,
             smallest: f64::INFINITY,
             at_once: 0,
             later: [0; CLASSES],
+            apart: [0; CLASSES],
         };
         Self { of_elements: std::array::from_fn(|_| none.clone()) }
     }
@@ -62,27 +72,40 @@ impl HeldCommands {
         }
     }
 
-    /// The elements whose command is repeated, in a sentence.
-    pub(crate) fn warning(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<String> {
-        let elements = car.gearbox.elements.iter().enumerate();
-        let held = elements.filter_map(|(element, described)| {
-            let period_s = self.of_elements[tables.place(element)?].period_s()?;
-            Some(format!("{} (every {period_s:.2} s)", described.name))
-        });
-        let held: Vec<String> = held.collect();
-        (!held.is_empty()).then(|| {
+    /// The elements whose command is repeated, and those whose command is read too rarely, in a sentence each.
+    pub(crate) fn warnings(&self, car: &Car, tables: &ShiftTables<f64>) -> Vec<String> {
+        let named = |period_s: fn(&Changes) -> Option<f64>| {
+            let elements = car.gearbox.elements.iter().enumerate();
+            let named = elements.filter_map(|(element, described)| {
+                let period_s = period_s(&self.of_elements[tables.place(element)?])?;
+                Some(format!("{} (every {period_s:.2} s)", described.name))
+            });
+            named.collect::<Vec<_>>().join(", ")
+        };
+        let held = named(Changes::period_s);
+        let held = (!held.is_empty()).then(|| {
             format!(
-                "warning: commands that change more rarely than the rows come: {}. If the log repeats a slow message, a command was sent up to that long \
-                 before the row that shows it, and the guaranteed ranges do not hold. Leave repeated cells empty, or record the commands more often",
-                held.join(", ")
+                "warning: commands that change more rarely than the rows come: {held}. If the log repeats a slow message, a command was sent up to that \
+                 long before the row that shows it, and the guaranteed ranges do not hold. Leave repeated cells empty, or record the commands more often"
             )
-        })
+        });
+        let rare = named(Changes::too_rarely_read_s);
+        let rare = (!rare.is_empty()).then(|| {
+            format!(
+                "warning: commands that are recorded more rarely than every {APART_S} s: {rare}. What a command does between two of its \
+                 readings, as the pulse that fills a clutch, is not seen, and the guaranteed ranges do not hold. Record the commands at the rate at which \
+                 they are sent"
+            )
+        });
+        held.into_iter().chain(rare).collect()
     }
 }
 
 impl Changes {
     fn push(&mut self, time_s: f64, value: f64) {
+        let apart_s = time_s - core::mem::replace(&mut self.read_s, time_s);
         let Some(before) = self.newest.replace(value) else { return };
+        self.apart[class(apart_s)] += 1;
         if before == value {
             self.repeated += 1;
             return;
@@ -93,8 +116,7 @@ impl Changes {
         if self.repeated == 0 {
             self.at_once += 1;
         } else if since_s <= LONGEST_S && change > RESOLUTIONS * self.smallest {
-            let class = (since_s / CLASS_S).round().max(0.0) as usize;
-            self.later[class.min(CLASSES - 1)] += 1;
+            self.later[class(since_s)] += 1;
         }
         (self.changed_s, self.repeated) = (time_s, 0);
     }
@@ -103,13 +125,30 @@ impl Changes {
     fn period_s(&self) -> Option<f64> {
         let later: u64 = self.later.iter().sum();
         let is_held = later >= ENOUGH && self.at_once as f64 <= BY_CHANCE * later as f64;
-        let mut below = 0;
-        let middle = self.later.iter().position(|count| {
-            below += count;
-            2 * below >= later
-        });
-        middle.filter(|_| is_held).map(|class| class as f64 * CLASS_S)
+        is_held.then(|| middle_s(&self.later))
     }
+
+    /// The usual time between two readings, s, if it is too long for the range of the pressure.
+    fn too_rarely_read_s(&self) -> Option<f64> {
+        let is_known = self.apart.iter().sum::<u64>() >= ENOUGH;
+        Some(middle_s(&self.apart)).filter(|period_s| is_known && *period_s > APART_S * (1.0 + ROUNDING))
+    }
+}
+
+/// The class of a time.
+fn class(time_s: f64) -> usize {
+    ((time_s / CLASS_S).round().max(0.0) as usize).min(CLASSES - 1)
+}
+
+/// The middle one of the times that are counted in classes, s.
+fn middle_s(counts: &[u64; CLASSES]) -> f64 {
+    let all: u64 = counts.iter().sum();
+    let mut below = 0;
+    let middle = counts.iter().position(|count| {
+        below += count;
+        2 * below >= all
+    });
+    middle.map_or(0.0, |class| class as f64 * CLASS_S)
 }
 
 #[cfg(test)]
@@ -137,6 +176,20 @@ mod tests {
         assert_eq!(period_s(0.01, 0.001), None);
         // Within the resolution of its reading a ramp stands still for two rows.
         assert_eq!(period_s(0.01, 0.005), None);
+    }
+
+    #[test]
+    fn a_command_that_is_read_too_rarely_is_one_whether_it_changes_or_not() {
+        let read = |every_s: f64, count: u32| {
+            let mut changes = HeldCommands::default().of_elements[0].clone();
+            (0..count).for_each(|row| changes.push(every_s * f64::from(row), f64::from(row % 7)));
+            changes.too_rarely_read_s()
+        };
+        assert_eq!([0.01, 0.1].map(|every_s| read(every_s, 1000)), [None; 2]);
+        assert_eq!(read(0.2, 1000), Some(0.2));
+        // Of a few readings nothing is said, nor of none.
+        assert_eq!([0, 1, 20].map(|count| read(0.2, count)), [None; 3]);
+        assert_eq!(HeldCommands::default().of_elements[0].clone().too_rarely_read_s(), None);
     }
 
     #[test]
