@@ -9,6 +9,7 @@ mod args;
 mod browser;
 mod commands;
 mod failure;
+mod message;
 mod output;
 mod signals;
 
@@ -19,10 +20,12 @@ use trace::{ShownPath as _, printable};
 
 use args::{Arguments, Command};
 use failure::Failure;
+use message::Colors;
 
 fn main() -> ExitCode {
     let command = match Arguments::try_parse() {
         Ok(arguments) => {
+            arguments.color.hold();
             if arguments.quiet {
                 output::be_quiet();
             }
@@ -30,6 +33,7 @@ fn main() -> ExitCode {
         }
         // The message repeats what was typed, and a shell may have completed the name of a file.
         Err(error) if error.use_stderr() => {
+            Colors::of_arguments(std::env::args_os().map(|of| of.to_string_lossy().into_owned())).hold();
             let shown = std::env::args_os().map(|of| printable(&of.to_string_lossy()).into_owned());
             Arguments::try_parse_from(shown).err().unwrap_or(error).exit()
         }

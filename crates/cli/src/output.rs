@@ -1,4 +1,4 @@
-//! Messages and tables. Colours appear on terminals only and never under `NO_COLOR`.
+//! What is printed: results and tables on standard output, and which messages are shown.
 //!
 //! Names of files, and names in files, are other people's. Whatever is written here for people has no character that controls a
 //! terminal: see [`printable_lines`]. JSON and TOML have escapes of their own.
@@ -8,22 +8,12 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use anstyle::{AnsiColor, Style};
 use indicatif::ProgressDrawTarget;
 use serde::Serialize;
 use trace::{is_unprintable, printable};
 
 use crate::failure::Failure;
-
-const ERROR: Style = AnsiColor::Red.on_default().bold();
-const HINT: Style = AnsiColor::Cyan.on_default();
-
-/// An error on standard error; `hint:` at the start of a line is coloured.
-pub(crate) fn error(message: &str) {
-    let mut stderr = anstream::stderr().lock();
-    // There is no other place to report that standard error cannot be written.
-    let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", coloured_hints(&printable_lines(message)));
-}
+pub(crate) use crate::message::{error, say};
 
 /// Whether messages are errors and warnings alone.
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
@@ -50,25 +40,12 @@ pub(crate) fn note(message: &str) {
     }
 }
 
-/// A message on standard error.
-pub(crate) fn say(message: &str) {
-    let _ = writeln!(anstream::stderr().lock(), "{}", printable_lines(message));
-}
-
 /// A text whose characters are all printed, those that are not escaped. Only its own line breaks stay.
-fn printable_lines(text: &str) -> Cow<'_, str> {
+pub(crate) fn printable_lines(text: &str) -> Cow<'_, str> {
     if !text.chars().any(|c| c != '\n' && is_unprintable(c)) {
         return Cow::Borrowed(text);
     }
     Cow::Owned(text.split('\n').map(printable).collect::<Vec<_>>().join("\n"))
-}
-
-fn coloured_hints(message: &str) -> String {
-    let line = |line: &str| match line.strip_prefix("hint:") {
-        Some(rest) => format!("{HINT}hint:{HINT:#}{rest}"),
-        None => line.to_owned(),
-    };
-    message.lines().map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// A table on standard output: the first `left` columns to the left, the others to the right.

@@ -2,7 +2,9 @@
 
 use std::process::{Command, Output};
 
-use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, said, stderr, stdout, wetclutch};
+use crate::support::{
+    EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, said, stderr, stdout, wetclutch, without_excerpts,
+};
 
 const CAR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml");
 const DRIVE: &str = "name = \"d\"\nvehicle = \"car.toml\"\n[[segment]]\nduration_s = 3\nthrottle = 0.2\n";
@@ -67,7 +69,7 @@ fn a_device_or_a_pipe_is_no_text_file_wherever_one_is_named() {
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for wrong in ["/dev/zero", "/dev/full", &pipe] {
         for (name, output) in readers(&folder, wrong) {
-            let error = refused(&output);
+            let error = without_excerpts(&refused(&output));
             let what =
                 format!("{wrong}: this is a device or a pipe, expected a file\nhint: write the text to a file first");
             assert!(error.contains(&what), "{name}: {error}");

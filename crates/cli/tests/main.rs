@@ -13,6 +13,7 @@ mod day_of_logs;
 mod design_car;
 mod drives;
 mod equations;
+mod excerpts;
 mod export;
 mod failing_channels;
 mod first_words;

@@ -49,6 +49,15 @@ pub(crate) fn refused(output: &Output) -> String {
     stderr(output)
 }
 
+/// Messages without the lines of files that they show.
+pub(crate) fn without_excerpts(text: &str) -> String {
+    let is_of_excerpt = |line: &str| {
+        let rest = line.trim_start_matches(|c: char| c == ' ' || c.is_ascii_digit());
+        rest.len() < line.len() && (rest.starts_with("--> ") || rest.starts_with('|'))
+    };
+    text.lines().filter(|line| !is_of_excerpt(line)).map(|line| line.to_owned() + "\n").collect()
+}
+
 /// A folder that goes away with the test, unless `WETCLUTCH_KEEP` is set.
 pub(crate) struct Folder(PathBuf);
 

@@ -9,6 +9,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::message::Colors;
+
 pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
 pub(crate) use logs::{Estimate, Fit, FormatChoice, Init, Inspect, LaunchChoice, Mapping};
 pub(crate) use studies::{
@@ -48,6 +50,9 @@ pub(crate) struct Arguments {
     /// Messages are errors and warnings alone; results are printed as without it
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
+    /// When messages have colours; results have none
+    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t)]
+    pub(crate) color: Colors,
     #[command(subcommand)]
     pub(crate) command: Command,
 }

@@ -3,10 +3,10 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
 use super::wrong::Wrong;
+use crate::entries::{Entry, entries_of};
 
 /// What is put in place of what is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,17 +25,6 @@ pub(super) struct Draft {
     /// Places with values that are not those of the file: lines, with the key of a number.
     guessed: HashSet<(usize, String)>,
     guess: Guess,
-}
-
-/// A key of a table with its value.
-pub(super) struct Entry {
-    /// The tables that it is in.
-    pub(super) tables: String,
-    pub(super) key: Range<usize>,
-    value: Range<usize>,
-    /// Places of the values of a list.
-    items: Vec<Range<usize>>,
-    is_table: bool,
 }
 
 impl Draft {
@@ -95,16 +84,12 @@ impl Draft {
 
     /// All keys of the text; none if it is not TOML.
     pub(super) fn entries(&self) -> Vec<Entry> {
-        let mut entries = Vec::new();
-        if let Ok(root) = DeTable::parse(&self.text) {
-            each_entry("", root.get_ref(), &mut entries);
-        }
-        entries
+        DeTable::parse(&self.text).map_or(Vec::new(), |root| entries_of(root.get_ref()))
     }
 
     /// The key of an entry, without quotation marks.
     pub(super) fn name(&self, entry: &Entry) -> &str {
-        self.text.get(entry.key.clone()).unwrap_or_default().trim_matches(['"', '\''])
+        entry.name(&self.text)
     }
 
     /// The tables that begin on a line, of which a reader says no more.
@@ -293,29 +278,6 @@ impl Draft {
         self.text.replace_range(place, &new);
         self.guessed.insert(guessed);
         true
-    }
-}
-
-fn each_entry(tables: &str, table: &DeTable<'_>, entries: &mut Vec<Entry>) {
-    for (key, value) in table {
-        let items = match value.get_ref() {
-            DeValue::Array(items) => items.iter().map(Spanned::span).collect(),
-            _ => Vec::new(),
-        };
-        let is_table = value.get_ref().is_table();
-        entries.push(Entry { tables: tables.to_owned(), key: key.span(), value: value.span(), items, is_table });
-        let inner = if tables.is_empty() { key.get_ref().to_string() } else { format!("{tables}.{}", key.get_ref()) };
-        each_table(&inner, value, entries);
-    }
-}
-
-fn each_table(tables: &str, value: &Spanned<DeValue<'_>>, entries: &mut Vec<Entry>) {
-    match value.get_ref() {
-        DeValue::Table(table) => each_entry(tables, table, entries),
-        DeValue::Array(items) => {
-            items.iter().enumerate().for_each(|(at, item)| each_table(&format!("{tables}[{at}]"), item, entries));
-        }
-        _ => {}
     }
 }
 

@@ -2,8 +2,9 @@
 
 use crate::ConfigError;
 
-use super::draft::{Draft, Entry, Guess};
+use super::draft::{Draft, Guess};
 use super::wrong::Wrong;
+use crate::entries::Entry;
 use crate::near::is_near;
 
 /// A key that is there in place of another one.
