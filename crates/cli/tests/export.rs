@@ -52,6 +52,12 @@ fn export_names_what_is_wrong_and_writes_nothing() {
     for endless in ["/dev/zero", ROOT] {
         let said = wrong(&[&car(), "--check-elf", endless]);
         assert!(said.contains("no linked program") && said.contains("hint: "), "{said}");
+        let said = wrong(&[&car(), "--fmu", endless]);
+        assert!(said.contains("no linked shared library") && said.contains("embedded/fmu"), "{said}");
     }
+    let said = wrong(&[&car(), "--fmu", VEHICLE]);
+    assert!(said.contains("not a shared library of a model") && said.contains("embedded/fmu"), "{said}");
+    let said = wrong(&[&car(), "--fmu", "there-is-none.so"]);
+    assert!(said.contains("there-is-none.so") && said.contains("embedded/fmu"), "{said}");
     assert!(!Path::new(&out).exists());
 }

@@ -1,5 +1,7 @@
 //! What passes between C and the filter: plain words without padding.
 
+use core::mem::offset_of;
+
 use drivetrain::Real;
 use observer::gearbox::{ClutchEstimate, GearCommand, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput, ShiftPhase};
 use observer::{ChannelHealth, Channels};
@@ -151,6 +153,17 @@ impl Estimate {
         // SAFETY: as above; every word is a value of its member.
         unsafe { &mut *core::ptr::from_mut(self).cast() }
     }
+
+    /// Whether the word at this place is a real number; the others are whole ones.
+    pub const fn is_real(at: usize) -> bool {
+        let byte = 4 * at;
+        let [offgoing, oncoming] = [offset_of!(Self, offgoing), offset_of!(Self, oncoming)];
+        let of_clutch = offset_of!(Clutch, pressure_pa);
+        let is_whole = byte < offgoing + of_clutch
+            || (byte >= oncoming && byte < oncoming + of_clutch)
+            || byte >= offset_of!(Self, channels);
+        !is_whole
+    }
 }
 
 /// Words of an [`Input`].
@@ -167,6 +180,16 @@ impl Input {
     pub fn words_mut(&mut self) -> &mut [u32; INPUT_WORDS] {
         // SAFETY: as above; every word is a value of its member.
         unsafe { &mut *core::ptr::from_mut(self).cast() }
+    }
+
+    /// Whether the word at this place is a real number; the others are whole ones.
+    pub const fn is_real(at: usize) -> bool {
+        let byte = 4 * at;
+        let [first, whole, commands] =
+            [offset_of!(Self, engine_rad_s), offset_of!(Self, lock_up_applied), offset_of!(Self, commands)];
+        let in_readings = if byte >= commands { byte - commands } else { byte.wrapping_sub(first) };
+        let is_whole = byte >= whole && byte < commands;
+        byte < first || !is_whole && in_readings % size_of::<Reading>() != offset_of!(Reading, came)
     }
 
     /// In neutral, with a reading of each speed and command in each step, and none of torque and oil.

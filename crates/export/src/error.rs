@@ -42,6 +42,14 @@ pub enum ExportError {
         "`{0}` of the program is of another car or version: the first difference is `{1}`\nhint: export again into the folder that the program is built from"
     )]
     OtherParameters(String, String),
+    /// A file is no library of a model.
+    #[error(
+        "not a shared library of a model: {0}\nhint: it is built from the sources of wetclutch: cargo build --release --locked --manifest-path embedded/fmu/Cargo.toml --target-dir target"
+    )]
+    Library(String),
+    /// Two libraries are for the same platform.
+    #[error("two shared libraries of a model are for {0}\nhint: give one for each platform")]
+    PlatformTwice(&'static str),
     /// The shift of the self-test cannot be simulated.
     #[error("the shift {shift} of the self-test cannot be simulated: {message}")]
     SelfTest {

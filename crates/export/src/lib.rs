@@ -10,7 +10,9 @@ mod certificate;
 mod elf;
 mod error;
 mod estimate_members;
+mod fmu;
 mod header;
+mod input_members;
 mod parameters;
 mod readme;
 mod self_test;
@@ -19,6 +21,7 @@ mod units;
 
 use car::{Car, ErrorBudget, Sensors};
 use config::CarFile;
+use drivetrain::CommandKind;
 use observer::gearbox::{GearboxTables, MAX_ELEMENTS, ShiftRow};
 use observer::{GearboxFilter, ShiftTables, gearbox_filter};
 
@@ -37,6 +40,8 @@ pub struct ExportOptions {
     pub sensors: Option<Sensors>,
     /// A linked program with the parameters: its addresses go into the description for calibration tools.
     pub program: Option<Vec<u8>>,
+    /// Shared libraries of `embedded/fmu`, each for another platform: with one of them models for co-simulation are written too.
+    pub fmu_libraries: Vec<Vec<u8>>,
 }
 
 /// A file that is to be written.
@@ -120,11 +125,21 @@ impl ExportedFilter {
 
     /// Names of the elements, in the order of the tables.
     fn elements(&self) -> Vec<&str> {
-        let elements = self.car.gearbox.elements.iter().enumerate();
-        let mut named: Vec<_> =
-            elements.filter_map(|(at, element)| Some((self.tables.place(at)?, element.name.as_str()))).collect();
-        named.sort_unstable();
-        named.into_iter().map(|(_, name)| name).collect()
+        self.in_places().into_iter().map(|at| self.car.gearbox.elements[at].name.as_str()).collect()
+    }
+
+    /// What the valves of the elements are commanded by, in the same order.
+    fn command_kinds(&self) -> Vec<CommandKind> {
+        let kind = |at: usize| self.car.clutches.get(at)?.as_ref().map(|clutch| clutch.valve.command_kind());
+        self.in_places().into_iter().map(|at| kind(at).unwrap_or(CommandKind::Current)).collect()
+    }
+
+    /// The elements of the gearbox that are in the tables, in the order of the tables.
+    fn in_places(&self) -> Vec<usize> {
+        let elements = 0..self.car.gearbox.elements.len();
+        let mut placed: Vec<_> = elements.filter_map(|at| Some((self.tables.place(at)?, at))).collect();
+        placed.sort_unstable();
+        placed.into_iter().map(|(_, at)| at).collect()
     }
 }
 
@@ -160,5 +175,8 @@ pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFil
     ];
     let mut files: Vec<_> = texts.into_iter().map(|(name, text)| ExportedFile::text(name, text)).collect();
     files.push(ExportedFile { name: format!("wetclutch_{name}_parameters.bin"), bytes: image.bytes() });
+    if !options.fmu_libraries.is_empty() {
+        files.extend(fmu::models(&filter, &image, &options.fmu_libraries)?);
+    }
     Ok(files)
 }

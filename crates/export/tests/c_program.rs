@@ -40,15 +40,19 @@ pub(crate) fn run_in(folder: &Path, program: &str, arguments: &[&str]) -> String
 
 /// Builds the library for this machine; a panic that can be reached would let the C programs not link.
 fn library() -> PathBuf {
+    built_with_cargo("embedded/library/Cargo.toml").join("libwetclutch.a")
+}
+
+/// Builds what is not of the workspace, for this machine. Returns the folder with it.
+pub(crate) fn built_with_cargo(manifest: &str) -> PathBuf {
     let target = root().join("target/library");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let manifest = root().join("embedded/library/Cargo.toml");
     run(Command::new(cargo)
         .args(["build", "--release", "--locked", "--manifest-path"])
-        .arg(manifest)
+        .arg(root().join(manifest))
         .arg("--target-dir")
         .arg(&target));
-    target.join("release/libwetclutch.a")
+    target.join("release")
 }
 
 /// Compilers that are there.
@@ -76,7 +80,7 @@ pub(crate) fn exported(folder: &Folder, vehicle: &str) {
 }
 
 /// Every word of an input.
-fn input_bytes(input: &Input) -> Vec<u8> {
+pub(crate) fn input_bytes(input: &Input) -> Vec<u8> {
     let Input { dt_s, lock_up_applied, gear_from, gear_to, .. } = *input;
     let reading = |of: &ecu::Reading| [of.value.to_bits(), of.age_s.to_bits(), of.came];
     let speeds = [

@@ -4,6 +4,7 @@
 
 mod a2l;
 mod c_program;
+mod fmu;
 mod image;
 mod readings;
 mod same_bits;

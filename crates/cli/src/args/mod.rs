@@ -292,6 +292,7 @@ pub(crate) enum Command {
     ///   wetclutch_CAR_selftest.c        a simulated shift and its estimates to the last bit
     ///   example.c, README.md            the observer in a task, and how it is built
     ///   certificate.md, report.md       what the ranges assume; sizes
+    ///   wetclutch_CAR_fmi2.fmu, ...fmi3.fmu    with --fmu: the observer for co-simulation (FMI 2.0, FMI 3.0)
     ///
     /// The same car gives the same bytes. The library is built from the sources, once for each controller; README.md says how.
     ///
@@ -394,6 +395,9 @@ pub(crate) struct Export {
     /// Linked program of the controller with these parameters: its addresses go into the .a2l; fails if its parameters are others
     #[arg(long, value_name = "FIRMWARE.elf")]
     pub(crate) check_elf: Option<PathBuf>,
+    /// Models for co-simulation as well (FMI 2.0 and 3.0), with this shared library of embedded/fmu; repeat it for another platform
+    #[arg(long, value_name = "LIBRARY")]
+    pub(crate) fmu: Vec<PathBuf>,
     /// Folder for the files
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,

@@ -15,8 +15,9 @@ pub(crate) fn export(options: &Export) -> Result<(), Failure> {
     let vehicle = VehicleFile::read(&options.vehicle)?;
     let sensors = options.sensors.as_deref().map(read_sensors).transpose()?;
     let program = options.check_elf.as_deref().map(read_program).transpose()?;
-    let files = wetclutch::export(&vehicle, &ExportOptions { shift: options.shift.clone(), sensors, program })
-        .map_err(|error| named(&options.vehicle, error))?;
+    let fmu_libraries = options.fmu.iter().map(|path| read_library(path)).collect::<Result<_, _>>()?;
+    let exported = ExportOptions { shift: options.shift.clone(), sensors, program, fmu_libraries };
+    let files = wetclutch::export(&vehicle, &exported).map_err(|error| named(&options.vehicle, error))?;
     writable(&options.output, &[])?;
     for file in &files {
         not_an_input(Some(&options.output.join(&file.name)), [&options.vehicle])?;
@@ -41,11 +42,22 @@ const MOST_BYTES: u64 = 1 << 28;
 
 /// The linked program of a controller.
 fn read_program(path: &Path) -> Result<Vec<u8>, Failure> {
+    read_linked(path, "program", "give the ELF file that the linker wrote")
+}
+
+/// The shared library of models for co-simulation.
+fn read_library(path: &Path) -> Result<Vec<u8>, Failure> {
+    let build = "cargo build --release --locked --manifest-path embedded/fmu/Cargo.toml --target-dir target";
+    read_linked(path, "shared library", &format!("it is built from the sources of wetclutch: {build}"))
+}
+
+/// What a linker wrote.
+fn read_linked(path: &Path, what: &str, hint: &str) -> Result<Vec<u8>, Failure> {
     let failure = |message: String| Failure::Input(format!("{}: {message}", path.shown()));
-    let there = std::fs::metadata(path).map_err(|error| failure(error.to_string()))?;
+    let there = std::fs::metadata(path).map_err(|error| failure(format!("{error}\nhint: {hint}")))?;
     if !there.is_file() || there.len() > MOST_BYTES {
         return Err(failure(format!(
-            "no linked program: it is a regular file of at most {} MB\nhint: give the ELF file that the linker wrote",
+            "no linked {what}: it is a regular file of at most {} MB\nhint: {hint}",
             MOST_BYTES >> 20
         )));
     }
