@@ -26,7 +26,7 @@ fn a_wrong_image_is_refused_with_its_reason() {
     assert_eq!(refused(&[words.clone(), vec![0]].concat()), status::IMAGE_SIZE);
     assert_eq!(refused(&changed(0, 0)), status::IMAGE_MAGIC);
     assert_eq!(refused(&words.iter().map(|word| word.swap_bytes()).collect::<Vec<_>>()), status::IMAGE_MAGIC);
-    assert_eq!(refused(&changed(1, 2)), status::IMAGE_VERSION);
+    assert_eq!(refused(&changed(1, ecu::FORMAT_VERSION + 1)), status::IMAGE_VERSION);
     for (at, word) in words.iter().enumerate().skip(3) {
         assert_eq!(refused(&changed(at, word ^ (1 << (at % 32)))), status::IMAGE_CHECKSUM, "{at}");
     }
