@@ -19,6 +19,8 @@ pub struct ShiftClutch {
     pub has_stroke: bool,
     /// Peak of the drag of the open clutch, N m.
     pub drag_n_m: f64,
+    /// Mass of all steel plates, kg, where it is given: they take the heat of a shift.
+    pub steel_mass_kg: Option<f64>,
 }
 
 impl ShiftClutch {

@@ -243,5 +243,6 @@ fn clutch(element: &GearboxElement) -> Result<Option<ShiftClutch>, TemplateError
         cylinder: Cylinder::of_clutch(&clutch).with_oil(WARM_OIL_DEGC),
         has_stroke: false,
         drag_n_m: DRAG_N_M,
+        steel_mass_kg: None,
     }))
 }

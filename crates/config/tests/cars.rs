@@ -228,6 +228,17 @@ fn a_key_of_the_file_replaces_that_of_the_eight_speed_car() {
 }
 
 #[test]
+fn the_mass_of_the_steel_plates_is_that_of_one_element_or_not_known() {
+    let masses = |text: &str| -> Vec<_> {
+        car(text).unwrap().clutches.iter().flatten().map(|clutch| clutch.steel_mass_kg).collect()
+    };
+    assert_eq!(masses(""), [None; 5]);
+    assert_eq!(masses("[clutch.C]\nsteel_mass_kg = 0.6\n"), [None, None, Some(0.6), None, None]);
+    let error = car("[clutch.C]\nsteel_mass_kg = 600\n").unwrap_err();
+    assert!(error.contains("car.toml:4: `clutch.C.steel_mass_kg` is 600, expected 0.05 to 20"), "{error}");
+}
+
+#[test]
 fn a_table_fill_gives_the_pistons_a_stroke() {
     let strokes = |text: &str| -> Vec<Option<f64>> {
         let mm = |clutch: &car::ShiftClutch| 1e3 * clutch.cylinder.stroke_m3 / clutch.clutch.piston_area_m2;
@@ -294,6 +305,7 @@ fn the_shipped_vehicle_files_are_right() {
         ("six_speed", 5),
         ("four_speed", 5),
         ("four_speed_one_way", 5),
+        ("three_speed_c6", 4),
         ("four_speed_fn4a", 5),
         ("four_speed_simpson", 6),
         ("six_speed_tf80sc", 5),

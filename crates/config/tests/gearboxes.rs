@@ -230,6 +230,50 @@ fn all_holding_torques_of_the_four_and_six_speed_gearboxes_come_out() {
     );
 }
 
+fn c6() -> Gearbox {
+    gearbox!("../../../gearboxes/c6.toml")
+}
+fn th400() -> Gearbox {
+    gearbox!("gearboxes/th400.toml")
+}
+
+#[test]
+fn simpson_three_speeds_have_the_published_ratios_and_one_way_clutches_take_single_elements_over() {
+    assert_ratios(&c6(), "R L 1 2 3", "-2.18 2.46 2.46 1.46 1.00", Printed::Rounded);
+    assert_ratios(&th400(), "R 1 L 2 3", "-2.08 2.48 2.48 1.48 1.00", Printed::Rounded);
+    // The sun of equal sets carries `ring over sun` of the turbine torque in 2nd, both sets together that of 1st.
+    assert_torques(
+        &c6(),
+        &[
+            "DIR 1.000 LR -3.182",
+            "FWD 1.000 LR 1.458",
+            "FWD 1.000 F1 1.458",
+            "FWD 1.000 INT 0.458",
+            "FWD 0.686 DIR 0.314",
+        ],
+    );
+    assert_torques(
+        &th400(),
+        &[
+            "DIR 1.000 LR -3.077 F2 0.000",
+            "FWD 1.000 F1 1.481 F2 0.000",
+            "FWD 1.000 LR 1.481 F2 0.000",
+            "FWD 1.000 INT 0.481 F2 0.481",
+            "FWD 0.675 INT 0.000 DIR 0.325",
+        ],
+    );
+    for (gearbox, ups) in [(c6(), [["F1", "INT"], ["INT", "DIR"]]), (th400(), [["F1", "INT"], ["F2", "DIR"]])] {
+        // A sprag behind a brake, which carries nothing in L, does not make it the gear of a one-way clutch.
+        assert_eq!(gearbox.forward_gears(), ["1", "2", "3"].map(|name| gearbox.gear(name).unwrap()));
+        for (pair, [off, on]) in gearbox.forward_gears().windows(2).zip(ups) {
+            let element = |name: &str| gearbox.elements.iter().position(|element| element.name == name).unwrap();
+            let up = gearbox.shift(pair[0], pair[1]).unwrap();
+            assert_eq!(up.change.single(), Some([element(off), element(on)]), "{}", gearbox.name);
+            assert_eq!(gearbox.shift(pair[1], pair[0]).unwrap().change.single(), Some([element(on), element(off)]));
+        }
+    }
+}
+
 /// Not published: the element released and the output held, its slip is the reciprocal of its torque, in exact fractions.
 #[test]
 fn holding_torques_are_those_of_virtual_work() {

@@ -10,9 +10,12 @@ use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating,
 
 use crate::EvaluateError;
 use crate::checks::log_beside::is_of_its_gears;
+use crate::felt_shift::{FeltShift, Motion};
+use crate::plate_temperature::PlateTemperatures;
 use crate::recording::Recording;
 use crate::score::row;
 pub use crate::scored_shift::{DriveState, ScoredShift};
+use crate::shift_comfort::{AccelerationSource, ShiftComfort};
 use crate::shift_summary::ShiftSummary;
 use crate::thinned::thinned;
 use crate::worth_a_look::chosen;
@@ -53,6 +56,7 @@ impl ScoredDrive {
 pub(crate) struct PassingShifts {
     pub(crate) drive: ScoredDrive,
     pub(crate) open: Option<ScoredShift>,
+    plates: PlateTemperatures,
     /// States that were left when some were left out the last time.
     left: usize,
     /// Shifts that are drawn, by their places, as far as it is decided; and how many shifts it is decided of.
@@ -89,17 +93,30 @@ impl PassingShifts {
         }
     }
 
-    pub(crate) fn end(&mut self, mut quality: CarShiftQuality) {
-        if self.open.as_ref().is_some_and(|open| open.is_garage) {
+    /// Gives what was felt to the shift that ended last, where it is known.
+    pub(crate) fn take_comfort(&mut self, comfort: Option<ShiftComfort>) {
+        if let Some((comfort, shift)) = comfort.zip(self.drive.shifts.last_mut()).filter(|(_, shift)| !shift.is_garage)
+        {
+            shift.comfort = Some(comfort);
+        }
+    }
+
+    /// Ends the open shift of a car with oil of this temperature, degC.
+    pub(crate) fn end(&mut self, car: &Car, oil_degc: f64, mut quality: CarShiftQuality) {
+        let Some(shift) = self.open.take() else { return };
+        if shift.is_garage {
             (quality.flare_rad_s, quality.past_synchronous_rad_s) = (f64::NAN, f64::NAN);
         }
-        self.drive.shifts.extend(self.open.take().map(|shift| {
-            let mut summary = ShiftSummary::of(&shift.rows, shift.kind);
-            if !is_of_its_gears(shift.kind, &quality, shift.time_s[1] - shift.time_s[0]) {
-                summary.friction_work_j = [None; 2];
-            }
-            ScoredShift { quality, summary, ..shift }
-        }));
+        let mut summary = ShiftSummary::of(&shift.rows, shift.kind);
+        let [begin_s, end_s] = shift.time_s;
+        if !is_of_its_gears(shift.kind, &quality, end_s - begin_s) {
+            summary.friction_work_j = [None; 2];
+        }
+        let [_, plates_degc] = [0, 1].map(|clutch| {
+            let (element, [work_j, ..]) = shift.elements[clutch].zip(summary.friction_work_j[clutch])?;
+            self.plates.heated(car, element, work_j, end_s, oil_degc)
+        });
+        self.drive.shifts.push(ScoredShift { quality, summary, plates_degc, ..shift });
     }
 
     /// Keeps what figures need of at most so many of the shifts that are wanted: those with the largest errors, of equal ones the first; where
@@ -150,11 +167,18 @@ impl PassingShifts {
             elements,
             time_s: [time_s; 2],
             quality: CarShiftQuality::default(),
+            comfort: None,
+            plates_degc: None,
             rows: Vec::new(),
             summary: ShiftSummary::default(),
             is_drawn: true,
         });
     }
+}
+
+/// Slips of these gears at these speeds of turbine and output, rad/s at the turbine; not a number of neutral.
+pub(crate) fn slips_rad_s(car: &Car, gears: [usize; 2], [turbine, output]: [f64; 2]) -> [f64; 2] {
+    gears.map(|gear| turbine - car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio) * output)
 }
 
 /// Whether two ratios are of gears in one direction; neutral has no number.
@@ -193,6 +217,7 @@ pub struct DriveScorer<'a> {
     state: GearboxState<f64>,
     passing: PassingShifts,
     rating: Option<CarShiftRating>,
+    felt: FeltShift,
     last: Option<CarSample>,
 }
 
@@ -205,20 +230,32 @@ impl<'a> DriveScorer<'a> {
         filter: &'a GearboxFilter<'a, f64>,
     ) -> Self {
         let (state, passing) = (filter.start(), PassingShifts::default());
-        Self { known, model, tables, filter, state, passing, rating: None, last: None }
+        let felt = FeltShift::of(AccelerationSource::Vehicle);
+        Self { known, model, tables, filter, state, passing, rating: None, felt, last: None }
     }
 
     /// Takes the next sample and what the filter is shown of it.
     pub fn push(&mut self, sample: &CarSample, input: &ShiftInput<f64>) {
-        let Self { known, passing, rating, .. } = self;
+        let Self { known, passing, rating, felt, .. } = self;
         let estimate = self.filter.step(&mut self.state, input);
         passing.state(state_of(sample, estimate.health));
         self.last = Some(*sample);
         let [from, to] = sample.gears().map(|gear| gear.unwrap_or(NO_GEAR));
         let gears = (from != to).then_some([from, to]);
         if passing.ends(gears) {
-            end(passing, rating, sample);
+            end(known, passing, rating, sample);
+            let complete = passing.drive.shifts.last().filter(|shift| shift.quality.complete_s.is_some());
+            felt.end(complete.map(|_| sample.time_s));
         }
+        if passing.open.is_none() && gears.is_some() {
+            passing.take_comfort(felt.begin(sample.time_s));
+        }
+        felt.push(Motion {
+            time_s: sample.time_s,
+            value: sample.vehicle_m_s2,
+            slips_rad_s: slips_rad_s(known, [from, to], [sample.torques.turbine_rad_s, sample.torques.output_rad_s]),
+        });
+        passing.take_comfort(felt.ended(sample.time_s));
         if gears.is_none() {
             return;
         }
@@ -240,18 +277,20 @@ impl<'a> DriveScorer<'a> {
 
     /// The drive.
     pub fn finish(mut self) -> ScoredDrive {
+        let comfort = self.felt.finish();
+        self.passing.take_comfort(comfort);
         if let Some(last) = &self.last {
-            end(&mut self.passing, &mut self.rating, last);
+            end(self.known, &mut self.passing, &mut self.rating, last);
         }
         self.passing.drive
     }
 }
 
 /// Ends the open shift with the first sample after it.
-fn end(passing: &mut PassingShifts, rating: &mut Option<CarShiftRating>, after: &CarSample) {
+fn end(car: &Car, passing: &mut PassingShifts, rating: &mut Option<CarShiftRating>, after: &CarSample) {
     if let Some(mut rating) = rating.take() {
         rating.push(after);
-        passing.end(rating.quality());
+        passing.end(car, car.oil_temperature_degc, rating.quality());
     }
 }
 
@@ -312,6 +351,8 @@ mod tests {
             elements: [Some(0), Some(1)],
             time_s: [5.0, 5.2],
             quality: CarShiftQuality::default(),
+            comfort: None,
+            plates_degc: None,
             summary: ShiftSummary::of(&rows, kind),
             rows,
             is_drawn: true,

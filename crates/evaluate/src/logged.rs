@@ -21,9 +21,11 @@ use crate::checks::in_gear::{InGear, InGearRow};
 use crate::checks::lock_up_check::LockUpCheck;
 use crate::checks::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk, not_of_their_gears};
 use crate::checks::still_commands::StillCommands;
-use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift};
+use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift, slips_rad_s};
+use crate::felt_shift::{FeltShift, Motion};
 use crate::learning_count::LearningCount;
 use crate::score::within;
+use crate::shift_comfort::AccelerationSource;
 use crate::{ClutchRow, EvaluateError, ROUNDING_N_M, ROUNDING_PA, ShiftScoreRow};
 
 /// Slip below which a true clutch sticks, rad/s.
@@ -60,6 +62,9 @@ pub struct LoggedDrive<'c> {
     carried: CarriedPressures,
     doubted: DoubtedPressures,
     jerk: ShiftJerk,
+    felt: FeltShift,
+    /// Newest temperature of the oil, degC; that of the vehicle file where the log has none.
+    oil_degc: f64,
 }
 
 /// Holes of the recording within shifts.
@@ -135,6 +140,8 @@ impl<'c> LoggedDrive<'c> {
             carried: CarriedPressures::default(),
             doubted: DoubtedPressures::default(),
             jerk: ShiftJerk::default(),
+            felt: FeltShift::of(AccelerationSource::OutputSpeed),
+            oil_degc: car.oil_temperature_degc,
         }
     }
 
@@ -162,6 +169,7 @@ impl<'c> LoggedDrive<'c> {
         let input = &step.input;
         if let Some(degc) = step.oil_degc {
             self.state.take_oil_temperature(degc);
+            self.oil_degc = degc;
         }
         let mut estimate = self.filter.step(&mut self.state, input);
         if self.delay.is_found() {
@@ -236,6 +244,15 @@ impl<'c> LoggedDrive<'c> {
         let jerk_m_s3 = self.jerk.ended(step.time_s);
         self.passing.take_jerk(jerk_m_s3);
         let [_, turbine, output] = self.speeds_rad_s;
+        if let Some(reading) = input.output_rad_s.filter(|_| !estimate.channels.output.is_refused()) {
+            self.felt.push(Motion {
+                time_s: step.time_s - reading.age_s,
+                value: reading.value / self.car.driveline.final_ratio * self.car.road.wheel_radius_m,
+                slips_rad_s: slips_rad_s(self.car, [from, to], [turbine, output]),
+            });
+        }
+        let comfort = self.felt.ended(step.time_s);
+        self.passing.take_comfort(comfort);
         self.delay.push(step, &estimate, [turbine, output]);
         estimate
     }
@@ -297,6 +314,8 @@ impl<'c> LoggedDrive<'c> {
             self.begun_s = step.time_s;
             let jerk_m_s3 = self.jerk.begin(step.time_s);
             self.passing.take_jerk(jerk_m_s3);
+            let comfort = self.felt.begin(step.time_s);
+            self.passing.take_comfort(comfort);
             self.still.begin();
             let ratios = [from, to].map(|gear| self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
             self.beyond = BeyondGears::new(&self.car.gearbox, [from, to], ratios);
@@ -355,8 +374,9 @@ impl<'c> LoggedDrive<'c> {
         // A log has no slip of the held elements.
         let unknown =
             CarShiftQuality { jerk_m_s3: f64::NAN, held_slip_rad_s: f64::NAN, tie_up_n_m: f64::NAN, ..shift.quality };
-        self.passing.end(CarShiftQuality { complete_s, ..unknown });
+        self.passing.end(self.car, self.oil_degc, CarShiftQuality { complete_s, ..unknown });
         self.jerk.end(at.map(|(time_s, _)| time_s));
+        self.felt.end(completed_s);
     }
 
     /// Keeps what figures need of at most so many of the shifts up to now that are wanted, those with the largest errors, or without truth those
@@ -369,6 +389,8 @@ impl<'c> LoggedDrive<'c> {
     pub fn finish(mut self) -> ScoredDrive {
         let jerk_m_s3 = self.jerk.ended(f64::INFINITY);
         self.passing.take_jerk(jerk_m_s3);
+        let comfort = self.felt.finish();
+        self.passing.take_comfort(comfort);
         // A shift that the log cuts off is not complete.
         self.end(None);
         let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));

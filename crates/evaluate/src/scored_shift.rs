@@ -5,6 +5,7 @@ use observer::Health;
 use plant::car::CarShiftQuality;
 
 use crate::errors::ErrorsByPhase;
+use crate::shift_comfort::ShiftComfort;
 use crate::shift_summary::{ShiftSummary, spans_s};
 use crate::{ShiftScoreRow, TruePhase};
 
@@ -44,6 +45,10 @@ pub struct ScoredShift {
     pub time_s: [f64; 2],
     /// How it went.
     pub quality: CarShiftQuality,
+    /// What the occupants feel of it; `None` of a garage shift, of one that was not completed, and without a speed or acceleration around it.
+    pub comfort: Option<ShiftComfort>,
+    /// Temperature of the steel plates of the oncoming clutch after it, degC, where their mass and the friction work are known.
+    pub plates_degc: Option<f64>,
     /// Truth and estimates; empty where the filter has no tables, and where [`Self::is_drawn`] is false.
     pub rows: Vec<ShiftScoreRow>,
     /// What the rows say together.

@@ -1,16 +1,20 @@
-//! What the occupants feel of a shift: steps, holes and sign changes of the vehicle acceleration.
+//! What the occupants feel of a shift: steps, holes and sign changes of the vehicle acceleration, its vibration dose, and a rating.
 //!
 //! All quantities come from the longitudinal acceleration of the vehicle, averaged over 50 ms around each time: a centred mean has no
 //! delay, and takes an oscillation of 8.9 Hz to 0.7 of its amplitude. The acceleration *before* is the mean over the 0.2 s before the
 //! request, the acceleration *after* that from 0.3 s to 0.5 s after the end of the shift. A change from one to the other is the purpose
 //! of the shift: only what lies beyond both is an excursion.
 
+use plant::car::CarShiftQuality;
+
+use crate::weighting::Weighting;
+
 /// The acceleration is averaged over this time, s.
 pub const MEAN_S: f64 = 0.05;
 /// The acceleration before the shift is the mean over this time before the request, s.
-const BEFORE_S: f64 = 0.2;
+pub(crate) const BEFORE_S: f64 = 0.2;
 /// The acceleration after the shift is the mean over this span after its end, s.
-const AFTER_S: [f64; 2] = [0.3, 0.5];
+pub(crate) const AFTER_S: [f64; 2] = [0.3, 0.5];
 /// A torque hole is this fraction of the acceleration before, and deeper.
 const HOLE: f64 = 0.1;
 /// The after-shock is sought so long after the synchronous speed, s.
@@ -21,6 +25,33 @@ const LEAST_M_S2: f64 = 0.5;
 const SIGN_M_S2: f64 = 0.1;
 /// Slip from which on an element counts as slipping, rad/s at the turbine.
 const SLIPS_RAD_S: f64 = 3.0;
+
+/// What the rating compares with \[chosen\]: what a calibrator of a series transmission would accept. Vibration dose, m/s^1.75; jerk,
+/// m/s^3; step, m/s^2; depth of the hole, a fraction; duration, s; flare, rad/s.
+const ACCEPTED: [f64; 6] = [0.5, 5.0, 0.5, 0.35, 1.4, 3.0];
+/// The best rating, the lowest one, and what is taken off where every quantity is just accepted.
+const BEST: f64 = 10.0;
+const LOWEST: f64 = 1.0;
+const ACCEPTED_LOSS: f64 = 3.0;
+
+/// What the acceleration is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AccelerationSource {
+    /// The acceleration of the vehicle, as a simulation has it.
+    Vehicle,
+    /// The slope of the output speed of the gearbox: the drive shafts swing in it.
+    OutputSpeed,
+}
+
+impl AccelerationSource {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Vehicle => "vehicle",
+            Self::OutputSpeed => "output_speed",
+        }
+    }
+}
 
 /// A vehicle in a shift at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,6 +83,13 @@ pub struct ShiftComfort {
     pub sign_changes: usize,
     /// Time from the first slip of the old gear to the synchronous speed of the new one, s; not a number if that is not reached.
     pub inertia_phase_s: f64,
+    /// Time from the request to the first slip of the old gear, s; not a number if the synchronous speed is not reached.
+    pub response_s: f64,
+    /// Vibration dose value from the request to 0.5 s after the end, m/s^1.75: the fourth root of the integral of the fourth power of the
+    /// acceleration, weighted by `W_d` of ISO 2631-1.
+    pub vibration_dose_m_s1_75: f64,
+    /// What the acceleration is taken from.
+    pub source: AccelerationSource,
 }
 
 impl ShiftComfort {
@@ -81,8 +119,45 @@ impl ShiftComfort {
             after_shock_m_s2: after_shock.map(|(_, a)| (a - after).abs()).fold(0.0, f64::max),
             sign_changes: sign_changes(&felt),
             inertia_phase_s: phase_s.map_or(f64::NAN, |[from_s, to_s]| to_s - from_s),
+            response_s: phase_s.map_or(f64::NAN, |[from_s, _]| from_s - request_s),
+            vibration_dose_m_s1_75: vibration_dose(samples, [request_s, end_s + AFTER_S[1]], before),
+            source: AccelerationSource::Vehicle,
         })
     }
+
+    /// How far the acceleration lies beyond those before and after, at most, m/s^2.
+    pub fn step_m_s2(&self) -> f64 {
+        let [below, above] = self.beyond_m_s2;
+        below.max(above)
+    }
+
+    /// A rating from 10 to 1 of a shift that was completed: `10 - 3 r`, where `r` is the mean of fourth powers, and its fourth root, of
+    /// vibration dose, jerk, step, depth of the hole, duration and flare over what is accepted of each. So the worst of them counts most, 7 is
+    /// a shift that is just accepted in all of them, and what is not known is left out.
+    pub fn rating(&self, quality: &CarShiftQuality) -> Option<f64> {
+        let CarShiftQuality { jerk_m_s3, flare_rad_s, complete_s, .. } = *quality;
+        let values = [self.vibration_dose_m_s1_75, jerk_m_s3, self.step_m_s2(), self.hole, complete_s?, flare_rad_s];
+        let over =
+            values.iter().zip(ACCEPTED).map(|(value, accepted)| value / accepted).filter(|over| over.is_finite());
+        let (sum, count) = over.fold((0.0, 0.0), |(sum, count), over| (sum + over * over * over * over, count + 1.0));
+        let mean: f64 = sum / count;
+        (count > 0.0).then(|| (BEST - ACCEPTED_LOSS * mean.sqrt().sqrt()).max(LOWEST))
+    }
+}
+
+/// The vibration dose value of a span of time, m/s^1.75, of a car that has accelerated evenly until then, m/s^2.
+fn vibration_dose(samples: &[FeltSample], [from_s, to_s]: [f64; 2], before_m_s2: f64) -> f64 {
+    let mut weighting = Weighting::at_rest(before_m_s2);
+    let fourth = |weighted: f64| weighted * weighted * weighted * weighted;
+    let (mut dose, mut last, mut last_s) = (0.0, 0.0, from_s);
+    for sample in within(samples, [from_s, to_s]) {
+        let step_s = sample.time_s - last_s;
+        let weighted = fourth(weighting.step(step_s, sample.acceleration_m_s2));
+        dose += 0.5 * step_s * (last + weighted);
+        (last, last_s) = (weighted, sample.time_s);
+    }
+    let dose: f64 = dose;
+    dose.sqrt().sqrt()
 }
 
 /// Mean acceleration in a span of time, m/s^2.
@@ -107,7 +182,7 @@ fn smooth(samples: &[FeltSample], span_s: [f64; 2]) -> Vec<(f64, f64)> {
 
 /// How long a condition holds in all, s.
 fn lasting(felt: &[(f64, f64)], holds: impl Fn(f64) -> bool) -> f64 {
-    felt.windows(2).filter(|pair| holds(pair[0].1)).map(|pair| pair[1].0 - pair[0].0).sum()
+    felt.windows(2).filter(|pair| holds(pair[0].1)).fold(0.0, |length_s, pair| length_s + (pair[1].0 - pair[0].0))
 }
 
 fn sign_changes(felt: &[(f64, f64)]) -> usize {
@@ -175,6 +250,49 @@ mod tests {
             _ => -1.0,
         });
         assert_eq!((comfort.sign_changes, comfort.hole, comfort.traction), (2, 0.0, 1.0));
+    }
+
+    /// The first half of a swing that the weighting passes, against the integral of the fourth power of a sine.
+    #[test]
+    fn the_vibration_dose_of_a_swing_is_that_of_its_weighted_fourth_power() {
+        use std::f64::consts::TAU;
+        let comfort = shift(|t| if (1.0..2.5).contains(&t) { (TAU * 4.0 * (t - 1.0)).sin() } else { 0.0 });
+        // Amplitude 0.512 at 4 Hz, for 1.5 s.
+        let expected = 0.512 * (1.5 * 3.0 / 8.0_f64).sqrt().sqrt();
+        let dose = comfort.vibration_dose_m_s1_75;
+        assert!((dose / expected - 1.0).abs() < 0.05, "{dose} {expected}");
+        // A change from one acceleration to the other is felt, the more the faster it is.
+        let change = |length_s: f64| shift(|t| 2.0 - ((t - 1.2) / length_s).clamp(0.0, 1.0)).vibration_dose_m_s1_75;
+        assert!(shift(|_| 2.0).vibration_dose_m_s1_75 < 1e-9);
+        assert!(change(0.05) > 1.2 * change(0.5) && change(0.5) > 0.1, "{} {}", change(0.05), change(0.5));
+    }
+
+    #[test]
+    fn the_rating_is_7_where_all_is_just_accepted_and_the_worst_quantity_counts_most() {
+        let of = |factors: [f64; 6]| {
+            let [dose, jerk, step, hole, complete, flare] = [0, 1, 2, 3, 4, 5].map(|at| factors[at] * ACCEPTED[at]);
+            let comfort = ShiftComfort {
+                vibration_dose_m_s1_75: dose,
+                beyond_m_s2: [0.0, step],
+                hole,
+                ..shift(|t| 2.0 - ((t - 1.2) / 0.5).clamp(0.0, 1.0))
+            };
+            let quality = CarShiftQuality {
+                jerk_m_s3: jerk,
+                complete_s: Some(complete),
+                flare_rad_s: flare,
+                ..CarShiftQuality::default()
+            };
+            comfort.rating(&quality).unwrap()
+        };
+        assert!((of([1.0; 6]) - 7.0).abs() < 1e-12 && (of([0.5; 6]) - 8.5).abs() < 1e-12 && of([0.0; 6]) == 10.0);
+        assert_eq!(of([9.0; 6]), 1.0);
+        // One at twice what is accepted costs more than all of them at what is accepted.
+        assert!(of([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]) < 6.5, "{}", of([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        // What is not known is left out.
+        assert!((of([1.0, f64::NAN, 1.0, 1.0, 1.0, f64::NAN]) - 7.0).abs() < 1e-12);
+        let comfort = shift(|_| 2.0);
+        assert_eq!(comfort.rating(&CarShiftQuality::default()), None, "not completed");
     }
 
     #[test]

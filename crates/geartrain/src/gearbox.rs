@@ -130,10 +130,10 @@ impl Gearbox {
         self.elements.get(element).is_some_and(|element| element.kind == ElementKind::OneWayClutch)
     }
 
-    /// The one-way clutch that is engaged in a gear.
+    /// The one-way clutch that holds a gear: one that is engaged without torque, as behind an open brake, holds none.
     pub fn one_way_clutch_of(&self, gear: usize) -> Option<usize> {
-        let holding = self.gears.get(gear)?.holding.iter().map(|holding| holding.element);
-        holding.into_iter().find(|&element| self.is_one_way(element))
+        let holds = |holding: &&Holding| self.is_one_way(holding.element) && holding.per_turbine_torque > ZERO;
+        self.gears.get(gear)?.holding.iter().find(holds).map(|holding| holding.element)
     }
 
     /// Whether only dogs change between its forward gears, as behind one clutch: no clutch takes the load over from another.

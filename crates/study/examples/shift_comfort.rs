@@ -52,11 +52,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     for kind in ShiftKind::ALL {
         let bars = Bar::of(kind);
         println!("{}", kind.name());
-        println!("  {:28}{}", "", bars.iter().map(|bar| format!("{:>13}", bar.name)).collect::<String>());
+        println!("  {:28}{}", "", titles(&bars));
         let shifts: Vec<&(String, Felt)> = all.iter().filter(|(_, felt)| felt.kind == kind).collect();
         for (label, felt) in &shifts {
             let cell = |bar: &Bar| format!("{:>12.2}{}", (bar.value)(felt), if bar.is_met(felt) { " " } else { "*" });
-            println!("  {label:28}{}", bars.iter().map(cell).collect::<String>());
+            let (dose, rating) = (felt.comfort.vibration_dose_m_s1_75, felt.rating().unwrap_or(f64::NAN));
+            println!("  {label:28}{}{dose:>13.2}{rating:>13.1}", bars.iter().map(cell).collect::<String>());
         }
         let met = |bar: &Bar| shifts.iter().filter(|(_, felt)| bar.is_met(felt)).count();
         let counts = bars.iter().map(|bar| format!("{:>13}", format!("{}/{}", met(bar), shifts.len())));
@@ -65,4 +66,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let is_good = |(_, felt): &&(String, Felt)| Bar::of(felt.kind).iter().all(|bar| bar.is_met(felt));
     println!("{} of {} shifts are within all bars", all.iter().filter(is_good).count(), all.len());
     Ok(())
+}
+
+fn titles(bars: &[Bar]) -> String {
+    let names = bars.iter().map(|bar| bar.name).chain(["VDV, m/s1.75", "rating"]);
+    names.map(|name| format!("{name:>13}")).collect()
 }

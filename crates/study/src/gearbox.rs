@@ -20,7 +20,7 @@ pub mod tour;
 pub use evaluate::score::{inputs, score_from, score_samples, score_shift, simulated};
 pub use evaluate::{
     ClutchRow, EvaluateError, RECORD_S, SAMPLE_S, ShiftScoreRow, SquaredErrors, TruePhase, drive, learning_count,
-    logged, measured, recording, shift_summary, worth_a_look,
+    logged, measured, recording, shift_comfort, shift_summary, worth_a_look,
 };
 
 use car::{Car, ShiftClutch};

@@ -28,6 +28,9 @@ use crate::{ConfigError, GearboxFile, Kind, Source, file_of};
 const DEFAULTS: (&str, &str) = ("vehicles/eight_speed.toml", include_str!("../../../../vehicles/eight_speed.toml"));
 const GEARBOX: (&str, &str) = ("gearboxes/8hp.toml", include_str!("../../../../gearboxes/8hp.toml"));
 
+/// Mass of the steel plates of a pack, kg: one plate of 60 g, to the packs of a truck.
+const STEEL_MASSES_KG: std::ops::RangeInclusive<f64> = 0.05..=20.0;
+
 /// What to do about a `[valve]` of which a part is missing.
 const WHOLE_VALVE: &str =
     "a [valve] of your own is given whole, as in vehicles/eight_speed.toml: all of its keys, or none";
@@ -248,6 +251,7 @@ struct RawElementClutch {
     friction: Option<RawFriction>,
     static_friction: Option<Number>,
     drag_n_m: Option<Number>,
+    steel_mass_kg: Option<Number>,
     return_spring_n: Option<Number>,
     valve: Option<Spanned<RawClutchValve>>,
     fill: Option<RawFill>,
@@ -424,7 +428,9 @@ impl CommonClutch<'_> {
         };
         let (cylinder, has_stroke) = fill::cylinder(check, &table, fills, &clutch, oil_degc)?;
         let has_stroke = has_stroke && fills.is_some();
-        Ok(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke, drag_n_m })
+        let mass = own.and_then(|own| own.steel_mass_kg.as_ref());
+        let steel_mass_kg = mass.map(|mass| check.number(key("steel_mass_kg"), mass, STEEL_MASSES_KG)).transpose()?;
+        Ok(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke, drag_n_m, steel_mass_kg })
     }
 
     /// Plates and piston with their friction.

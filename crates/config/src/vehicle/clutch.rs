@@ -63,5 +63,6 @@ pub(super) fn check(
         cylinder,
         has_stroke,
         drag_n_m: 0.0,
+        steel_mass_kg: None,
     })
 }

@@ -4,6 +4,7 @@ use car::Car;
 use observer::Health;
 use study::gearbox::drive::{ScoredDrive, ScoredShift};
 use study::gearbox::matrix::{ErrorsByPhase, controlling_of};
+use study::gearbox::shift_comfort::ShiftComfort;
 use study::gearbox::{SquaredErrors, TruePhase};
 use trace::Cell;
 
@@ -240,6 +241,18 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         number("tie_up_estimate_n_m", shift.summary.tie_up_n_m),
         number("jerk_m_s3", quality.jerk_m_s3),
     ];
+    let felt = |of: fn(&ShiftComfort) -> f64| shift.comfort.as_ref().map_or(f64::NAN, of);
+    let rating = shift.comfort.as_ref().and_then(|comfort| comfort.rating(quality));
+    cells.extend([
+        number("response_s", felt(|comfort| comfort.response_s)),
+        number("acceleration_step_m_s2", felt(ShiftComfort::step_m_s2)),
+        number("torque_hole_fraction", felt(|comfort| comfort.hole)),
+        number("torque_hole_s", felt(|comfort| comfort.hole_s)),
+        number("vibration_dose_m_s1_75", felt(|comfort| comfort.vibration_dose_m_s1_75)),
+        number("rating", rating.unwrap_or(f64::NAN)),
+        number("oncoming_plates_degc", shift.plates_degc.unwrap_or(f64::NAN)),
+        word("acceleration_source", shift.comfort.map_or("", |comfort| comfort.source.name())),
+    ]);
     let errors: ErrorsByPhase = shift.errors().unwrap_or_default();
     for (phase, clutches) in ["torque_phase", "inertia_phase"].iter().zip(errors) {
         for (clutch, errors) in ["controlling", "other"].iter().zip(clutches) {

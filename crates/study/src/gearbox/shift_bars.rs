@@ -27,6 +27,13 @@ pub struct Felt {
     pub comfort: ShiftComfort,
 }
 
+impl Felt {
+    /// Its rating from 10 to 1, [`ShiftComfort::rating`]; `None` of a shift that was not completed.
+    pub fn rating(&self) -> Option<f64> {
+        self.comfort.rating(&self.quality)
+    }
+}
+
 /// The largest or smallest value of a quantity that is accepted.
 #[derive(Debug, Clone, Copy)]
 pub struct Bar {
