@@ -306,6 +306,7 @@ fn the_shipped_vehicle_files_are_right() {
         ("four_speed", 5),
         ("four_speed_one_way", 5),
         ("three_speed_c6", 4),
+        ("five_speed_722_6", 6),
         ("four_speed_fn4a", 5),
         ("four_speed_simpson", 6),
         ("six_speed_tf80sc", 5),

@@ -230,6 +230,9 @@ fn all_holding_torques_of_the_four_and_six_speed_gearboxes_come_out() {
     );
 }
 
+fn mercedes_722_6() -> Gearbox {
+    gearbox!("../../../gearboxes/722_6.toml")
+}
 fn c6() -> Gearbox {
     gearbox!("../../../gearboxes/c6.toml")
 }
@@ -272,6 +275,25 @@ fn simpson_three_speeds_have_the_published_ratios_and_one_way_clutches_take_sing
             assert_eq!(gearbox.shift(pair[1], pair[0]).unwrap().change.single(), Some([element(on), element(off)]));
         }
     }
+}
+
+#[test]
+fn the_722_6_has_the_published_ratios_and_changes_one_element_from_gear_to_gear() {
+    let gearbox = mercedes_722_6();
+    assert_ratios(&gearbox, "R R2 1 2 3 4 5", "-3.167 -1.926 3.595 2.186 1.405 1.000 0.831", Printed::Rounded);
+    assert_torques(
+        &gearbox,
+        &[
+            "B1 0.644 B3 -4.812 K3 -0.914",
+            "B3 -2.926 K1 0.644 K3 -0.556",
+            "B1 0.644 B2 1.951 K3 -0.914",
+            "B2 1.186 K1 0.644 K3 -0.556",
+            "B2 0.405 K1 0.000 K2 1.000",
+            "K1 -0.335 K2 1.519 K3 0.288",
+            "B1 -0.169 K2 1.262 K3 0.240",
+        ],
+    );
+    assert_eq!(several(&gearbox, "double"), ["1-3", "1-4", "2-5", "3-5"]);
 }
 
 /// Not published: the element released and the output held, its slip is the reciprocal of its torque, in exact fractions.

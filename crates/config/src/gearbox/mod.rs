@@ -18,12 +18,13 @@ const LEVELS: &str = "the levels are \"stick-diagram\" (shafts, sets, elements),
                       \"ratios\" (ratios alone)";
 
 /// The gearbox files of the program, each by its name, for the gasoline engine of `vehicles/eight_speed.toml`.
-pub const SHIPPED: [(&str, &str); 12] = [
+pub const SHIPPED: [(&str, &str); 13] = [
     ("8hp", include_str!("../../../../gearboxes/8hp.toml")),
     ("10_speed", include_str!("../../../../gearboxes/10_speed.toml")),
     ("dual_clutch_7", include_str!("../../../../gearboxes/dual_clutch_7.toml")),
     ("lepelletier_6", include_str!("../../../../gearboxes/lepelletier_6.toml")),
     ("ravigneaux_4", include_str!("../../../../gearboxes/ravigneaux_4.toml")),
+    ("722_6", include_str!("../../../../gearboxes/722_6.toml")),
     ("8hp45", include_str!("../../../../gearboxes/8hp45.toml")),
     ("9g_tronic", include_str!("../../../../gearboxes/9g_tronic.toml")),
     ("a340e", include_str!("../../../../gearboxes/a340e.toml")),

@@ -12,7 +12,8 @@ use study::gearbox::recording::Recording;
 use super::cars::sensors;
 
 /// The vehicle files with a gearbox that is on the road, but for those that other tests drive.
-const CARS: [&str; 7] = [
+const CARS: [&str; 8] = [
+    "five_speed_722_6",
     "three_speed_c6",
     "eight_speed_8hp45",
     "eight_speed_a8lr1",
