@@ -63,6 +63,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Simulate(options) => commands::simulate(&options),
         Command::Design(options) => commands::design(&options),
         Command::Inspect(options) => commands::inspect(&options),
+        Command::Convert(options) => commands::convert(&options),
         Command::Estimate(options) => commands::estimate(&options),
         Command::Fit(options) => commands::fit(&options),
         Command::Init(options) => commands::init(&options),

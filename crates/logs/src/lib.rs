@@ -16,6 +16,7 @@ pub mod arrays;
 #[cfg(not(target_family = "wasm"))]
 pub mod can;
 pub mod columns;
+pub mod convert;
 mod copies;
 mod csv_dialect;
 pub mod csv_log;

@@ -11,7 +11,8 @@ use crate::columns::{Batch, Said, Source, Stream};
 pub enum Quality {
     /// It can be used.
     Good,
-    /// It is not a finite number, or the frame is too short for the signal. (An empty cell of a table, or NaN in it, is no sample.)
+    /// It is not a finite number, or the frame is too short for the signal. (An empty cell of a table, or NaN in it or in a
+    /// channel of an MDF file that has no conversion, is no sample.)
     Missing,
     /// Its invalidation bit is set.
     Invalid,

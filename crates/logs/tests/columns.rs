@@ -103,7 +103,9 @@ fn what_is_bad_in_a_later_batch_is_bad_in_whole_arrays_too() {
     let path = folder.0.join("log.mf4");
     let times: Vec<f64> = (0..30_000).map(|i| f64::from(i) * 0.01).collect();
     let mut speed: Vec<f64> = times.iter().map(|t| 400.0 + t).collect();
-    speed[9_000] = f64::NAN;
+    speed[9_000] = f64::INFINITY;
+    // No sample at all.
+    speed[9_500] = f64::NAN;
     let mut writer = Mf4Writer::new();
     let group = writer.add_group(&times).unwrap();
     group.add_channel("speed", "rad/s", &speed).unwrap();
@@ -122,8 +124,8 @@ fn what_is_bad_in_a_later_batch_is_bad_in_whole_arrays_too() {
     let (arrays, said) = in_arrays(&mut open(), 2);
     assert_eq!(format!("{arrays:?}"), format!("{columns:?}"));
     assert_eq!(said, notes);
-    assert_eq!(arrays[0].len(), 29_999);
-    let bad: Vec<usize> = (0..29_999).filter(|&i| arrays[0][i].2 != Quality::Good).collect();
+    assert_eq!(arrays[0].len(), 29_998);
+    let bad: Vec<usize> = (0..29_998).filter(|&i| arrays[0][i].2 != Quality::Good).collect();
     assert_eq!(bad, [9_000]);
     assert_eq!(arrays[1].iter().filter(|(.., quality)| *quality == Quality::Good).count(), 29_999);
 }

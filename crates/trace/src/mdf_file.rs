@@ -58,6 +58,14 @@ fn text(id: &[u8; 4], text: &str) -> Vec<u8> {
     block(id, &[], &data)
 }
 
+/// Name and unit of a column: `N_Eng [rpm]`, or by the end of its name.
+fn name_and_unit(title: &str) -> (&str, Option<&str>) {
+    match title.strip_suffix(']').and_then(|title| title.rsplit_once(" [")) {
+        Some((name, unit)) => (name, Some(unit)),
+        None => (title, Unit::of_name(title).map(|unit| unit.name)),
+    }
+}
+
 /// Blocks one after the other, from the beginning of the file on.
 struct Blocks {
     bytes: Vec<u8>,
@@ -94,9 +102,10 @@ impl<W: Write + Seek> MdfWriter<W> {
         let mut byte_offset = 0;
         let time = std::iter::once((signal::TIME, ColumnKind::Number));
         for (i, (name, kind)) in time.chain(columns.iter().copied()).enumerate() {
+            let (name, unit) = name_and_unit(name);
             let name_at = blocks.add(&text(b"##TX", name));
-            let unit = Unit::of_name(name).filter(|_| kind == ColumnKind::Number);
-            let unit_at = unit.map_or(0, |unit| blocks.add(&text(b"##TX", unit.name)));
+            let unit = unit.filter(|unit| kind == ColumnKind::Number && !unit.is_empty());
+            let unit_at = unit.map_or(0, |unit| blocks.add(&text(b"##TX", unit)));
             let bits: u32 = if kind == ColumnKind::Word { 8 } else { 64 };
             channels.push(channel(i == 0, name_at, unit_at, byte_offset, bits));
             byte_offset += bits / 8;

@@ -57,6 +57,24 @@ pub(crate) struct Inspect {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Convert {
+    /// Logs; `-` is standard input
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
+    /// The table, by its ending .csv, .parquet or .mf4, or a folder, which gets a table of each log. No table is replaced
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Format of files in a folder [default: csv]
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<FormatChoice>,
+    /// Print what was written as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Estimate {
     /// Logs; `-` is standard input. Several are estimated at a time, each into a file of its own
     #[arg(required = true, value_name = "LOG")]

@@ -12,7 +12,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::message::Colors;
 
 pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
-pub(crate) use logs::{Estimate, Fit, FormatChoice, Init, Inspect, LaunchChoice, Mapping};
+pub(crate) use logs::{Convert, Estimate, Fit, FormatChoice, Init, Inspect, LaunchChoice, Mapping};
 pub(crate) use studies::{
     Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,
     WorstCaseOptions, available_threads,
@@ -130,6 +130,19 @@ pub(crate) enum Command {
     ///   wetclutch inspect drive.blf --map map.toml --shifts -o drive.html
     #[command(verbatim_doc_comment)]
     Inspect(Inspect),
+    /// Write the channels of logs as tables: CSV, Parquet or MDF 4
+    ///
+    /// Writes the decoded channels of a log of any format that is read, with their names and units. A row has the values of one time; a channel
+    /// that has none there is empty. Samples that are not good, such as repeated ones, are left out.
+    ///
+    /// With --map or --channel only the mapped channels, under the names of their signals and in SI, and beside the table OUT_map.toml: a channel map
+    /// with the delays and ranges, by which the table is estimated as the log.
+    ///
+    ///   wetclutch convert drive.blf --dbc bus.dbc -o drive.parquet
+    ///   wetclutch convert drive.mf4 --map map.toml -o drive.csv
+    ///   wetclutch estimate drive.csv --map drive_map.toml --vehicle car.toml
+    #[command(verbatim_doc_comment)]
+    Convert(Convert),
     /// Estimate pressure and torque from a file of measured signals
     ///
     /// Runs an observer over a file of measured signals. The file needs the columns

@@ -6,6 +6,7 @@ mod check;
 mod check_defaults;
 mod check_json;
 mod check_page;
+mod convert;
 mod demo;
 mod demo_drive;
 mod design;
@@ -34,6 +35,7 @@ use car::read_car;
 
 pub(crate) use bench::bench;
 pub(crate) use check::check;
+pub(crate) use convert::convert;
 pub(crate) use demo::demo;
 pub(crate) use design::design;
 pub(crate) use error_bound::error_bound;

@@ -147,7 +147,12 @@ impl<'a> Field<'a> {
             column.all_good();
             return;
         }
-        let of = |value: &f64| Some(if value.is_finite() { Quality::Good } else { Quality::Missing });
+        // A reading that did not come, as in a table: one without a value in its table of conversion is missing.
+        let is_table = self.kind == Kind::Float && matches!(self.conversion, Conversion::None);
+        let of = |value: &f64| match value.is_finite() {
+            true => Some(Quality::Good),
+            false => (!(is_table && value.is_nan())).then_some(Quality::Missing),
+        };
         let worth: Vec<_> = column.values[first..].iter().map(of).collect();
         let qualities = column.qualities_from(first);
         qualities.extend(worth);
