@@ -44,7 +44,7 @@ pub enum ExportError {
     OtherParameters(String, String),
     /// A file is no library of a model.
     #[error(
-        "not a shared library of a model: {0}\nhint: it is built from the sources of wetclutch: cargo build --release --locked --manifest-path embedded/fmu/Cargo.toml --target-dir target"
+        "not a shared library of a model: {0}\nhint: it is built from the sources of wetclutch: cargo build --release --locked --manifest-path embedded/fmu/Cargo.toml --target-dir target; that of the car by embedded/car_fmu/Cargo.toml"
     )]
     Library(String),
     /// Two libraries are for the same platform.

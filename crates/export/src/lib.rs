@@ -42,6 +42,8 @@ pub struct ExportOptions {
     pub program: Option<Vec<u8>>,
     /// Shared libraries of `embedded/fmu`, each for another platform: with one of them models for co-simulation are written too.
     pub fmu_libraries: Vec<Vec<u8>>,
+    /// The same of `embedded/car_fmu`: models of the simulated car with its shift controller.
+    pub car_fmu_libraries: Vec<Vec<u8>>,
 }
 
 /// A file that is to be written.
@@ -176,7 +178,10 @@ pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFil
     let mut files: Vec<_> = texts.into_iter().map(|(name, text)| ExportedFile::text(name, text)).collect();
     files.push(ExportedFile { name: format!("wetclutch_{name}_parameters.bin"), bytes: image.bytes() });
     if !options.fmu_libraries.is_empty() {
-        files.extend(fmu::models(&filter, &image, &options.fmu_libraries)?);
+        files.extend(fmu::models(&fmu::of_observer(&filter, &image), &options.fmu_libraries)?);
+    }
+    if !options.car_fmu_libraries.is_empty() {
+        files.extend(fmu::models(&fmu::of_car(&filter, file), &options.car_fmu_libraries)?);
     }
     Ok(files)
 }

@@ -110,6 +110,9 @@ fn what_is_no_library_of_a_model_is_refused() {
     let bytes = std::fs::read(library()).unwrap();
     let twice = models(vec![bytes.clone(), bytes.clone()]).unwrap_err().to_string();
     assert!(twice.contains("x86_64-linux") || twice.contains("two shared libraries"), "{twice}");
+    let of_car = ExportOptions { car_fmu_libraries: vec![bytes.clone()], ..ExportOptions::default() };
+    let other = export(&car_file("eight_speed.toml"), &of_car).unwrap_err().to_string();
+    assert!(other.contains("not wetclutch_car_fmu") && other.contains("embedded/car_fmu"), "{other}");
     let own = std::fs::read(std::env::current_exe().unwrap()).unwrap();
     for wrong in [Vec::new(), b"\x7fELF".to_vec(), bytes[..2000].to_vec(), own] {
         let said = models(vec![wrong]).unwrap_err().to_string();

@@ -69,7 +69,7 @@ pub(crate) struct Instance {
 const NOT_NOW: &CStr =
     c"the function may not be called now: the order is instantiate, enter and exit initialization, steps, terminate";
 const NO_VARIABLE: &CStr = c"no such variable, or one of another type";
-const NO_INPUT: &CStr = c"no such input, or one of another type";
+const NO_INPUT: &CStr = c"no such input, one of another type, or a value out of its range";
 const NO_STEP: &CStr = c"time and length of a step must be finite, and the length above zero";
 const DAMAGED: &CStr = c"the bytes are no state of this model, or damaged";
 

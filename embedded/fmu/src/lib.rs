@@ -16,3 +16,7 @@ mod system;
 
 /// The model of this library.
 type Model = observer::ObserverModel;
+
+/// By this name among its functions `wetclutch export` knows the model of the library.
+#[unsafe(no_mangle)]
+extern "C" fn wetclutch_fmu() {}

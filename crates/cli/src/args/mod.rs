@@ -306,6 +306,7 @@ pub(crate) enum Command {
     ///   example.c, README.md            the observer in a task, and how it is built
     ///   certificate.md, report.md       what the ranges assume; sizes
     ///   wetclutch_CAR_fmi2.fmu, ...fmi3.fmu    with --fmu: the observer for co-simulation (FMI 2.0, FMI 3.0)
+    ///   wetclutch_CAR_car_fmi2.fmu, ...    with --car-fmu: the car itself, which shifts
     ///
     /// The same car gives the same bytes. The library is built from the sources, once for each controller; README.md says how.
     ///
@@ -411,6 +412,9 @@ pub(crate) struct Export {
     /// Models for co-simulation as well (FMI 2.0 and 3.0), with this shared library of embedded/fmu; repeat it for another platform
     #[arg(long, value_name = "LIBRARY")]
     pub(crate) fmu: Vec<PathBuf>,
+    /// Models of the simulated car with its shift controller as well, with this shared library of embedded/car_fmu
+    #[arg(long, value_name = "LIBRARY")]
+    pub(crate) car_fmu: Vec<PathBuf>,
     /// Folder for the files
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,

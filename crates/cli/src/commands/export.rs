@@ -1,7 +1,7 @@
 //! `wetclutch export`.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use trace::{ShownPath as _, WholeFile};
 use wetclutch::{ExportOptions, ExportedFile, VehicleFile, read_sensors};
@@ -15,8 +15,9 @@ pub(crate) fn export(options: &Export) -> Result<(), Failure> {
     let vehicle = VehicleFile::read(&options.vehicle)?;
     let sensors = options.sensors.as_deref().map(read_sensors).transpose()?;
     let program = options.check_elf.as_deref().map(read_program).transpose()?;
-    let fmu_libraries = options.fmu.iter().map(|path| read_library(path)).collect::<Result<_, _>>()?;
-    let exported = ExportOptions { shift: options.shift.clone(), sensors, program, fmu_libraries };
+    let libraries = |paths: &[PathBuf]| paths.iter().map(|path| read_library(path)).collect::<Result<Vec<_>, _>>();
+    let (fmu_libraries, car_fmu_libraries) = (libraries(&options.fmu)?, libraries(&options.car_fmu)?);
+    let exported = ExportOptions { shift: options.shift.clone(), sensors, program, fmu_libraries, car_fmu_libraries };
     let files = wetclutch::export(&vehicle, &exported).map_err(|error| named(&options.vehicle, error))?;
     writable(&options.output, &[])?;
     for file in &files {

@@ -3,17 +3,21 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use super::Version;
 use super::variables::{Variable, variables};
-use super::{LIBRARY, Version};
 use crate::{ExportedFilter, Image};
 
 /// A model as its description names it.
 pub(crate) struct Description {
-    name: String,
-    about: String,
+    pub(crate) name: String,
+    /// Name of its shared library, without an ending.
+    pub(crate) library: &'static str,
+    pub(crate) about: String,
     /// `guid` and `instantiationToken`.
-    token: String,
-    variables: Vec<Variable>,
+    pub(crate) token: String,
+    /// Whether its state can be written as bytes.
+    pub(crate) is_serialised: bool,
+    pub(crate) variables: Vec<Variable>,
 }
 
 impl Description {
@@ -27,6 +31,8 @@ impl Description {
             name: format!("wetclutch_{}", filter.name),
             about: format!("Observer of clutch pressures and torques: {}", filter.car.name),
             token,
+            library: "wetclutch_fmu",
+            is_serialised: true,
             variables: variables(filter),
         }
     }
@@ -39,12 +45,13 @@ impl Description {
     }
 
     fn xml_2(&self) -> String {
+        let Self { library, is_serialised, .. } = self;
         let variables: String = self.variables.iter().map(Variable::xml_2).collect();
         let outputs = self.lines(|index, _| format!("      <Unknown index=\"{index}\"/>\n"));
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <fmiModelDescription fmiVersion=\"2.0\" guid=\"{}\" {}>\n  \
-             <CoSimulation modelIdentifier=\"{LIBRARY}\" canHandleVariableCommunicationStepSize=\"true\" canGetAndSetFMUstate=\"true\" canSerializeFMUstate=\"true\"/>\n\
+             <CoSimulation modelIdentifier=\"{library}\" canHandleVariableCommunicationStepSize=\"true\" canGetAndSetFMUstate=\"true\" canSerializeFMUstate=\"{is_serialised}\"/>\n\
              {}  <ModelVariables>\n{variables}  </ModelVariables>\n  <ModelStructure>\n    <Outputs>\n{outputs}    </Outputs>\n    \
              <InitialUnknowns>\n{outputs}    </InitialUnknowns>\n  </ModelStructure>\n</fmiModelDescription>\n",
             self.token,
@@ -54,12 +61,13 @@ impl Description {
     }
 
     fn xml_3(&self) -> String {
+        let Self { library, is_serialised, .. } = self;
         let variables: String = self.variables.iter().map(Variable::xml_3).collect();
         let list = |kind: &str| self.lines(|_, reference| format!("    <{kind} valueReference=\"{reference}\"/>\n"));
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <fmiModelDescription fmiVersion=\"3.0\" instantiationToken=\"{}\" {}>\n  \
-             <CoSimulation modelIdentifier=\"{LIBRARY}\" canHandleVariableCommunicationStepSize=\"true\" canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\"/>\n\
+             <CoSimulation modelIdentifier=\"{library}\" canHandleVariableCommunicationStepSize=\"true\" canGetAndSetFMUState=\"true\" canSerializeFMUState=\"{is_serialised}\"/>\n\
              {}  <ModelVariables>\n    \
              <Float64 name=\"time\" valueReference=\"0\" causality=\"independent\" variability=\"continuous\" unit=\"s\" description=\"time\"/>\n\
              {variables}  </ModelVariables>\n  <ModelStructure>\n{}{}  </ModelStructure>\n</fmiModelDescription>\n",
@@ -145,6 +153,8 @@ fn unit_definition(unit: &str) -> String {
         "s" => "s=\"1\"",
         "A" => "A=\"1\"",
         "%" => "factor=\"0.01\"",
+        "rad" => "rad=\"1\"",
+        "m/s" => "m=\"1\" s=\"-1\"",
         "degC" => "K=\"1\" offset=\"273.15\"",
         _ => return format!("    <Unit name=\"{unit}\"/>\n"),
     };

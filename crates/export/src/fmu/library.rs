@@ -2,7 +2,7 @@
 
 use object::{Architecture, BinaryFormat, Object as _};
 
-use super::{LIBRARY, Version};
+use super::Version;
 use crate::ExportError;
 
 /// A platform as the versions of the standard name it, and the ending of a shared library on it.
@@ -31,14 +31,16 @@ impl Platform {
 /// A shared library for a platform.
 #[derive(Debug)]
 pub(crate) struct Library<'b> {
+    /// Its name, without an ending.
+    name: &'static str,
     pub(crate) bytes: &'b [u8],
     pub(crate) platform: Platform,
 }
 
 impl<'b> Library<'b> {
     /// # Errors
-    /// The file is no shared library of a platform, or has not the functions of both versions.
-    pub(crate) fn of(bytes: &'b [u8]) -> Result<Self, ExportError> {
+    /// The file is no shared library of a platform, has not the functions of both versions, or is that of another model.
+    pub(crate) fn of(bytes: &'b [u8], name: &'static str) -> Result<Self, ExportError> {
         let file = object::File::parse(bytes).map_err(|error| ExportError::Library(error.to_string()))?;
         let exported = file.exports().map_err(|error| ExportError::Library(error.to_string()))?;
         // On macOS names begin with an underscore.
@@ -46,9 +48,12 @@ impl<'b> Library<'b> {
         if !(has("fmi2DoStep") && has("fmi3DoStep")) {
             return Err(ExportError::Library("it has not the functions of FMI 2.0 and 3.0".to_owned()));
         }
+        if !has(name) {
+            return Err(ExportError::Library(format!("it is not {name}, but that of another model")));
+        }
         let platform = Platform::of(file.format(), file.architecture());
         let unnamed = || ExportError::Library(format!("it is for {:?}", file.architecture()));
-        Ok(Self { bytes, platform: platform.ok_or_else(unnamed)? })
+        Ok(Self { name, bytes, platform: platform.ok_or_else(unnamed)? })
     }
 
     /// Its place in an archive.
@@ -57,6 +62,6 @@ impl<'b> Library<'b> {
             Version::Two => self.platform.two,
             Version::Three => self.platform.three,
         };
-        format!("binaries/{folder}/{LIBRARY}.{}", self.platform.ending)
+        format!("binaries/{folder}/{}.{}", self.name, self.platform.ending)
     }
 }

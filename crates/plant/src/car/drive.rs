@@ -155,8 +155,9 @@ enum Wanted {
 /// Name of neutral in a drive file.
 const NEUTRAL: &str = "N";
 
-/// Which gear is wanted when.
-struct Shifting<'d> {
+/// Which gear a drive wants when.
+#[derive(Debug, Clone)]
+pub struct Shifting<'d> {
     plan: &'d ShiftPlan,
     /// The forward gears from the lowest to the highest, each with its ratio.
     gears: Vec<(usize, f64)>,
@@ -168,7 +169,11 @@ struct Shifting<'d> {
 }
 
 impl<'d> Shifting<'d> {
-    fn new(car: &Car, drive: &'d Drive) -> Result<Self, CarError> {
+    /// At the start of a drive.
+    ///
+    /// # Errors
+    /// The gearbox has no gear of such a name, or no forward gear.
+    pub fn new(car: &Car, drive: &'d Drive) -> Result<Self, CarError> {
         let named = |name: &str| {
             let names = || car.gearbox.gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
             let message = || format!("the gearbox has no gear \"{name}\"\nhint: its gears are {}", names());
@@ -199,8 +204,16 @@ impl<'d> Shifting<'d> {
         Ok(Self { plan, gears, final_ratio, gear, starts_in_neutral, since_s, listed })
     }
 
+    /// The gear that was engaged last.
+    pub fn gear(&self) -> usize {
+        self.gear
+    }
+
     /// Asks for another gear where the plan wants it.
-    fn step(&mut self, run: &mut CarRun<'_>, driver: &Driver) -> Result<(), CarError> {
+    ///
+    /// # Errors
+    /// The gear cannot be reached.
+    pub fn step(&mut self, run: &mut CarRun<'_>, driver: &Driver) -> Result<(), CarError> {
         let now_s = run.time_s();
         if run.controller().gear() != self.gear {
             self.gear = run.controller().gear();
