@@ -1,0 +1,195 @@
+"""Writes the JSON schemas of the TOML files, from what the program accepts: docs/schemas/*.json.
+
+    python3 .ci/schemas.py target/release/wetclutch           # write them
+    python3 .ci/schemas.py target/release/wetclutch --check   # fail where one is stale
+
+The shipped files are read, and `wetclutch check` is asked for each key which types of values it takes, and for each table which keys. A file that the
+program accepts fits its schema; ranges that depend on other values are in the descriptions alone.
+"""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PROGRAM = Path(sys.argv[1]).resolve()
+WORK = ROOT / "target" / "schemas"
+FOLDERS = ["vehicles", "gearboxes", "drives", "experiments", "maps"]
+UNKNOWN = "no_such_key_at_all"
+REFUSED = ("invalid type", "invalid length", "invalid value", "data did not match")
+# A value of each type, and what a schema calls the type.
+TYPES = [(1.0, "number"), ("?", "string"), (True, "boolean"), ([1.0, 1.0], "array"), ([[1.0]], "array"), ([], "array"), ({}, "object")]
+ALL = {name for _, name in TYPES}
+NUMBER = re.compile(r"-?\d+(\.\d+)?")
+KINDS = {
+    "a vehicle file of a car with a gearbox": ("car", "Vehicle file with a gearbox"),
+    "a vehicle file of one shift": ("vehicle", "Vehicle file of one shift"),
+    "a gearbox file": ("gearbox", "Gearbox file"),
+    "a drive file": ("drive", "Drive file"),
+    "an experiment file": ("experiment", "Experiment file"),
+    "a study file": ("study", "Study file"),
+    "a channel map": ("channel_map", "Channel map"),
+}
+
+
+def toml(value):
+    """A value on one line of TOML."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {toml(of)}" for key, of in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(value)
+
+
+def check(*files):
+    done = subprocess.run([PROGRAM, "check", "--json", *files], capture_output=True, text=True)
+    return json.loads(done.stdout)["files"]
+
+
+class File:
+    """A shipped file, of which parts are replaced."""
+
+    def __init__(self, path):
+        self.path, self.root = path, tomllib.loads(path.read_text())
+
+    def errors(self, place, value):
+        """The errors of the file with another value at a place, or without any."""
+        root = json.loads(json.dumps(self.root))
+        inner = root
+        for step in place[:-1]:
+            inner = inner[step]
+        inner[place[-1]] = value
+        probe = self.path.with_name("probe.toml")
+        probe.write_text("".join(f"{json.dumps(key)} = {toml(of)}\n" for key, of in root.items()))
+        return check(str(probe))[0]["errors"]
+
+
+def quoted(message):
+    return message.split("`")[1::2]
+
+
+def keys_of(file, place):
+    """The keys that a table may have; none where any name is a key."""
+    for error in file.errors([*place, UNKNOWN], 1):
+        found = quoted(error["message"])
+        if error["message"].startswith("unknown ") and UNKNOWN in found:
+            return [key for key in found if key != UNKNOWN] or None
+    return None
+
+
+def schema_of_value(file, place, value):
+    types, words, ranges = set(), [], None
+    for probe, name in TYPES:
+        errors = file.errors(place, probe)
+        refused = [error["message"] for error in errors if error["message"].startswith(REFUSED)]
+        variants = [quoted(error["message"])[1:] for error in errors if error["message"].startswith("unknown variant `?`")]
+        words += variants[0] if variants else []
+        if not refused:
+            types.add(name)
+    types.add({int: "number", float: "number", str: "string", bool: "boolean", list: "array", dict: "object"}[type(value)])
+    if type(value) in (int, float):
+        said = [error["expected"] for error in file.errors(place, 9e99) if error["expected"]]
+        ranges = said[0] if said else None
+    # What takes every type is read by rules of its own.
+    schema = {} if types == ALL else {"type": sorted(types) if len(types) > 1 else types.pop()}
+    if words and schema.get("type") == "string":
+        schema = {"enum": sorted(set(words))}
+    if ranges:
+        schema["description"] = f"expected {NUMBER.sub(lambda number: f'{float(number.group()):g}', ranges)}"
+    return schema
+
+
+def schema_of_table(places):
+    """The schema of a table that stands at these places: `(file, place, value)`."""
+    known, is_open, values = set(), False, {}
+    for file, place, table in places:
+        keys = keys_of(file, place)
+        is_open |= keys is None
+        known.update(keys or [])
+        for key, value in table.items():
+            values.setdefault(key, []).append((file, [*place, key], value))
+    properties = {key: {} for key in known}
+    for key, found in values.items():
+        properties[key] = schema_of(found)
+    if is_open and all(isinstance(value, dict) for found in values.values() for _, _, value in found) and values:
+        # Tables with names of their own, such as those of clutches.
+        return {"type": "object", "additionalProperties": schema_of([one for found in values.values() for one in found])}
+    return {"type": "object", "properties": dict(sorted(properties.items())), "additionalProperties": is_open}
+
+
+def schema_of(found):
+    tables = [one for one in found if isinstance(one[2], dict)]
+    lists = [one for one in found if isinstance(one[2], list) and one[2] and isinstance(one[2][0], dict)]
+    others = [one for one in found if one not in tables and one not in lists]
+    schemas = []
+    if tables:
+        schemas.append(schema_of_table(tables))
+    if lists:
+        items = [(file, [*place, at], item) for file, place, value in lists for at, item in enumerate(value)]
+        schemas.append({"type": "array", "items": schema_of(items)})
+    if others:
+        # One of each type of value.
+        kinds = {type(one[2]): one for one in reversed(others)}
+        schemas += [schema_of_value(*one) for one in kinds.values()]
+    unique = [schema for at, schema in enumerate(schemas) if schema not in schemas[:at]]
+    # What takes anything takes the others too; that with a description first.
+    anything = sorted((schema for schema in unique if not schema.keys() - {"description"}), key=len, reverse=True)
+    return anything[0] if anything else unique[0] if len(unique) == 1 else {"anyOf": unique}
+
+
+def fits(schema, value):
+    """Whether a value fits a schema of the forms above."""
+    if "anyOf" in schema:
+        return any(fits(one, value) for one in schema["anyOf"])
+    if "enum" in schema:
+        return value in schema["enum"]
+    if "type" not in schema:
+        return True
+    name = {bool: "boolean", int: "number", float: "number", str: "string", list: "array", dict: "object"}[type(value)]
+    if name not in ([schema["type"]] if isinstance(schema["type"], str) else schema["type"]):
+        return False
+    if isinstance(value, list):
+        return all(fits(schema.get("items", {}), item) for item in value)
+    if isinstance(value, dict):
+        other = schema.get("additionalProperties", True)
+        of = lambda key: schema.get("properties", {}).get(key, other)
+        return all(of(key) is True or (of(key) is not False and fits(of(key), item)) for key, item in value.items())
+    return True
+
+
+def main():
+    shutil.rmtree(WORK, ignore_errors=True)
+    for folder in FOLDERS:
+        shutil.copytree(ROOT / folder, WORK / folder)
+    paths = [path for folder in FOLDERS for path in sorted((WORK / folder).glob("*.toml"))]
+    files = {kind: [] for kind in KINDS}
+    for path, found in zip(paths, check(*map(str, paths))):
+        if found["describes"] in files and not found["errors"]:
+            files[found["describes"]].append(File(path))
+    stale = []
+    for kind, (name, title) in KINDS.items():
+        schema = {
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "title": title,
+            **schema_of_table([(file, [], file.root) for file in files[kind]]),
+        }
+        for file in files[kind]:
+            if not fits(schema, file.root):
+                sys.exit(f"{file.path.name} does not fit the schema of {name}")
+            if fits(schema, {**file.root, UNKNOWN: 1}):
+                sys.exit(f"the schema of {name} takes a key that does not exist")
+        path, text = ROOT / "docs" / "schemas" / f"{name}.json", json.dumps(schema, indent=2) + "\n"
+        if "--check" not in sys.argv:
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
+        elif not path.exists() or path.read_text() != text:
+            stale.append(f"docs/schemas/{name}.json is stale: run `python3 .ci/schemas.py target/release/wetclutch`")
+    if stale:
+        sys.exit("\n".join(stale))
+
+
+main()
