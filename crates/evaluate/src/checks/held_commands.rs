@@ -20,14 +20,17 @@ const RESOLUTIONS: f64 = 3.0;
 /// Width of a class of times, s.
 const CLASS_S: f64 = 0.01;
 const CLASSES: usize = 51;
-/// Longest time between two readings of a command that are not too rare, s \[chosen\]: a pulse that fills a clutch takes 0.1 to 0.2 s.
-const APART_S: f64 = 0.1;
+/// Longest time between two readings of a command that are not too rare, s \[chosen\]: a pulse that fills a clutch takes 0.1 to 0.2 s, and is
+/// to be seen by two.
+const APART_S: f64 = 0.05;
 /// Fraction by which times of rows are rounded.
 const ROUNDING: f64 = 1e-3;
 
-/// The changes of one command.
-#[derive(Clone)]
-struct Changes {
+/// When one command was read, and when it changed.
+#[derive(Debug, Clone)]
+pub struct CommandTimes {
+    /// Rows, with a reading of the command or without.
+    rows: u64,
     newest: Option<f64>,
     read_s: f64,
     changed_s: f64,
@@ -41,14 +44,21 @@ struct Changes {
     apart: [u64; CLASSES],
 }
 
-/// The changes of all commands of a log.
+/// The times of all commands of a log.
 pub(crate) struct HeldCommands {
-    of_elements: [Changes; MAX_ELEMENTS],
+    of_elements: [CommandTimes; MAX_ELEMENTS],
 }
 
 impl Default for HeldCommands {
     fn default() -> Self {
-        let none = Changes {
+        Self { of_elements: std::array::from_fn(|_| CommandTimes::default()) }
+    }
+}
+
+impl Default for CommandTimes {
+    fn default() -> Self {
+        Self {
+            rows: 0,
             newest: None,
             read_s: f64::NEG_INFINITY,
             changed_s: f64::NEG_INFINITY,
@@ -57,52 +67,62 @@ impl Default for HeldCommands {
             at_once: 0,
             later: [0; CLASSES],
             apart: [0; CLASSES],
-        };
-        Self { of_elements: std::array::from_fn(|_| none.clone()) }
+        }
     }
 }
 
 impl HeldCommands {
     /// Takes the commands of a row.
     pub(crate) fn push(&mut self, time_s: f64, commands: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
-        for (changes, command) in self.of_elements.iter_mut().zip(commands) {
-            if let Some(reading) = command {
-                changes.push(time_s - reading.age_s, reading.value);
-            }
+        for (times, command) in self.of_elements.iter_mut().zip(commands) {
+            times.push(time_s, *command);
         }
     }
 
-    /// The elements whose command is repeated, and those whose command is read too rarely, in a sentence each.
+    /// What is said of the commands of the elements.
     pub(crate) fn warnings(&self, car: &Car, tables: &ShiftTables<f64>) -> Vec<String> {
-        let named = |period_s: fn(&Changes) -> Option<f64>| {
-            let elements = car.gearbox.elements.iter().enumerate();
-            let named = elements.filter_map(|(element, described)| {
-                let period_s = period_s(&self.of_elements[tables.place(element)?])?;
-                Some(format!("{} (every {period_s:.2} s)", described.name))
-            });
-            named.collect::<Vec<_>>().join(", ")
-        };
-        let held = named(Changes::period_s);
-        let held = (!held.is_empty()).then(|| {
-            format!(
-                "warning: commands that change more rarely than the rows come: {held}. If the log repeats a slow message, a command was sent up to that \
-                 long before the row that shows it, and the guaranteed ranges do not hold. Leave repeated cells empty, or record the commands more often"
-            )
+        let elements = car.gearbox.elements.iter().enumerate();
+        let commands = elements.filter_map(|(element, described)| {
+            Some((described.name.as_str(), &self.of_elements[tables.place(element)?]))
         });
-        let rare = named(Changes::too_rarely_read_s);
-        let rare = (!rare.is_empty()).then(|| {
-            format!(
-                "warning: commands that are recorded more rarely than every {APART_S} s: {rare}. What a command does between two of its \
-                 readings, as the pulse that fills a clutch, is not seen, and the guaranteed ranges do not hold. Record the commands at the rate at which \
-                 they are sent"
-            )
-        });
-        held.into_iter().chain(rare).collect()
+        warnings_of(&commands.collect::<Vec<_>>())
     }
 }
 
-impl Changes {
-    fn push(&mut self, time_s: f64, value: f64) {
+/// The commands that are repeated, and those that are read too rarely, in a sentence each; every command with the name of its clutch.
+pub fn warnings_of(commands: &[(&str, &CommandTimes)]) -> Vec<String> {
+    let named = |period_s: fn(&CommandTimes) -> Option<f64>| {
+        let named =
+            commands.iter().filter_map(|(name, times)| Some(format!("{name} (every {:.2} s)", period_s(times)?)));
+        named.collect::<Vec<_>>().join(", ")
+    };
+    let held = named(CommandTimes::held_s);
+    let held = (!held.is_empty()).then(|| {
+        format!(
+            "warning: commands that change more rarely than the rows come: {held}. If the log repeats a slow message, a command was sent up to that \
+             long before the row that shows it, and the guaranteed ranges do not hold. Leave repeated cells empty, or record the commands more often"
+        )
+    });
+    let rare = named(CommandTimes::too_rarely_read_s);
+    let rare = (!rare.is_empty()).then(|| {
+        format!(
+            "warning: commands that are recorded more rarely than every {APART_S} s: {rare}. What a command does between two of its readings, as the \
+             pulse that fills a clutch, is not seen, and the guaranteed ranges do not hold. Record the commands at the rate at which they are sent"
+        )
+    });
+    held.into_iter().chain(rare).collect()
+}
+
+impl CommandTimes {
+    /// Takes a row, with the reading of the command that came with it.
+    pub fn push(&mut self, time_s: f64, reading: Option<Reading<f64>>) {
+        self.rows += 1;
+        if let Some(reading) = reading {
+            self.read(time_s - reading.age_s, reading.value);
+        }
+    }
+
+    fn read(&mut self, time_s: f64, value: f64) {
         let apart_s = time_s - core::mem::replace(&mut self.read_s, time_s);
         let Some(before) = self.newest.replace(value) else { return };
         self.apart[class(apart_s)] += 1;
@@ -122,15 +142,16 @@ impl Changes {
     }
 
     /// The usual time between two changes, s, if they come more rarely than the readings.
-    fn period_s(&self) -> Option<f64> {
+    fn held_s(&self) -> Option<f64> {
         let later: u64 = self.later.iter().sum();
         let is_held = later >= ENOUGH && self.at_once as f64 <= BY_CHANCE * later as f64;
         is_held.then(|| middle_s(&self.later))
     }
 
-    /// The usual time between two readings, s, if it is too long for the range of the pressure.
+    /// The usual time between two readings, s, if it is too long for the range of the pressure and rows come without a reading.
     fn too_rarely_read_s(&self) -> Option<f64> {
-        let is_known = self.apart.iter().sum::<u64>() >= ENOUGH;
+        let readings: u64 = self.apart.iter().sum();
+        let is_known = readings >= ENOUGH && self.rows > 2 * readings;
         Some(middle_s(&self.apart)).filter(|period_s| is_known && *period_s > APART_S * (1.0 + ROUNDING))
     }
 }
@@ -157,14 +178,14 @@ mod tests {
 
     /// Ramps of 0.2 A/s up and down through a minute, sent so often and read every 10 ms with this resolution.
     fn period_s(sent_s: f64, resolution: f64) -> Option<f64> {
-        let mut changes = HeldCommands::default().of_elements[0].clone();
+        let mut changes = CommandTimes::default();
         for row in 0..6000 {
             let time_s = 0.01 * f64::from(row);
             let at_s = (time_s / sent_s + 1e-6).floor() * sent_s;
             let command = 0.4 * (0.5 * at_s).rem_euclid(1.0);
-            changes.push(time_s, (command / resolution).round() * resolution);
+            changes.read(time_s, (command / resolution).round() * resolution);
         }
-        changes.period_s()
+        changes.held_s()
     }
 
     #[test]
@@ -180,23 +201,23 @@ mod tests {
 
     #[test]
     fn a_command_that_is_read_too_rarely_is_one_whether_it_changes_or_not() {
-        let read = |every_s: f64, count: u32| {
-            let mut changes = HeldCommands::default().of_elements[0].clone();
-            (0..count).for_each(|row| changes.push(every_s * f64::from(row), f64::from(row % 7)));
-            changes.too_rarely_read_s()
+        let read = |every: u32, rows: u32| {
+            let mut times = CommandTimes::default();
+            let reading = |row| Reading { value: f64::from(row / every % 7), age_s: 0.0 };
+            (0..rows).for_each(|row| times.push(0.01 * f64::from(row), (row % every == 0).then(|| reading(row))));
+            times.too_rarely_read_s()
         };
-        assert_eq!([0.01, 0.1].map(|every_s| read(every_s, 1000)), [None; 2]);
-        assert_eq!(read(0.2, 1000), Some(0.2));
+        assert_eq!([1, 5].map(|every| read(every, 10_000)), [None; 2]);
+        assert_eq!([6, 20].map(|every| read(every, 10_000)), [Some(0.06), Some(0.2)]);
         // Of a few readings nothing is said, nor of none.
-        assert_eq!([0, 1, 20].map(|count| read(0.2, count)), [None; 3]);
-        assert_eq!(HeldCommands::default().of_elements[0].clone().too_rarely_read_s(), None);
+        assert_eq!([0, 1, 400].map(|rows| read(20, rows)), [None; 3]);
     }
 
     #[test]
     fn a_command_that_never_changes_has_no_period() {
-        let mut changes = HeldCommands::default().of_elements[0].clone();
-        assert_eq!(changes.period_s(), None);
-        (0..1000).for_each(|row| changes.push(0.01 * f64::from(row), 0.3));
-        assert_eq!(changes.period_s(), None);
+        let mut changes = CommandTimes::default();
+        assert_eq!(changes.held_s(), None);
+        (0..1000).for_each(|row| changes.read(0.01 * f64::from(row), 0.3));
+        assert_eq!(changes.held_s(), None);
     }
 }

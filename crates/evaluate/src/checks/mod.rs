@@ -4,7 +4,7 @@ mod came_speed;
 pub(crate) mod command_delay;
 pub(crate) mod contradictions;
 pub(crate) mod converter_check;
-pub(crate) mod held_commands;
+pub mod held_commands;
 pub(crate) mod in_gear;
 pub(crate) mod lock_up_check;
 pub(crate) mod log_beside;

@@ -1,6 +1,7 @@
 //! What is said about the estimates of a log.
 
 use car::{ObserverKind, Vehicle};
+use evaluate::checks::held_commands::{CommandTimes, warnings_of};
 use logs::Role;
 use observer::{ChannelHealth, Estimate as Sample, Health};
 use report::tables::{health_meaning, phase_name};
@@ -30,6 +31,8 @@ pub(crate) struct Findings {
     errors: Option<ErrorScore>,
     /// Samples without a command of the valve that can be used.
     without_command: u64,
+    /// Of the oncoming clutch, and of the offgoing one.
+    commands: [CommandTimes; 2],
     /// Readings that came, and those of them that were taken, of each channel.
     came: [u64; CHANNELS],
     taken: [u64; CHANNELS],
@@ -52,6 +55,7 @@ impl Findings {
             health: Vec::new(),
             errors: Some(ErrorScore::new(0.0)),
             without_command: 0,
+            commands: Default::default(),
             came: [0; CHANNELS],
             taken: [0; CHANNELS],
         }
@@ -75,6 +79,9 @@ impl Findings {
         self.rows += 1;
         self.ratios.push(row.time_s, &row.input, is_looked_at(self.rows, FIRST_LOOK));
         let input = &row.input;
+        for (times, reading) in self.commands.iter_mut().zip([input.command, input.offgoing_command]) {
+            times.push(row.time_s, reading);
+        }
         let readings = [
             input.engine_rad_s,
             input.turbine_rad_s,
@@ -106,6 +113,12 @@ impl Findings {
             (_, None) => self.errors = None,
             (None, _) => {}
         }
+    }
+
+    /// What is said of commands that are recorded too rarely.
+    pub(crate) fn warnings_of_commands(&self) -> Vec<String> {
+        let [oncoming, offgoing] = &self.commands;
+        warnings_of(&[("oncoming clutch", oncoming), ("offgoing clutch", offgoing)])
     }
 
     /// From the first step to the last, s.

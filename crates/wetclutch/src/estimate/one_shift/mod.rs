@@ -134,7 +134,8 @@ pub fn estimate(
     let median_s = log.median_step_s();
     check_findings(input.path, &findings, vehicle, &log, observer.kind)?;
     let warnings = [slow_log(median_s), old_commands(median_s, vehicle.error_bounds.command_age_s)];
-    warnings.into_iter().flatten().for_each(|warning| say(&warning));
+    let warnings = warnings.into_iter().flatten().chain(findings.warnings_of_commands());
+    warnings.for_each(|warning| say(&warning));
     shifts.check()?;
     let rows = table.finish()?;
     let shifts_of_log = shifts.seen();
