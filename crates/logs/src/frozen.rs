@@ -5,7 +5,8 @@
 //! [`FROZEN_CHANGE`], and by more than [`FROZEN_QUANTA`] of its own quanta: it is not used until it changes. Its quantum is the
 //! smallest change that was seen of it; before it has changed, [`FROZEN_FROM_START_S`] and [`FROZEN_CHANGE_FROM_START`] count. One that
 //! changed by [`FROZEN_QUANTA`] of its quanta from sample to sample stands for [`STOPPED_S`] and [`STOPPED_SAMPLES`] only, and the other
-//! changes by those quanta. Where such a speed never had one value twice in a row, in [`MANY_CHANGES`] changes, no other one has to show it.
+//! changes by those quanta. Where a speed that changed by more than one of its quanta never had one value twice in a row, in [`MANY_CHANGES`]
+//! changes, no other one has to show it.
 //! Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from a turbine that is nearly as fast
 //! or faster: below that the idle control may hold the engine while the car comes to rest. An engine that is faster than any idle control
 //! holds it, [`IDLE_RAD_S`], parts from the turbine by the slip of the converter, but does not stand still to the last digit while the turbine
@@ -124,12 +125,16 @@ impl FrozenSpeed {
         };
         let quantum = if self.quantum.is_finite() { FROZEN_QUANTA * self.quantum } else { 0.0 };
         let long = still.samples >= FROZEN_SAMPLES.max(3 * self.longest_still) && time_s - still.since_s >= limit_s;
-        let stopped = self.longest_still > 0
-            && self.moves > quantum
+        let stands = self.longest_still > 0
             && still.samples >= STOPPED_SAMPLES.max(3 * self.longest_still)
             && time_s - still.since_s >= STOPPED_S;
-        // A speed that never had one value twice does not have it for so long.
-        let never_stood = stopped && self.longest_still == 1 && self.changes >= MANY_CHANGES;
+        let stopped = stands && self.moves > quantum;
+        // A speed that never had one value twice does not have it for so long. The smallest change of a smooth speed may be far above its quantum.
+        let never_stood = stands
+            && self.longest_still == 1
+            && self.changes >= MANY_CHANGES
+            && self.quantum.is_finite()
+            && self.moves > self.quantum;
         let rests_rad_s = rests_rad_s(self.role);
         if !still.frozen && never_stood && value.abs() > rests_rad_s {
             still.frozen = true;

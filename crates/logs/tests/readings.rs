@@ -446,6 +446,20 @@ fn a_speed_that_moved_and_stops_is_frozen_from_its_first_equal_sample_on() {
 }
 
 #[test]
+fn a_smooth_speed_that_sticks_for_a_tenth_of_a_second_is_frozen() {
+    // It never changes by less than a third of what it does when it sticks, and the output hardly changes.
+    let mut text = "time_s,t_rpm,o_rpm\n".to_owned();
+    for row in 0..400 {
+        let time = f64::from(row);
+        let turbine = 2000.0 + if row < 50 { 1.4 * time } else { 70.0 + 4.1 * (time - 50.0) };
+        let turbine = if (300..310).contains(&row) { 3095.0 } else { turbine };
+        writeln!(text, "{:.2},{turbine:.6},{:.6}", 0.01 * time, 800.0 + 0.01 * time).unwrap();
+    }
+    let (_, summary, _) = readings(&text, &map(&["turbine_speed=t_rpm", "output_speed=o_rpm"])).unwrap();
+    assert_eq!(count(&summary, Quality::Frozen), 9);
+}
+
+#[test]
 fn a_fast_engine_that_stops_changing_behind_a_converter_is_frozen() {
     let frozen = |idle_rpm: f64, stands: std::ops::Range<u32>| {
         let mut text = "time_s,e_rpm,t_rpm,o_rpm\n".to_owned();
