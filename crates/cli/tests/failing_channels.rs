@@ -212,13 +212,27 @@ fn a_speed_that_ends_before_the_first_shift_leaves_the_open_loop() {
     let [gear, target] = ["gear", "target_gear"].map(|name| column(&case.log, name));
     let begin = (1..gear.len()).find(|row| gear[*row] != target[*row] && gear[row - 1] == target[row - 1]).unwrap();
     let before_s = numbers(&case.log, "time_s")[begin] - 0.5;
-    for speed in ["engine_speed", "turbine_speed", "output_speed"] {
-        for value in ["", "0"] {
-            let log = case.with(&format!("{speed}_rad_s"), [before_s, f64::INFINITY], value);
-            let (note, table, _) = case.estimate(&log, &[]);
-            assert_eq!(table.lines().count(), case.log.lines().count(), "{speed} `{value}`: {note}");
-            assert!(note.contains("came no more, or was refused, in "), "{speed} `{value}`: {note}");
-            assert!(!note.contains("units of both speeds") && !note.contains("lock-up"), "{speed} `{value}`: {note}");
+    let map = case.folder.write("map.toml", case.map(""));
+    for (speed, from_s) in
+        ["engine_speed", "turbine_speed", "output_speed"].map(|speed| [(speed, before_s), (speed, 0.5)]).as_flattened()
+    {
+        let column_name = format!("{speed}_rad_s");
+        let row = numbers(&case.log, "time_s").iter().position(|time_s| time_s >= from_s).unwrap();
+        let stuck = column(&case.log, &column_name)[row].to_owned();
+        for value in ["", "0", &stuck] {
+            let log = case.with(&column_name, [*from_s, f64::INFINITY], value);
+            for more in [&[][..], &["--map", &map]] {
+                let (note, table, _) = case.estimate(&log, more);
+                assert_eq!(table.lines().count(), case.log.lines().count(), "{speed} `{value}`: {note}");
+                assert!(
+                    note.contains("came no more, or was refused, in "),
+                    "{speed} from {from_s} s `{value}`: {note}"
+                );
+                assert!(
+                    !note.contains("units of both speeds") && !note.contains("lock-up"),
+                    "{speed} `{value}`: {note}"
+                );
+            }
         }
     }
 }

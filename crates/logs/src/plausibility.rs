@@ -185,8 +185,8 @@ pub fn too_fast_a_time(step_s: f64, span_s: f64) -> Option<String> {
 pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
     // A turbine of a car that creeps is as slow.
     let creeps = |of: &RoleSummary, role: Role| role == Role::TurbineSpeed && of.extremes.speed() < DRIVEN_RAD_S;
-    let turning =
-        |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.speed() > 1.0);
+    let is_turning = |entry: &&RoleSummary| entry.extremes.speed() > 1.0 && !entry.ended_early();
+    let turning = |role: Role| summary.iter().find(|entry| entry.role == role).filter(is_turning);
     let mut findings: Vec<Finding> = summary.iter().filter_map(|entry| alone(entry, summary, seen)).collect();
     if !findings.is_empty() {
         return findings;
@@ -362,6 +362,7 @@ mod tests {
             counts: QualityCounts::default(),
             extremes,
             unit_name: unit_name.to_owned(),
+            until: 1.0,
         }
     }
 

@@ -50,6 +50,15 @@ pub struct RoleSummary {
     pub extremes: Extremes,
     /// The unit in which the log has it.
     pub unit_name: String,
+    /// At which fraction of the time so far the last good sample came, 0 to 1.
+    pub until: f64,
+}
+
+impl RoleSummary {
+    /// Whether it ended, or its sensor failed, in the first half of the time so far: what it gave before says little of the rest.
+    pub fn ended_early(&self) -> bool {
+        self.until < 0.5
+    }
 }
 
 /// The channels of one role while they are read.
@@ -60,6 +69,8 @@ struct Channels {
     parts_s: f64,
     counts: QualityCounts,
     extremes: Extremes,
+    /// Time of the last good sample, s.
+    good_s: f64,
 }
 
 /// A reading that waits, with the place of its entry in the map, the time of its sample, s, and the resets of clocks until then.
@@ -95,6 +106,8 @@ pub struct Readings<'a> {
     is_reverse: bool,
     /// Newest friction torque of the engine, N m; zero where it is not mapped, none before its first value.
     friction_n_m: Option<f64>,
+    /// Times of the first and of the last sample, s.
+    span_s: [f64; 2],
 }
 
 impl<'a> Readings<'a> {
@@ -119,6 +132,7 @@ impl<'a> Readings<'a> {
             resolved,
             counts: QualityCounts::default(),
             extremes: Extremes::default(),
+            good_s: f64::NAN,
         });
         let roles = roles.collect();
         Ok(Self {
@@ -136,6 +150,7 @@ impl<'a> Readings<'a> {
             withdrawn: Vec::new(),
             is_reverse: false,
             friction_n_m: (!map.has(Role::EngineFrictionTorque)).then_some(0.0),
+            span_s: [f64::INFINITY, f64::NEG_INFINITY],
         })
     }
 
@@ -147,8 +162,15 @@ impl<'a> Readings<'a> {
             counts: channels.counts,
             extremes: channels.extremes,
             unit_name: channels.resolved.unit_name.clone(),
+            until: self.until(channels.good_s),
         };
         self.roles.iter().map(summary).collect()
+    }
+
+    /// The fraction of the time so far at which a sample came; all of it before two times are known.
+    fn until(&self, time_s: f64) -> f64 {
+        let [first_s, last_s] = self.span_s;
+        if last_s > first_s { ((time_s - first_s) / (last_s - first_s)).max(0.0) } else { 1.0 }
     }
 
     /// The place in the map of the entry that gave the last reading.
@@ -216,10 +238,8 @@ impl<'a> Readings<'a> {
                 )));
             }
             // A request that is rarely made is rightly absent.
-            // A sensor that fails in the drive leaves what it gave before. A log goes on without output and wheel speed.
-            let is_frozen = matches!(role.role, Role::OutputSpeed | Role::WheelSpeed);
-            let frozen = if is_frozen { role.counts.of(Quality::Frozen) } else { 0 };
-            let total = total - role.counts.of(Quality::Impossible) - frozen;
+            // A sensor that fails in the drive leaves what it gave before.
+            let total = total - role.counts.of(Quality::Impossible) - role.counts.of(Quality::Frozen);
             if 2 * good < total && role.role != Role::TorqueReductionRequest {
                 return Err(LogError::map(format!(
                     "{} of {total} samples of {name} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",
@@ -282,6 +302,8 @@ impl<'a> Readings<'a> {
             self.withdrawn.extend(withdrawn);
         }
         channels.counts.push(quality);
+        let [first_s, last_s] = self.span_s;
+        self.span_s = [first_s.min(sample.time_s), last_s.max(sample.time_s)];
         match quality {
             Quality::Good => {}
             Quality::Frozen | Quality::Impossible => {
@@ -294,6 +316,7 @@ impl<'a> Readings<'a> {
         }
         // In reverse the car goes backwards: the sign of these speeds says nothing.
         let is_backwards = self.is_reverse && matches!(kind, Role::OutputSpeed | Role::WheelSpeed);
+        channels.good_s = sample.time_s;
         channels.extremes.push(if is_backwards { value.abs() } else { value });
         Some(Reading { role: kind, time_s, stamp_s, value })
     }

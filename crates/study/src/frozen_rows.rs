@@ -99,10 +99,7 @@ impl FrozenRows {
     }
 
     /// What was met, in sentences.
-    ///
-    /// # Errors
-    /// Most readings of engine or turbine speed were frozen; holds what to say of it. A log goes on without output and wheel speed.
-    pub(crate) fn notes(&self) -> Result<Vec<String>, String> {
+    pub(crate) fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         for (role, counts) in WATCHED.iter().zip(self.counts) {
             let Counts { readings, frozen, impossible, held } = counts;
@@ -122,10 +119,20 @@ impl FrozenRows {
                     "{impossible} of {readings} readings of {name} are impossible, as a zero while the car drives or a jump, and are not used"
                 ));
             }
-            if 2 * frozen > readings && matches!(role, Role::EngineSpeed | Role::TurbineSpeed) {
-                return Err(format!("{}\nhint: check the sensor of {name} and its column", notes.join(", ")));
-            }
         }
-        Ok(notes)
+        notes
+    }
+
+    /// Refuses a log of one shift without the speeds that show it. It goes on without output and wheel speed.
+    ///
+    /// # Errors
+    /// Most readings of engine or turbine speed were frozen; holds what to say of it.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let frozen = WATCHED.iter().zip(self.counts).find(|(role, counts)| {
+            2 * counts.frozen > counts.readings && matches!(role, Role::EngineSpeed | Role::TurbineSpeed)
+        });
+        frozen.map_or(Ok(()), |(role, _)| {
+            Err(format!("{}\nhint: check the sensor of {} and its column", self.notes().join(", "), role.name()))
+        })
     }
 }

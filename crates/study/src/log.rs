@@ -207,7 +207,8 @@ impl Log {
     pub fn check_readings(&self) -> Result<Vec<String>, TraceError> {
         let mut notes = self.clock.notes(&self.rows)?;
         notes.extend(self.samples.notes(&self.rows)?);
-        notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
+        self.frozen.check().map_err(|message| self.rows.refused(message))?;
+        notes.extend(self.frozen.notes());
         Ok(notes)
     }
 

@@ -115,9 +115,15 @@ impl<'c> InGear<'c> {
         }
     }
 
-    /// Rows, and those whose turbine and output speed do not fit the ratio of the gear.
+    /// Rows, and those whose turbine and output speed do not fit the ratio of the gear; none where a speed has ended in most rows: what its
+    /// sensor gave while it failed says nothing of the car.
     pub(crate) fn rows(&self) -> [u64; 2] {
-        self.rows
+        if self.has_ended() { [0; 2] } else { self.rows }
+    }
+
+    /// Whether engine, turbine or output speed have ended in most rows while the car moves.
+    fn has_ended(&self) -> bool {
+        2 * self.ended > self.health.iter().sum()
     }
 
     /// The rows while the car moves, if there are enough of them and the filter could use the readings of none.
@@ -126,8 +132,7 @@ impl<'c> InGear<'c> {
         let rows = self.health.iter().sum();
         let is_used = Health::ALL.iter().any(|health| is_usable(*health) && of(health) > 0);
         let health = Health::ALL.into_iter().max_by_key(of)?;
-        let has_ended = 2 * self.ended > rows;
-        (!is_used && !has_ended && rows >= ENOUGH_ROWS).then_some(Unusable { rows, health })
+        (!is_used && !self.has_ended() && rows >= ENOUGH_ROWS).then_some(Unusable { rows, health })
     }
 
     /// Rows while the car moves in which engine, turbine or output speed have ended.

@@ -159,7 +159,7 @@ impl<'c> CarLog<'c> {
             return Err(self.rows.refused(format!("the gear is missing in all rows\nhint: {gears}")));
         }
         notes.extend(self.gears.notes(&gears).map_err(|message| self.rows.refused(message))?);
-        notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
+        notes.extend(self.frozen.notes());
         notes.extend(self.unread());
         Ok(notes)
     }

@@ -34,8 +34,8 @@ pub(crate) struct WatchedColumns {
     first: usize,
     rows: u64,
     summaries: Vec<RoleSummary>,
-    /// Whether each is needed, and how many values it has.
-    needs: Vec<(bool, u64)>,
+    /// Whether each is needed, how many values it has, and the row of the last one.
+    needs: Vec<(bool, u64, u64)>,
 }
 
 impl WatchedColumns {
@@ -50,8 +50,8 @@ impl WatchedColumns {
                 _ => "rpm",
             };
             let (counts, extremes) = (QualityCounts::default(), Extremes::default());
-            summaries.push(RoleSummary { role, name, counts, extremes, unit_name: unit_name.to_owned() });
-            needs.push((is_needed, 0));
+            summaries.push(RoleSummary { role, name, counts, extremes, unit_name: unit_name.to_owned(), until: 1.0 });
+            needs.push((is_needed, 0, 0));
         }
         Self { first, rows: 0, summaries, needs }
     }
@@ -60,9 +60,10 @@ impl WatchedColumns {
     pub(crate) fn push(&mut self, values: impl IntoIterator<Item = Option<f64>>) {
         self.rows += 1;
         let is_looked_at = is_looked_at(self.rows, self.first);
-        for ((entry, (_, count)), value) in self.summaries.iter_mut().zip(&mut self.needs).zip(values) {
+        for ((entry, (_, count, last)), value) in self.summaries.iter_mut().zip(&mut self.needs).zip(values) {
             if let Some(value) = value.filter(|value| value.is_finite()) {
                 *count += 1;
+                *last = self.rows;
                 if is_looked_at {
                     entry.extremes.push(value);
                 }
@@ -78,14 +79,20 @@ impl WatchedColumns {
     /// Refuses a table in which a column that is needed has no value, or whose values cannot be right.
     pub(crate) fn check(&self, seen: Seen) -> Result<(), Error> {
         let mut with_needs = self.summaries.iter().zip(&self.needs);
-        if let Some((entry, _)) = with_needs.find(|(_, need)| **need == (true, 0)).filter(|_| self.rows > 0) {
+        if let Some((entry, _)) =
+            with_needs.find(|(_, (is_needed, count, _))| *is_needed && *count == 0).filter(|_| self.rows > 0)
+        {
             return Err(Error::Input(format!(
                 "{} has no value in any of {} rows\nhint: an estimate of this car needs it; look at the log with `wetclutch inspect`",
                 entry.name,
                 grouped(self.rows)
             )));
         }
-        let Some(Finding { name, message, likely, .. }) = findings(&self.summaries, seen).into_iter().next() else {
+        let until = |(_, _, last): &(bool, u64, u64)| *last as f64 / self.rows as f64;
+        let with_needs = self.summaries.iter().zip(&self.needs);
+        let summaries: Vec<_> =
+            with_needs.map(|(entry, need)| RoleSummary { until: until(need), ..entry.clone() }).collect();
+        let Some(Finding { name, message, likely, .. }) = findings(&summaries, seen).into_iter().next() else {
             return Ok(());
         };
         let hint = match likely {
