@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,10 @@ import pytest
 import wetclutch as wc
 
 ROOT = Path(__file__).resolve().parents[2]
+
+# A program that a script starts in the background ignores interrupts until it says otherwise.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 
 @pytest.fixture(scope="session")
 def car() -> wc.Car:
