@@ -63,7 +63,7 @@ struct Callbacks {
     environment: *mut c_void,
 }
 
-/// The folder of a location such as `file:///tmp/a%20b`.
+/// The folder of a location such as `file:///opt/a%20b`.
 fn folder_at(location: &[u8]) -> Option<Vec<u8>> {
     let location = location.strip_prefix(b"file:")?;
     // An authority, mostly none, is between the second and the third slash.
