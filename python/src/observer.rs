@@ -7,8 +7,8 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use wetclutch::{
-    ClutchEstimate, ElementId, Error, Estimator, Gear, GearId, Reading, ShiftCommand, ShiftEstimate, ShiftId, Step,
-    VehicleFile,
+    ClutchEstimate, ElementId, Error, Estimator, Gear, GearId, Reading, ShiftCommand, ShiftElement, ShiftEstimate,
+    ShiftId, Step, VehicleFile,
 };
 
 use crate::car::parsed;
@@ -83,7 +83,7 @@ impl Observer {
             let named = |name: &String| Some((name.clone(), estimator.element(name)?));
             let elements = car.gearbox.elements.iter().filter_map(|element| named(&element.name)).collect();
             let places = (0..car.gearbox.elements.len())
-                .filter_map(|place| Some((place, estimator.name_of(place)?.to_owned())))
+                .filter_map(|place| Some((place, estimator.name_of(ShiftElement::at(place))?.to_owned())))
                 .collect();
             let gears = car.gearbox.gears.iter().map(|gear| gear.name.clone()).collect();
             let shift = shift.map(|name| car.shift_named(name)).transpose()?;
@@ -302,7 +302,7 @@ impl StepEstimate {
 
     fn clutch(&self, which: usize) -> Option<ClutchStep> {
         let clutch = *self.estimate.clutches?.get(which)?;
-        let named = self.names.places.iter().find(|(place, _)| *place == clutch.element);
+        let named = self.names.places.iter().find(|(place, _)| clutch.element.place() == Some(*place));
         Some(ClutchStep { clutch, element: named.map(|(_, name)| name.clone()) })
     }
 }

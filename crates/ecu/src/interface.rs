@@ -3,7 +3,7 @@
 use core::mem::offset_of;
 
 use drivetrain::Real;
-use observer::gearbox::{ClutchEstimate, GearCommand, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput, ShiftPhase};
+use observer::gearbox::{ClutchEstimate, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput, ShiftPhase};
 use observer::{ChannelHealth, Channels};
 
 /// A reading of a channel.
@@ -275,7 +275,7 @@ impl Clutch {
         let (pressure_range_pa, torque_range_n_m) = ranges.unwrap_or_default();
         let flag = |bit: u32, is_set: bool| if is_set { bit } else { 0 };
         Self {
-            element: if estimate.element == ONE_WAY { -1 } else { estimate.element as i32 },
+            element: estimate.element.place().map_or(-1, |place| place as i32),
             flags: flag(CLUTCH_HOLDS, estimate.holds)
                 | flag(CLUTCH_HIDDEN, estimate.hidden)
                 | flag(CLUTCH_RANGE, ranges.is_some()),

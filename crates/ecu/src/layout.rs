@@ -6,8 +6,8 @@ use car::FillBudget;
 use drivetrain::table::MAX_POINTS;
 use drivetrain::{Clutch, ClutchValve, Converter, Cylinder, Driveline, Passage, PulseWidth, Table1, ValveMaps};
 use observer::gearbox::{
-    ElementUncertainty, FrictionElement, GearRow, Piston, ShiftClutch, ShiftRow, ShiftUncertainty, TurbineTorque,
-    ValveLimits,
+    ElementUncertainty, FrictionElement, GearRow, Piston, ShiftClutch, ShiftElement, ShiftRow, ShiftUncertainty,
+    TurbineTorque, ValveLimits,
 };
 use observer::{Budget, EngineNoise, GearboxFilter, GearboxTables, InputLimits, SpeedReading, ValveModel};
 
@@ -65,6 +65,28 @@ layout! {
     GearRow { ratio, inertia_kg_m2, holding }
     ShiftClutch { element, alpha, ratio }
     ShiftRow { from, to, clutches, mass_kg_m2, has_dog }
+}
+
+/// Words of an element of a shift that is no clutch or brake with a place in the tables.
+const ONE_WAY: u32 = u32::MAX;
+const UNKNOWN: u32 = u32::MAX - 1;
+
+impl Layout for ShiftElement {
+    fn put(&self, name: &'static str, sink: &mut impl Sink) {
+        let word = match *self {
+            Self::Friction(place) => u32::from(place),
+            Self::OneWay => ONE_WAY,
+            Self::Unknown => UNKNOWN,
+        };
+        sink.whole(name, word);
+    }
+
+    fn take(words: &mut Words<'_>) -> Option<Self> {
+        Some(match words.whole()? {
+            ONE_WAY => Self::OneWay,
+            place => Self::at(place as usize),
+        })
+    }
 }
 
 /// Its points alone: slopes follow from them.

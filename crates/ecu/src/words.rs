@@ -88,14 +88,13 @@ impl Layout for u32 {
     }
 }
 
-/// Places of nothing are the highest numbers, on a controller of 32 bits as here.
 impl Layout for usize {
     fn put(&self, name: &'static str, sink: &mut impl Sink) {
         sink.whole(name, *self as u32);
     }
 
     fn take(words: &mut Words<'_>) -> Option<Self> {
-        words.whole().map(|word| word as i32 as isize as usize)
+        words.whole().map(|word| word as usize)
     }
 }
 

@@ -2,7 +2,8 @@
 
 use car::{Car, ElementId, ErrorBudget, Gear, GearId, Sensors, Step};
 use observer::gearbox::{
-    GearCommand, GearboxFilter, GearboxState, GearboxTables, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput,
+    GearCommand, GearboxFilter, GearboxState, GearboxTables, Learnt, MAX_ELEMENTS, ShiftElement, ShiftEstimate,
+    ShiftInput,
 };
 use observer::{ShiftTables, gearbox_filter};
 
@@ -67,10 +68,8 @@ impl Estimator {
     }
 
     /// The name of the element that a [`observer::gearbox::ClutchEstimate`] is of; `None` of a one-way clutch.
-    pub fn name_of(&self, place: usize) -> Option<&str> {
-        if place == ONE_WAY {
-            return None;
-        }
+    pub fn name_of(&self, element: ShiftElement) -> Option<&str> {
+        let place = element.place()?;
         let elements = self.elements.iter().enumerate();
         elements.filter(|(at, _)| self.tables.place(*at) == Some(place)).map(|(_, name)| name.as_str()).next()
     }
@@ -194,6 +193,6 @@ mod tests {
             }
         }
         assert_eq!(estimator.gear("9"), None);
-        assert_eq!(estimator.name_of(ONE_WAY), None);
+        assert_eq!(estimator.name_of(ShiftElement::OneWay), None);
     }
 }

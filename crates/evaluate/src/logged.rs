@@ -3,7 +3,7 @@
 use car::ErrorBudget;
 use car::{Car, Sensors};
 use observer::gearbox::{
-    ClutchEstimate, GearCommand, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftPhase,
+    ClutchEstimate, GearCommand, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftPhase,
 };
 use observer::{Health, Reading};
 use observer::{ShiftTables, gearbox_filter};
@@ -463,7 +463,7 @@ fn clutch_row(
         torque_range_n_m: found.torque_range_n_m,
         pressure_range_pa: found.pressure_range_pa,
         hidden: found.hidden,
-        is_one_way: found.element == ONE_WAY,
+        is_one_way: found.element.is_one_way(),
         in_range: within(found.pressure_range_pa, pressure_pa, ROUNDING_PA)
             && within(found.torque_range_n_m, torque_n_m, ROUNDING_N_M),
     }

@@ -2,7 +2,7 @@
 
 use car::{Car, ErrorBudget, Sensors};
 use drivetrain::Real;
-use observer::gearbox::{GearboxFilter, GearboxState, ONE_WAY, ShiftEstimate, ShiftInput};
+use observer::gearbox::{GearboxFilter, GearboxState, ShiftElement, ShiftEstimate, ShiftInput};
 use observer::{Health, ShiftTables, gearbox_filter};
 use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_shift};
 
@@ -272,21 +272,23 @@ pub fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstima
     let alphas = tables.tables().shift(under_way.from, under_way.to).map(|row| row.clutches.map(|clutch| clutch.alpha));
     let of = |c: usize| {
         let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
-        (found.element == tables.place(truth.element).unwrap_or(ONE_WAY)).then(|| ClutchRow {
-            // A valve model knows no direction: it is told the true one. Else noise of a slip that is not yet seen would be its error.
-            torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m.abs().copysign(truth.torque_n_m)],
-            torque_std_dev_n_m: found.std_dev_n_m,
-            pressure_std_dev_pa: found.pressure_std_dev_pa,
-            pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
-            slip_rad_s: truth.slip_rad_s,
-            alpha: alphas.map_or(f64::NAN, |alphas| alphas[c]),
-            sticks: truth.sticks,
-            torque_range_n_m: found.torque_range_n_m,
-            pressure_range_pa: found.pressure_range_pa,
-            hidden: found.hidden,
-            is_one_way: found.element == ONE_WAY,
-            in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
-                && within(found.torque_range_n_m, truth.torque_n_m, ROUNDING_N_M),
+        (found.element == tables.place(truth.element).map_or(ShiftElement::OneWay, ShiftElement::at)).then(|| {
+            ClutchRow {
+                // A valve model knows no direction: it is told the true one. Else noise of a slip that is not yet seen would be its error.
+                torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m.abs().copysign(truth.torque_n_m)],
+                torque_std_dev_n_m: found.std_dev_n_m,
+                pressure_std_dev_pa: found.pressure_std_dev_pa,
+                pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
+                slip_rad_s: truth.slip_rad_s,
+                alpha: alphas.map_or(f64::NAN, |alphas| alphas[c]),
+                sticks: truth.sticks,
+                torque_range_n_m: found.torque_range_n_m,
+                pressure_range_pa: found.pressure_range_pa,
+                hidden: found.hidden,
+                is_one_way: found.element.is_one_way(),
+                in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
+                    && within(found.torque_range_n_m, truth.torque_n_m, ROUNDING_N_M),
+            }
         })
     };
     Some(ShiftScoreRow {

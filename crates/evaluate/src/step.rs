@@ -51,7 +51,7 @@ impl LogStep {
             if of_shift.is_finite() {
                 return Some(Reading { value: of_shift, age_s: 0.0 });
             }
-            *self.pressures.get(clutches?[c].element)?
+            *self.pressures.get(clutches?[c].element.place()?)?
         })
     }
 }

@@ -3,8 +3,8 @@
 use alloc::vec::Vec;
 
 use crate::gearbox::{
-    ElementUncertainty, FrictionElement, GearRow, GearboxFilter, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY,
-    Piston, ShiftRow, ShiftUncertainty, TurbineTorque, ValveLimits,
+    ElementUncertainty, FrictionElement, GearRow, GearboxFilter, GearboxTables, MAX_ELEMENTS, Piston, ShiftElement,
+    ShiftRow, ShiftUncertainty, TurbineTorque, ValveLimits,
 };
 use crate::{Budget, FillBudget, InputLimits, ValveModel};
 use car::{Car, ElementErrors, ErrorBudget, Sensors};
@@ -72,17 +72,20 @@ impl ShiftTables<f64> {
             return Err(elements.len());
         }
         let shift_rows = gearbox.shifts.iter().filter_map(|shift| {
-            let place = |element: usize| places[element].or(gearbox.is_one_way(element).then_some(ONE_WAY));
+            let of = |element: usize| match places[element] {
+                None => gearbox.is_one_way(element).then_some(ShiftElement::OneWay),
+                place => place.map(ShiftElement::at),
+            };
             let clutches = match &shift.change {
-                Change::Single { offgoing, oncoming, .. } => [place(*offgoing)?, place(*oncoming)?],
+                Change::Single { offgoing, oncoming, .. } => [of(*offgoing)?, of(*oncoming)?],
                 // Of ratios alone.
-                Change::Unknown => [NO_ELEMENT; 2],
+                Change::Unknown => [ShiftElement::Unknown; 2],
                 _ => return None,
             };
             let mut reduced = shift.reduced?;
             reduced.mass_kg_m2[0][0] += more_on_input_kg_m2;
             // Between gears of one ratio the speeds show nothing.
-            if gearbox.is_same_ratio(shift.from, shift.to) || clutches == [ONE_WAY; 2] {
+            if gearbox.is_same_ratio(shift.from, shift.to) || clutches == [ShiftElement::OneWay; 2] {
                 return None;
             }
             let has_dog = has_dog(gearbox, [shift.from, shift.to]);
@@ -130,6 +133,11 @@ impl<T: Real> ShiftTables<T> {
     /// What the filter does not know of each element.
     pub fn uncertainties_mut(&mut self) -> impl Iterator<Item = &mut ElementUncertainty<T>> {
         self.elements.iter_mut().map(|element| &mut element.uncertainty)
+    }
+
+    /// The element of the gearbox at a place of the tables.
+    pub fn element_at(&self, place: usize) -> Option<usize> {
+        self.places.iter().position(|at| *at == Some(place))
     }
 
     /// Place of an element of the gearbox in the tables; `None` if it is not in them.

@@ -31,7 +31,7 @@ pub use export::export;
 pub use fitted::{FitOptions, FitProgress, Fitted, fit};
 pub use gains::{DesignObserver, DesignOptions, Designed, design};
 pub use observer::Health;
-pub use observer::gearbox::{ClutchEstimate, ShiftEstimate, ShiftPhase};
+pub use observer::gearbox::{ClutchEstimate, ShiftElement, ShiftEstimate, ShiftPhase};
 pub use score::{PhaseScore, Scores, score};
 pub use simulate::{Simulation, simulate};
 pub use studies::StudyRuns;

@@ -214,9 +214,11 @@ impl<'c> CommandDelay<'c> {
 
     /// Mean differences of the torques of a shift; none of one without enough slip.
     fn differences(&self, shift: &ShiftRow<f64>, points: &[Point]) -> Option<Differences> {
-        let clutches = shift.clutches.map(|of| (of, &self.tables.tables().elements[of.element].clutch));
+        let elements = self.tables.tables().elements;
+        let [Some(off), Some(on)] = shift.clutches.map(|of| Some((of, of.element.place()?))) else { return None };
+        let clutches = [off, on].map(|(of, place)| (of, place, &elements[place].clutch));
         let force = |point: &Point, (gain, offset_pa): (f64, f64)| {
-            clutches.map(|(of, clutch)| clutch.clamp_force(gain * point.valve_pa[of.element] + offset_pa))
+            clutches.map(|(_, place, clutch)| clutch.clamp_force(gain * point.valve_pa[place] + offset_pa))
         };
         let forces: Vec<Vec<[f64; 2]>> = self
             .pressures
@@ -229,14 +231,14 @@ impl<'c> CommandDelay<'c> {
             let (point, before, after) = (&points[at], &points[at - RATE], &points[at + RATE]);
             let rate = |of: fn(&Point) -> f64| (of(after) - of(before)) / (2.0 * span_s(RATE));
             let needed_n_m = point.turbine_n_m - m11 * rate(|of| of.turbine_rad_s) - m12 * rate(|of| of.output_rad_s);
-            let slips = clutches.map(|(of, _)| point.turbine_rad_s - of.ratio * point.output_rad_s);
+            let slips = clutches.map(|(of, ..)| point.turbine_rad_s - of.ratio * point.output_rad_s);
             let holds = slips.map(|slip| slip.abs() < HOLDS_RAD_S);
             if !needed_n_m.is_finite() || holds == [true; 2] {
                 continue;
             }
             used += 1;
             let per_force = [0, 1].map(|c| {
-                let (of, clutch) = clutches[c];
+                let (of, _, clutch) = clutches[c];
                 of.alpha.abs() * clutch.torque_per_force(of.alpha * slips[c]) * slips[c].signum()
             });
             let balance = Balance { needed_n_m, per_force, holds };

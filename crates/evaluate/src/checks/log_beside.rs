@@ -50,7 +50,8 @@ impl CarriedPressures {
         let readings = step.shift_pressures(tables);
         [0, 1].map(|c| {
             let Some(reading) = readings[c].filter(|reading| reading.age_s <= OLDEST_S) else { return f64::NAN };
-            let change = row.and_then(|row| self.change_pa(row.clutches[c].element, step.time_s - reading.age_s));
+            let change =
+                row.and_then(|row| self.change_pa(row.clutches[c].element.place()?, step.time_s - reading.age_s));
             reading.value + change.unwrap_or(0.0)
         })
     }

@@ -6,7 +6,7 @@
 use car::Car;
 use observer::Reading;
 use observer::ShiftTables;
-use observer::gearbox::MAX_ELEMENTS;
+use observer::gearbox::{MAX_ELEMENTS, ShiftElement};
 
 /// Readings of a command in a shift that are needed to judge \[chosen\].
 const ENOUGH: u32 = 3;
@@ -41,9 +41,9 @@ impl StillCommands {
         }
     }
 
-    /// The shift between these elements, by place, is completed.
-    pub(crate) fn end(&mut self, places: [usize; 2]) {
-        for place in places {
+    /// The shift between these elements is completed.
+    pub(crate) fn end(&mut self, elements: [ShiftElement; 2]) {
+        for place in elements.into_iter().filter_map(ShiftElement::place) {
             if self.readings.get(place).is_some_and(|readings| *readings >= ENOUGH) {
                 self.shifts[place] += 1;
                 self.still[place] += u64::from(!self.has_moved[place]);

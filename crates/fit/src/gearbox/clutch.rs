@@ -65,7 +65,8 @@ impl ClutchModel {
         grid: Grid,
     ) -> Option<Self> {
         let shift = row.clutches[which];
-        let element = (0..car.clutches.len()).find(|at| tables.place(*at) == Some(shift.element))?;
+        let place = shift.element.place()?;
+        let element = tables.element_at(place)?;
         let known = car.clutches[element].as_ref()?;
         let per_pa = (0..grid.points).map(|i| {
             let time_s = grid.time_s(i);
@@ -78,14 +79,14 @@ impl ClutchModel {
         let measured = match &hydraulics.cylinder {
             Some(cylinder) => {
                 let sd = |quantity| quantities.place(quantity).map_or(0.0, |at| quantities.sd_before(at));
-                let [kiss, offset] = [Quantity::Kiss(shift.element), Quantity::PressureOffset(shift.element)].map(sd);
+                let [kiss, offset] = [Quantity::Kiss(place), Quantity::PressureOffset(place)].map(sd);
                 let sd_pa = Real::hypot(KISS_UNIT_PA * kiss, OFFSET_UNIT_PA * offset);
                 filled_part(&measured, kiss_pa + SURELY * sd_pa, cylinder)
             }
             None => measured,
         };
         Some(Self {
-            place: shift.element,
+            place,
             commands: log.commands[which].clone(),
             measured,
             hydraulics,

@@ -41,7 +41,7 @@ pub(super) fn without_pressures(shifts: &[ShiftLog], tables: &ShiftTables<f64>, 
         let [from, to] = log.gears;
         let Some(row) = tables.tables().shift(from, to).copied() else { continue };
         for (pressure, clutch) in log.pressure.iter_mut().zip(row.clutches) {
-            if places.contains(&clutch.element) {
+            if clutch.element.place().is_some_and(|place| places.contains(&place)) {
                 *pressure = Default::default();
             }
         }

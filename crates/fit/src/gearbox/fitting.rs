@@ -222,12 +222,12 @@ fn above_one_fraction(models: &[ShiftModel]) -> f64 {
 impl GearboxFit {
     /// The fill volume of an element by the measured pressures of the shifts in which it is the oncoming one.
     fn fill_of(&self, car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog], place: usize) -> Option<FillFit> {
-        let element = (0..car.clutches.len()).find(|at| tables.place(*at) == Some(place))?;
+        let element = tables.element_at(place)?;
         let known = car.clutches[element].as_ref()?;
         let budget = known.standard_fill_budget(car.oil_temperature_degc)?;
         let rows = tables.tables();
         let is_oncoming = |log: &&ShiftLog| {
-            rows.shift(log.gears[0], log.gears[1]).is_some_and(|row| row.clutches[1].element == place)
+            rows.shift(log.gears[0], log.gears[1]).is_some_and(|row| row.clutches[1].element.place() == Some(place))
         };
         let measured = shifts.iter().filter(|log| self.quantities.measured[place] && is_oncoming(log));
         let logs: Vec<FillLog<'_>> = (measured.map(|log| FillLog {

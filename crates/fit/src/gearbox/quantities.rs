@@ -334,7 +334,9 @@ fn measured(tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<bool> {
     for log in shifts {
         let Some(row) = rows.shift(log.gears[0], log.gears[1]) else { continue };
         for (clutch, pressure) in row.clutches.iter().zip(&log.pressure) {
-            measured[clutch.element] |= pressure.between(log.slip_s).next().is_some();
+            if let Some(place) = clutch.element.place() {
+                measured[place] |= pressure.between(log.slip_s).next().is_some();
+            }
         }
     }
     measured

@@ -281,11 +281,12 @@ impl<'a> Recorder<'a> {
         }
         let span = [open.begun_s - 0.1, ended_s + AFTER_S];
         let commands = row.clutches.map(|clutch| {
-            let all = self.commands.get(clutch.element);
+            let all = clutch.element.place().and_then(|place| self.commands.get(place));
             all.map(|all| all.part([open.begun_s - self.before_s(), span[1]])).unwrap_or_default()
         });
         let pressure = [0, 1].map(|which| {
-            let all = self.pressures.get(row.clutches[which].element);
+            let place = row.clutches[which].element.place();
+            let all = place.and_then(|place| self.pressures.get(place));
             with_rest(&self.pressure[which], all, [open.begun_s - AFTER_S, span[1]])
         });
         Ok(ShiftLog {

@@ -32,10 +32,10 @@ pub(super) fn zero_offsets(car: &Car, tables: &ShiftTables<f64>, shifts: &[Shift
     for log in shifts {
         let Some(row) = rows.shift(log.gears[0], log.gears[1]) else { continue };
         for ((clutch, commands), pressure) in row.clutches.iter().zip(&log.commands).zip(&log.pressure) {
-            let element = (0..car.clutches.len()).find(|at| tables.place(*at) == Some(clutch.element));
-            let known = element.and_then(|at| car.clutches[at].as_ref());
+            let Some(place) = clutch.element.place() else { continue };
+            let known = tables.element_at(place).and_then(|at| car.clutches[at].as_ref());
             let at_rest = known.map_or_else(Vec::new, |known| at_rest(&Hydraulics::of(known), commands, pressure));
-            readings[clutch.element].extend((!at_rest.is_empty()).then_some(at_rest));
+            readings[place].extend((!at_rest.is_empty()).then_some(at_rest));
         }
     }
     readings.into_iter().map(|shifts| zero_offset(&shifts)).collect()
@@ -51,7 +51,8 @@ pub(super) fn without_offsets(
     for log in &mut shifts {
         let Some(row) = tables.tables().shift(log.gears[0], log.gears[1]).copied() else { continue };
         for (pressure, clutch) in log.pressure.iter_mut().zip(row.clutches) {
-            if let Some(offset) = offsets.get(clutch.element).copied().flatten() {
+            let offset = clutch.element.place().and_then(|place| offsets.get(place).copied().flatten());
+            if let Some(offset) = offset {
                 pressure.value.iter_mut().for_each(|value_pa| *value_pa -= offset.value);
             }
         }

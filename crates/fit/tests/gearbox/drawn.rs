@@ -461,7 +461,9 @@ impl Truth {
         let rows = tables.tables();
         for log in shifts {
             let row = rows.shift(log.gears[0], log.gears[1]).unwrap();
-            let Some(clutch) = row.clutches.iter().position(|clutch| clutch.element == place) else { continue };
+            let Some(clutch) = row.clutches.iter().position(|clutch| clutch.element.place() == Some(place)) else {
+                continue;
+            };
             // A sensor is read from half a second before the command on, as a recorder takes it; until then the oncoming element is empty.
             for i in (1..=50).rev().filter(|_| clutch == 1) {
                 let noise_pa = SENSOR_PA * (f64::from(i % 3) - 1.0);

@@ -7,8 +7,8 @@ use super::phases::Slip;
 use super::powertrain::{ClutchTorque, Torques};
 use super::{
     ClutchesAtTurbine, FRACTION, FRICTION, GearCommand, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS,
-    N, Newest, OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
-    square,
+    N, Newest, OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftElement, ShiftInput, ShiftPhase,
+    ShiftRow, WHEEL, square,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -18,8 +18,8 @@ const HIDDEN: f64 = 0.9;
 /// Pressure and torque of one clutch of a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClutchEstimate<T> {
-    /// The element, by its place in [`super::GearboxTables::elements`].
-    pub element: usize,
+    /// The element.
+    pub element: ShiftElement,
     /// Cylinder pressure, Pa.
     pub pressure_pa: T,
     /// Torque, N m, positive when it drives its output side.
@@ -198,7 +198,8 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// The same at the time of the state.
     pub(super) fn range_of_element(&self, state: &GearboxState<T>, at: usize) -> Option<[T; 2]> {
-        self.element(&state.elements, at).and_then(|(memory, element)| memory.pressure_range_pa(element))
+        self.element(&state.elements, ShiftElement::at(at))
+            .and_then(|(memory, element)| memory.pressure_range_pa(element))
     }
 
     /// Slip of the offgoing clutch away from the new gear, where the readings show one.

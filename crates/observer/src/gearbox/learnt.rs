@@ -46,7 +46,7 @@ use super::elements::ValveTiming;
 use super::information::{InformationGain, Matrix, around, cholesky, is_positive, lower_inverse};
 use super::powertrain::dot;
 use super::systematic::is_considered;
-use super::tables::MAX_ELEMENTS;
+use super::tables::{MAX_ELEMENTS, ShiftElement};
 
 /// Most pairs of gears whose inertia is learnt.
 pub const MAX_PAIRS: usize = 16;
@@ -166,15 +166,14 @@ pub(super) struct Known<T> {
 impl<T: Real> Acting<T> {
     /// In the order of the filter's states: torque factors, kiss points, inertia, torque at the gearbox input; then lag and delay of either clutch.
     pub(super) fn new(
-        [off, on]: [usize; 2],
+        [off, on]: [ShiftElement; 2],
         pair: Option<usize>,
         slow_part: [T; 2],
         by_stiffness: [T; ACTING],
     ) -> Self {
-        let element = |at: usize| (at < MAX_ELEMENTS).then_some(at);
+        let element = |of: ShiftElement| of.place().filter(|&at| at < MAX_ELEMENTS);
         // A one-way clutch has no place among the elements.
-        let [kiss, lag, delay] =
-            [KISS_AT, LAG_AT, DELAY_AT].map(|first| move |at: usize| element(at).map(|at| first + at));
+        let [kiss, lag, delay] = [KISS_AT, LAG_AT, DELAY_AT].map(|first| move |of| element(of).map(|at| first + at));
         let inertia = pair.filter(|&pair| pair < MAX_PAIRS).map(|pair| INERTIA_AT + pair);
         let states = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
         let timings = [lag(off), delay(off), lag(on), delay(on)];

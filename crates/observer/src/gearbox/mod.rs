@@ -80,7 +80,7 @@ pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
 pub use pistons::Piston;
 pub use tables::{
-    FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, ShiftClutch, ShiftRow, ValveLimits,
+    FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftClutch, ShiftElement, ShiftRow, ValveLimits,
 };
 pub use turbine::TurbineTorque;
 pub use uncertainty::{ElementUncertainty, ShiftUncertainty};

@@ -2,8 +2,8 @@
 
 use super::{
     CORE, ClutchTorque, Contact, ElementState, FRACTION, FRACTION_S, FRICTION, FrictionElement, GearboxFilter, LOAD,
-    MAX_ELEMENTS, MODEL_FRACTION, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SCALE, SPRING, ShiftRow,
-    TURBINE, TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
+    MAX_ELEMENTS, MODEL_FRACTION, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SCALE, SPRING, ShiftElement,
+    ShiftRow, TURBINE, TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
 };
 use crate::gearbox::elements::positive_part;
 use drivetrain::Real;
@@ -53,9 +53,9 @@ impl<T: Real> GearboxFilter<'_, T> {
     pub(super) fn element<'s>(
         &'s self,
         elements: &'s [Option<ElementState<T>>; MAX_ELEMENTS],
-        at: usize,
+        of: ShiftElement,
     ) -> Option<(&'s ElementState<T>, &'s FrictionElement<T>)> {
-        elements.get(at)?.as_ref().zip(self.tables.elements.get(at))
+        elements.get(of.place()?)?.as_ref().zip(self.tables.element(of))
     }
 
     /// Predicts over the step, and decides which clutches hold. The noise of the turbine torque may be one error that has lasted for
@@ -117,8 +117,7 @@ impl<T: Real> GearboxFilter<'_, T> {
                 let c = c.min(1);
                 let walked = self
                     .tables
-                    .elements
-                    .get(clutch.element)
+                    .element(clutch.element)
                     .map_or(T::zero(), |element| u.friction_walk(element.uncertainty.slow_part, dt_s));
                 x.fade(PRESSURE[c], pressure);
                 x.add(FRICTION[c], FRICTION[c], walked);

@@ -2,8 +2,8 @@
 
 use super::{
     ChannelHealth, Channels, Engine, FIRST_S, GearCommand, GearboxFilter, GearboxState, InputSide, LOST_S,
-    MAX_ELEMENTS, Newest, OUTPUT, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, pieces,
-    square,
+    MAX_ELEMENTS, Newest, OUTPUT, Reading, Running, SPEEDS, ShiftElement, ShiftInput, Slip, SpeedReading, TURBINE,
+    Verdict, pieces, square,
 };
 use drivetrain::Real;
 
@@ -40,7 +40,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         let lost = || {
             let shift = self.tables.shift(gear.from, gear.to).filter(|_| gear.from != gear.to);
             let elements = shift.map(|shift| shift.clutches.map(|clutch| clutch.element));
-            elements.into_iter().flatten().any(|element| each.get(element) == Some(&ChannelHealth::Lost))
+            let places = elements.into_iter().flatten().filter_map(ShiftElement::place);
+            places.into_iter().any(|place| each.get(place) == Some(&ChannelHealth::Lost))
         };
         if is(ChannelHealth::Refused) {
             ChannelHealth::Refused

@@ -3,8 +3,8 @@
 use super::timing::ByTiming;
 use super::{
     ACTING, Acting, Compared, Correlations, ElementState, ElementUncertainty, FRICTION, GearboxFilter, IN_GEAR,
-    INERTIA, KISS, Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, ONE_WAY, PRESSURE, PhaseMemory,
-    Running, SCALE, SLOW_FRACTION, STATES_ACTING, ShiftPhase, ShiftRow, Slip,
+    INERTIA, KISS, Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running,
+    SCALE, SLOW_FRACTION, STATES_ACTING, ShiftElement, ShiftPhase, ShiftRow, Slip,
 };
 use drivetrain::Real;
 
@@ -116,17 +116,17 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// The same in a gear.
     pub(super) fn acting_in_gear(&self) -> Acting<T> {
-        Acting::turbine(self.by_stiffness([ONE_WAY; 2]))
+        Acting::turbine(self.by_stiffness([ShiftElement::Unknown; 2]))
     }
 
     /// A value of what is not known of two elements; infinite for one that is not in the tables, as a one-way clutch.
-    fn of_elements(&self, elements: [usize; 2], of: impl Fn(&ElementUncertainty<T>) -> T) -> [T; 2] {
-        elements.map(|at| self.tables.elements.get(at).map_or(T::infinity(), |element| of(&element.uncertainty)))
+    fn of_elements(&self, elements: [ShiftElement; 2], of: impl Fn(&ElementUncertainty<T>) -> T) -> [T; 2] {
+        elements.map(|element| self.tables.element(element).map_or(T::infinity(), |element| of(&element.uncertainty)))
     }
 
     /// How an error of the stiffness of the drive shafts shows in the lasting states, per standard deviation of it: as one of all
     /// torques alike, and of no kiss point and no timing.
-    fn by_stiffness(&self, elements: [usize; 2]) -> [T; ACTING] {
+    fn by_stiffness(&self, elements: [ShiftElement; 2]) -> [T; ACTING] {
         let u = &self.uncertainty;
         let source =
             if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share };
@@ -154,7 +154,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         shift: &ShiftRow<T>,
     ) -> ByTiming<T> {
-        let of = |at: usize| self.element(elements, at).map_or([T::zero(); 2], |(memory, _)| memory.taken_off());
+        let of = |element| self.element(elements, element).map_or([T::zero(); 2], |(memory, _)| memory.taken_off());
         shift.clutches.map(|clutch| of(clutch.element))
     }
 

@@ -16,9 +16,6 @@ use crate::{Budget, Reading, ValveModel};
 /// Most clutches and brakes of a gearbox.
 pub const MAX_ELEMENTS: usize = 8;
 
-/// The place of no element: in the shifts of a gearbox of which the ratios alone are known.
-pub const NO_ELEMENT: usize = usize::MAX - 1;
-
 /// A clutch or brake with its valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionElement<T> {
@@ -89,14 +86,45 @@ pub struct GearRow<T> {
     pub holding: [T; MAX_ELEMENTS],
 }
 
-/// The place of a one-way clutch, which has no pressure and is in no table.
-pub const ONE_WAY: usize = usize::MAX;
+/// Which element changes in a shift.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShiftElement {
+    /// A clutch or brake, by its place in [`GearboxTables::elements`].
+    Friction(u8),
+    /// A one-way clutch, which has no pressure and is in no table.
+    OneWay,
+    /// Of the gearbox the ratios alone are known.
+    Unknown,
+}
+
+impl ShiftElement {
+    /// The clutch or brake at this place; unknown from [`MAX_ELEMENTS`] on.
+    pub const fn at(place: usize) -> Self {
+        // The place is below 8.
+        if place < MAX_ELEMENTS { Self::Friction(place as u8) } else { Self::Unknown }
+    }
+
+    /// The place of a clutch or brake in [`GearboxTables::elements`].
+    #[inline]
+    pub const fn place(self) -> Option<usize> {
+        match self {
+            Self::Friction(place) => Some(place as usize),
+            Self::OneWay | Self::Unknown => None,
+        }
+    }
+
+    /// Whether it is a one-way clutch.
+    #[inline]
+    pub const fn is_one_way(self) -> bool {
+        matches!(self, Self::OneWay)
+    }
+}
 
 /// An element that changes in a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftClutch<T> {
-    /// Its place in [`GearboxTables::elements`], or [`ONE_WAY`].
-    pub element: usize,
+    /// Which one it is.
+    pub element: ShiftElement,
     /// Its slip per turbine speed, `alpha`: the turbine feels `alpha` times its torque.
     pub alpha: T,
     /// The ratio `i` of the gear in which it holds.
@@ -106,7 +134,7 @@ pub struct ShiftClutch<T> {
 impl<T> ShiftClutch<T> {
     /// Whether it is a one-way clutch: it holds any torque in one direction, and carries none while it overruns.
     pub fn is_one_way(&self) -> bool {
-        self.element == ONE_WAY
+        self.element.is_one_way()
     }
 }
 
@@ -117,7 +145,7 @@ pub struct ShiftRow<T> {
     pub from: usize,
     /// The gear after.
     pub to: usize,
-    /// The element that opens, then the one that closes; [`NO_ELEMENT`] where the ratios alone are known.
+    /// The element that opens, then the one that closes.
     pub clutches: [ShiftClutch<T>; 2],
     /// Mass `M` in turbine and output speed, kg m^2.
     pub mass_kg_m2: [[T; 2]; 2],
@@ -139,8 +167,8 @@ pub struct GearboxTables<'a, T> {
 
 impl<T: Real> ShiftRow<T> {
     /// The shift between two gears with these offgoing and oncoming elements, without dogs.
-    pub fn new(gears: [usize; 2], elements: [usize; 2], reduced: &ReducedShift<T>) -> Self {
-        let clutch = |element: usize, slip: [T; 2]| ShiftClutch { element, alpha: slip[0], ratio: -slip[1] / slip[0] };
+    pub fn new(gears: [usize; 2], elements: [ShiftElement; 2], reduced: &ReducedShift<T>) -> Self {
+        let clutch = |element, slip: [T; 2]| ShiftClutch { element, alpha: slip[0], ratio: -slip[1] / slip[0] };
         Self {
             from: gears[0],
             to: gears[1],
@@ -200,7 +228,13 @@ impl<T: Real> FrictionElement<T> {
     }
 }
 
-impl<T: Real> GearboxTables<'_, T> {
+impl<'a, T: Real> GearboxTables<'a, T> {
+    /// A clutch or brake that changes in a shift; `None` of an element that is not in the tables.
+    #[inline]
+    pub fn element(&self, of: ShiftElement) -> Option<&'a FrictionElement<T>> {
+        self.elements.get(of.place()?)
+    }
+
     /// The place of two neighbouring gears among the pairs of gears: up or down, the same elements hold, and so the inertia
     /// is the same. `None` for a shift that skips a gear.
     pub fn pair(&self, from: usize, to: usize) -> Option<usize> {
@@ -233,8 +267,25 @@ impl<T: Real> GearboxTables<'_, T> {
         let elements = self.elements.len().min(MAX_ELEMENTS);
         let known = |row: &&ShiftRow<T>| {
             (row.from, row.to) == (from, to)
-                && row.clutches.iter().all(|clutch| clutch.element < elements || clutch.is_one_way())
+                && row
+                    .clutches
+                    .iter()
+                    .all(|clutch| clutch.is_one_way() || clutch.element.place().is_some_and(|place| place < elements))
         };
         self.shifts.iter().find(known)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_element_has_a_place_if_the_tables_can_have_it() {
+        assert_eq!(ShiftElement::at(MAX_ELEMENTS - 1).place(), Some(MAX_ELEMENTS - 1));
+        assert_eq!([MAX_ELEMENTS, 256, usize::MAX].map(ShiftElement::at), [ShiftElement::Unknown; 3]);
+        assert_eq!([ShiftElement::OneWay, ShiftElement::Unknown].map(ShiftElement::place), [None; 2]);
+        // As small as the number of a place: the tables have two for each shift.
+        assert!(size_of::<ShiftClutch<f32>>() <= 12);
     }
 }

@@ -207,8 +207,8 @@ impl<'a> CarChannels<'a> {
             gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
         };
         let GearCommand { from, to } = input.gear;
-        let shift = self.tables.tables().shift(from, to).map(|row| row.clutches[1].element);
-        if let Some(pressure) = shift.and_then(|element| pressures.get_mut(element)) {
+        let place = self.tables.tables().shift(from, to).and_then(|row| row.clutches[1].element.place());
+        if let Some(pressure) = place.and_then(|place| pressures.get_mut(place)) {
             *pressure = pressure.or(oncoming[0]);
         }
         let oncoming_n_m = oncoming[1].map_or(f64::NAN, |torque| torque.value);

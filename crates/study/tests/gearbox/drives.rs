@@ -128,7 +128,8 @@ fn the_pressure_of_every_element_is_within_its_range_in_gears_too() {
                 let label = format!("{name} {:.2} s, element {element}", sample.time_s);
                 assert!((low - 1.0..=high + 1.0).contains(pressure_pa), "{label}: {low} {pressure_pa} {high}");
                 widths_pa.push(high - low);
-                let shifts = estimate.clutches.into_iter().flatten().find(|clutch| clutch.element == place);
+                let shifts =
+                    estimate.clutches.into_iter().flatten().find(|clutch| clutch.element.place() == Some(place));
                 assert!(shifts.is_none_or(|clutch| clutch.pressure_range_pa == Some([low, high])), "{label}");
             }
         }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::ValveModel;
+use crate::gearbox::ShiftElement;
 use crate::gearbox::{Piston, ValveLimits};
 use drivetrain::{Clutch, ClutchValve, Cylinder, Table1, ValveMaps};
 
@@ -80,7 +81,7 @@ fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
 /// Near the kiss point and above it, with errors that are known.
 #[test]
 fn an_element_holds_what_it_carries_by_the_estimate() {
-    let (element, shift) = (element(), ShiftClutch { element: 0, alpha: -1.4, ratio: 2.0 });
+    let (element, shift) = (element(), ShiftClutch { element: ShiftElement::Friction(0), alpha: -1.4, ratio: 2.0 });
     let mut state = ElementState::new(&element);
     for (valve_pa, factor, pressure, kiss) in [
         (2e5, 0.0, 0.0, 0.0),
@@ -107,7 +108,7 @@ fn an_element_holds_what_it_carries_by_the_estimate() {
 #[test]
 fn an_element_whose_plates_do_not_touch_carries_nothing() {
     let (with, without) = (with_stroke(), element());
-    let shift = ShiftClutch { element: 0, alpha: 1.0, ratio: 2.0 };
+    let shift = ShiftClutch { element: ShiftElement::Friction(0), alpha: 1.0, ratio: 2.0 };
     let wrong = PressureError { pressure: 0.4, kiss: 0.3, variance: [0.8, 0.9], covariance: 0.0 };
     let mut states = [with, without].map(|element| (element, ElementState::new(&element)));
     let mut carried = [0.0; 300];

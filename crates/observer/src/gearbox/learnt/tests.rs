@@ -8,7 +8,7 @@ const PART: f64 = 0.75;
 const STIFFNESS: [f64; ACTING] = [0.9, 0.9, 0.0, 0.0, 1.0, 2.3, 0.0, 0.0, 0.0, 0.0];
 
 fn shift() -> Acting<f64> {
-    Acting::new([1, 4], Some(2), [PART; 2], STIFFNESS)
+    Acting::new([1, 4].map(ShiftElement::at), Some(2), [PART; 2], STIFFNESS)
 }
 
 /// What a filter knows after a measurement of `h a` with a variance of the noise.
@@ -39,7 +39,7 @@ fn what_a_shift_shows_reaches_all_quantities_as_in_one_filter() {
     // Other shifts have tied the quantities to each other.
     let mut seed = 1;
     for pair in 0..6 {
-        let acting = Acting::new([pair, pair + 1], Some(pair), [PART; 2], STIFFNESS);
+        let acting = Acting::new([pair, pair + 1].map(ShiftElement::at), Some(pair), [PART; 2], STIFFNESS);
         let h = core::array::from_fn(|_| random(&mut seed));
         let before = learnt.known(&acting, &CORRELATIONS);
         assert!(learnt.take(&acting, &before, &after(&before, &h, 0.5, 0.1), &CORRELATIONS));
@@ -115,7 +115,8 @@ fn ten_thousand_shifts_leave_a_covariance_and_means_within_the_bounds() {
     let (mut learnt, mut seed, mut taken) = (Learnt::nothing(&correlations), 5, 0);
     for k in 0..10_000 {
         let at = k % 7;
-        let acting = Acting::new([at, at + 1], Some(at), [PART as f32; 2], STIFFNESS.map(|x| x as f32));
+        let acting =
+            Acting::new([at, at + 1].map(ShiftElement::at), Some(at), [PART as f32; 2], STIFFNESS.map(|x| x as f32));
         let known = learnt.known(&acting, &correlations);
         let double =
             Known { mean: known.mean.map(f64::from), covariance: known.covariance.map(|row| row.map(f64::from)) };
@@ -170,7 +171,7 @@ fn what_is_read_must_be_what_a_filter_can_have_learnt() {
 fn shown_by(car: impl Fn(usize) -> f64, learnt: &mut Learnt<f64>, shifts: usize, seed: &mut u64) {
     for k in 0..shifts {
         let at = k % 4;
-        let acting = Acting::new([at, at + 1], Some(at), [PART; 2], STIFFNESS);
+        let acting = Acting::new([at, at + 1].map(ShiftElement::at), Some(at), [PART; 2], STIFFNESS);
         let before = learnt.known(&acting, &CORRELATIONS);
         let mut known = before;
         for a in 0..ACTING {
@@ -230,7 +231,7 @@ fn shifts_that_show_all_torques_larger_leave_converter_and_engine_as_they_were()
     learnt.take_capacity(0.02, [0.058, 0.046], 1e-6);
     let before_any = learnt;
     for at in (0..400).map(|k| k % 5) {
-        let acting = Acting::new([at, at + 1], Some(at), [PART; 2], STIFFNESS);
+        let acting = Acting::new([at, at + 1].map(ShiftElement::at), Some(at), [PART; 2], STIFFNESS);
         let before = learnt.known(&acting, &CORRELATIONS);
         let mut known = before;
         for (a, value) in STIFFNESS.into_iter().enumerate() {
@@ -400,7 +401,8 @@ fn lag_and_delay_are_learnt_by_element_as_far_as_they_last() {
 /// A one-way clutch is in a shift without a place in the tables: nothing is learnt of it.
 #[test]
 fn an_element_that_is_not_in_the_tables_has_no_place() {
-    let acting = Acting::new([usize::MAX, 1], Some(MAX_PAIRS), [PART; 2], [0.0; ACTING]);
+    let acting =
+        Acting::new([ShiftElement::OneWay, ShiftElement::Friction(1)], Some(MAX_PAIRS), [PART; 2], [0.0; ACTING]);
     for (a, expected) in [(1, 1), (3, KISS_AT + 1), (5, TURBINE_AT), (8, LAG_AT + 1), (9, DELAY_AT + 1)] {
         assert_eq!(acting.place(a), Some(expected), "{a}");
     }

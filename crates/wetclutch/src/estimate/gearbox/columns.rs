@@ -2,7 +2,7 @@
 
 use car::Car;
 use car::columns::element_column;
-use observer::gearbox::{MAX_ELEMENTS, ONE_WAY, ShiftEstimate};
+use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate};
 use observer::{ChannelHealth, Channels};
 use study::gearbox::channels::gear_number;
 use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
@@ -22,7 +22,7 @@ pub(crate) struct Row<'a> {
 }
 
 /// What the columns of readings say of a row: of channels, of the commands of elements, and which of these are those of the shift.
-type Said = (Channels<ChannelHealth>, [ChannelHealth; MAX_ELEMENTS], Option<[usize; 2]>);
+type Said = (Channels<ChannelHealth>, [ChannelHealth; MAX_ELEMENTS], Option<[ShiftElement; 2]>);
 
 impl<'a> Row<'a> {
     /// What its columns of readings say, which is mostly the same as in the row before.
@@ -39,21 +39,21 @@ impl<'a> Row<'a> {
     /// is none.
     fn reading(&self, at: usize) -> Cell<'a> {
         let ShiftEstimate { channels, commands, clutches, .. } = &self.estimate;
+        let of_command = |which: usize| clutches.and_then(|of| commands.get(of[which].element.place()?).copied());
         let health = match READINGS.get(at) {
-            Some(&ONCOMING_COMMAND_READING) => clutches.and_then(|clutches| commands.get(clutches[1].element).copied()),
-            Some(&OFFGOING_COMMAND_READING) => clutches.and_then(|clutches| commands.get(clutches[0].element).copied()),
+            Some(&ONCOMING_COMMAND_READING) => of_command(1),
+            Some(&OFFGOING_COMMAND_READING) => of_command(0),
             _ => channels.each().get(at).copied(),
         };
         Cell::Word(health.map_or("", ChannelHealth::name))
     }
 
     fn element(&self, which: usize) -> Cell<'a> {
-        let place = self.estimate.clutches.map(|clutches| clutches[which].element);
-        if place == Some(ONE_WAY) {
-            return Cell::Word(self.one_way(which));
-        }
-        let named = self.places.iter().find(|(known, _)| Some(*known) == place);
-        Cell::Word(named.map_or("", |(_, name)| *name))
+        let Some(clutches) = self.estimate.clutches else { return Cell::Word("") };
+        Cell::Word(match clutches[which].element {
+            ShiftElement::OneWay => self.one_way(which),
+            of => self.places.iter().find(|(at, _)| of.place() == Some(*at)).map_or("", |(_, name)| *name),
+        })
     }
 
     /// The one-way clutch of the shift.
@@ -69,7 +69,7 @@ impl<'a> Row<'a> {
     /// of [`CLUTCH`].
     fn clutch(&self, which: usize, what: usize) -> f64 {
         let Some(clutch) = self.estimate.clutches.map(|clutches| clutches[which]) else { return f64::NAN };
-        if clutch.element == ONE_WAY && ![TORQUE, TORQUE_DEVIATION].contains(&what) {
+        if clutch.element.is_one_way() && ![TORQUE, TORQUE_DEVIATION].contains(&what) {
             // It has a torque alone.
             return f64::NAN;
         }
