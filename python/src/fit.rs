@@ -15,9 +15,9 @@ use crate::work::{self, Report};
 /// A log as Python gives it: its name, its table if it is one in memory, and how its channels are mapped.
 type Given = (PathBuf, Option<Py<Table>>, Mapping);
 
-/// The fitted car, its quantities, those that are not identifiable, statements, notes, how many shifts were fitted, why the given values are kept, and
+/// The fitted car, its quantities and the changes of the channel map, those that are not identifiable, statements, notes, how many shifts were fitted, why the given values are kept, and
 /// the page.
-type Found = (Described, Table, Vec<String>, Vec<String>, Vec<String>, usize, Option<String>, Option<String>);
+type Found = (Described, (Table, Table), Vec<String>, Vec<String>, Vec<String>, usize, Option<String>, Option<String>);
 
 /// Fits a car to logs.
 #[pyfunction]
@@ -57,8 +57,8 @@ pub(crate) fn fit(
         )?;
         Ok((found, notes))
     })?;
-    let intervals = found.intervals().into();
+    let tables = (found.intervals().into(), found.channel_map().into());
     let open = found.not_identifiable().map(str::to_owned).collect();
     let Fitted { vehicle, channels, statements, shifts, kept, page, .. } = found;
-    Ok((described(&vehicle), intervals, open, [channels, statements].concat(), notes, shifts, kept, page))
+    Ok((described(&vehicle), tables, open, [channels, statements].concat(), notes, shifts, kept, page))
 }

@@ -22,6 +22,8 @@ class Fit:
         intervals: A row for each fitted quantity: ``value`` and ``lower`` to ``upper``, the interval that contains it in 95 %, in ``unit``;
             a value with the unit 1 is a factor on that of the given car. ``deviation_after_over_before`` is the ratio of its standard
             deviations, and ``verdict`` says whether these logs identify it.
+        channel_map: What belongs into the channel map of the logs, a row for each change: ``value`` is added to the ``key`` of the ``signal``, and
+            ``scale`` is multiplied by it. The signal ``commands`` is each command of a valve.
         not_identifiable: Names of the quantities that these logs do not identify: they are known no better than before.
         statements: What else the logs show, in sentences.
         findings: What was found in the logs, in sentences.
@@ -32,6 +34,7 @@ class Fit:
 
     car: Car
     intervals: Table
+    channel_map: Table
     not_identifiable: tuple[str, ...]
     statements: tuple[str, ...]
     findings: tuple[str, ...]
@@ -84,12 +87,13 @@ def fit(
     many = list(logs) if isinstance(logs, (list, tuple)) else [logs]
     given = [(log if isinstance(log, Log) else read(log))._native for log in many]
     with reported(progress) as report:
-        fitted, intervals, not_identifiable, statements, findings, shifts, kept, html = native.fit(
+        fitted, (intervals, channel_map), not_identifiable, statements, findings, shifts, kept, html = native.fit(
             car._native, given, None if sensors is None else os.fspath(sensors), page, report
         )
     return Fit(
         car=Car._of(fitted),
         intervals=Table(intervals),
+        channel_map=Table(channel_map),
         not_identifiable=tuple(not_identifiable),
         statements=tuple(statements),
         findings=tuple(findings),

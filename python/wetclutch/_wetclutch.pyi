@@ -166,7 +166,7 @@ def fit(
     progress: Callable[[str, float | None], object] | None,
 ) -> tuple[
     tuple[str, str, str, str | None, list[str], list[str]],
-    Table,
+    tuple[Table, Table],
     list[str],
     list[str],
     list[str],

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::support::{Folder, ROOT, printed, refused, said, stderr, wetclutch};
 
-const CAR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml");
+pub(crate) const CAR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml");
 
 /// The factor of a quantity in the table of a fit, and its interval.
 fn factor(table: &str, name: &str) -> [f64; 3] {
@@ -14,7 +14,7 @@ fn factor(table: &str, name: &str) -> [f64; 3] {
 }
 
 /// A folder with three minutes of town by a car whose clutch E has 15 % more friction, and whose converter 8 % less capacity.
-fn town() -> (Folder, String) {
+pub(crate) fn town() -> (Folder, String) {
     let folder = Folder::new("fit-gearbox");
     let text = std::fs::read_to_string(CAR).unwrap().replace("../gearboxes", &format!("{ROOT}gearboxes"));
     let friction =

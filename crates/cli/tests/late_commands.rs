@@ -4,7 +4,7 @@ use crate::any_car::{column, estimate, numbers, simulated_twice};
 use crate::support::said;
 
 /// The log with its commands so many rows late.
-fn late(text: &str, rows: isize) -> String {
+pub(crate) fn late(text: &str, rows: isize) -> String {
     let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
     let (names, lines) = lines.split_first().unwrap();
     let is_command = |name: &str| name.starts_with("element_") && name.ends_with("_current_a");
@@ -17,7 +17,7 @@ fn late(text: &str, rows: isize) -> String {
 }
 
 /// A channel map for the names of the program, with this more in the entries of the commands.
-fn map(text: &str, more: &str) -> String {
+pub(crate) fn map(text: &str, more: &str) -> String {
     let commands = text.lines().next().unwrap().split(',').filter_map(|name| name.strip_suffix("_current_a"));
     let commands = commands.filter(|name| name.starts_with("element_"));
     let entry = |key: &str, name: &str, more: &str| format!("[channel.{key}]\nname = \"{name}\"\n{more}\n");

@@ -43,4 +43,5 @@ mod same_bits;
 mod studies;
 mod support;
 mod tables;
+mod write_map;
 mod wrong_maps;

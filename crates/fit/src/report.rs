@@ -3,11 +3,12 @@
 use drivetrain::Real;
 use nalgebra::{DMatrix, DVector};
 
+use crate::driving::MIN_SCALE;
 use crate::fill::{FILL_IDENTIFIED_BY, FillFit};
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, OFFSET_UNIT_PA};
 use crate::verdict::SIDES;
-use crate::{BacklashFit, Channel, Fit, Known, Measure, Parameter, ReportRow, Verdict, correlated};
+use crate::{BacklashFit, Channel, Fit, Known, MapChange, MapKey, Measure, Parameter, ReportRow, Verdict, correlated};
 
 /// A one-step gain of the turbine speed above this says that the model does not fit.
 const MISFIT_GAIN: f64 = 0.6;
@@ -181,30 +182,30 @@ impl Fit {
 
     /// Delays, scale and zero offset of channels, which belong into a channel map, each with its interval.
     fn channel_map(&self) -> Vec<String> {
+        self.map_changes().iter().map(said_of_change).collect()
+    }
+
+    /// What belongs into the channel map: delays, scale and zero offset of channels.
+    pub fn map_changes(&self) -> Vec<MapChange> {
         let delays = [
             (Parameter::OutputDelay, "output_speed"),
             (Parameter::EngineDelay, "engine_speed"),
             (Parameter::WheelDelay, "wheel_speed"),
             (Parameter::PressureDelay, "oncoming_pressure"),
         ];
-        let delay = |(parameter, role): (Parameter, &str)| {
-            let [low, late_ms, high] = self.interval(parameter)?.map(|late_s| 1e3 * late_s);
-            (low * high > 0.0).then(|| {
-                format!(
-                    "{role} is {late_ms:+.1} ms (95 % {low:+.1} to {high:+.1} ms) against the turbine speed: `delay_s` of its channel in the \
-                     channel map"
-                )
-            })
+        let known = |parameter| {
+            let [low, value, high] = self.interval(parameter)?;
+            Some(Known { value, sd: (high - low) / (2.0 * SIDES), before: f64::INFINITY })
         };
-        let scale = self.interval(Parameter::WheelScale).filter(|[_, scale, _]| (scale - 1.0).abs() > 1e-3);
-        let scale = scale.map(|[low, scale, high]| {
-            format!(
-                "wheel_speed reads x {scale:.4} (95 % {low:.4} to {high:.4}): `scale = {:.4}` in the channel map",
-                scale.recip()
-            )
+        let delay = |(parameter, signal): (Parameter, &str)| {
+            known(parameter).filter(|late_s| late_s.is_off_by(0.0)).map(|late_s| MapChange::of_delay(signal, &late_s))
+        };
+        let scale = known(Parameter::WheelScale).filter(|reads| (reads.value - 1.0).abs() > MIN_SCALE);
+        let scale = scale.map(|Known { value, sd, .. }| {
+            MapChange::of_signal("wheel_speed", MapKey::Scale, value.recip(), sd / (value * value))
         });
-        let offset =
-            self.interval(Parameter::PressureOffset).and_then(|offset| said_of_offset("oncoming_pressure", offset));
+        let offset = known(Parameter::PressureOffset)
+            .and_then(|offset| change_of_offset("oncoming_pressure", offset.value, offset.sd));
         delays.into_iter().filter_map(delay).chain(scale).chain(offset).collect()
     }
 
@@ -257,22 +258,40 @@ impl Fit {
     }
 }
 
+/// What a fit of one shift says of a channel.
+fn said_of_change(change: &MapChange) -> String {
+    let MapChange { channel, key, value, sd } = change;
+    let (signal, half) = (channel.name(), SIDES * sd);
+    match key {
+        MapKey::Offset => said_of_offset(signal, change),
+        MapKey::Scale => format!("{signal} x {value:.4} +- {half:.4} fits the other speeds: {}", change.instruction()),
+        MapKey::Delay | MapKey::Late => {
+            let [late_ms, half_ms] = [value, &half].map(|time_s| 1e3 * time_s);
+            format!("{signal} is {late_ms:+.1} +- {half_ms:.1} ms behind the turbine speed: {}", change.instruction())
+        }
+    }
+}
+
 /// The row of a zero offset, Pa.
 pub(crate) fn offset_row(name: String, offset: Known) -> ReportRow {
     let [value, sd, before] = [offset.value, offset.sd, offset.before].map(|pa| pa / OFFSET_UNIT_PA);
     row(&name, value, sd, before, offset.verdict(), Measure::Offset)
 }
 
-/// What a fit says of the zero offset of the channel of a pressure, Pa, between the ends of its interval, where that is not about zero.
-pub(crate) fn said_of_offset(channel: &str, offset_pa: [f64; 3]) -> Option<String> {
-    let [low, offset, high] = offset_pa.map(|pa| 1e-3 * pa);
-    (low * high > 0.0).then(|| {
-        format!(
-            "{channel} reads {offset:+.1} kPa (95 % {low:+.1} to {high:+.1} kPa) without a pressure: add {:+.1} kPa to `offset` of its channel in the \
-             channel map, in the unit of the channel. The fit has counted with it",
-            -offset
-        )
-    })
+/// The change of the channel map for a pressure that reads this without a pressure, Pa, where its interval is not about zero.
+pub(crate) fn change_of_offset(signal: &str, offset_pa: f64, sd_pa: f64) -> Option<MapChange> {
+    let change = MapChange::of_signal(signal, MapKey::Offset, -offset_pa, sd_pa);
+    (offset_pa.abs() > SIDES * sd_pa).then_some(change)
+}
+
+/// What a fit says of the zero offset of the channel of a pressure.
+pub(crate) fn said_of_offset(channel: &str, change: &MapChange) -> String {
+    let [offset, half] = [-change.value, SIDES * change.sd].map(|pa| 1e-3 * pa);
+    let [low, high] = [offset - half, offset + half];
+    format!(
+        "{channel} reads {offset:+.1} kPa (95 % {low:+.1} to {high:+.1} kPa) without a pressure: {}. The fit has counted with it",
+        change.instruction()
+    )
 }
 
 /// The row of a fill volume.

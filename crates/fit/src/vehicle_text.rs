@@ -176,15 +176,17 @@ impl VehicleText {
         None
     }
 
-    /// Adds a number to the table of another value, on the line above it.
+    /// Adds a number to the table of another value: on the line above it, or behind it in a table that is written in one line.
     pub(crate) fn add_beside(&mut self, path: &[Step], key: &str, value: f64, comment: &str) -> Result<(), FitError> {
-        let (_, key_at) = self.place(path)?;
+        let (span, key_at) = self.place(path)?;
         let line_at = self.text[..key_at].rfind('\n').map_or(0, |end| end + 1);
-        if !self.text[line_at..key_at].trim().is_empty() {
-            return Err(missing(path));
+        let (before, value) = (self.text[line_at..key_at].trim(), number(value));
+        let is_in_line = before.contains(['{', '=']) || !(before.is_empty() || before.ends_with('.'));
+        let line = if is_in_line { String::new() } else { format!("{before}{key} = {value}\n") };
+        if is_in_line {
+            self.edits.push((span.end..span.end, format!(", {key} = {value}")));
         }
-        self.edits
-            .push((line_at..line_at, format!("{FITTED}{comment}; the file had none\n{key} = {}\n", number(value))));
+        self.edits.push((line_at..line_at, format!("{FITTED}{comment}; the file had none\n{line}")));
         Ok(())
     }
 

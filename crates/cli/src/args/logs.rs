@@ -264,6 +264,9 @@ pub(crate) struct Fit {
     /// The fitted vehicle file
     #[arg(short, long, value_name = "FITTED.toml")]
     pub(crate) output: PathBuf,
+    /// The channel map of --map with the delays, scales and zero offsets that were found
+    #[arg(long, value_name = "OUT.toml", requires = "map", conflicts_with = "channel")]
+    pub(crate) write_map: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) page: PageChoice,
     /// Print what was found as JSON

@@ -1,20 +1,23 @@
 //! `wetclutch fit`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use config::{Kind, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use trace::ShownPath as _;
-use wetclutch::fitted::ReportRow;
+use wetclutch::fitted::{MapChange, ReportRow};
 use wetclutch::{FitOptions, FitProgress, Fitted, LogInput, VehicleFile, fit as fitted, read_sensors};
 
 use crate::args::Fit;
 use crate::commands::page::{check_page, write_html};
-use crate::commands::written::replaces_only;
+use crate::commands::written::{head, replaces_only};
 use crate::commands::{channel_map_of_car, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
+
+/// The first line of a channel map that a fit has written.
+const MAP_MARK: &str = "# Written by `wetclutch fit`, with the delays, scales and zero offsets that it found: ";
 
 pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
@@ -25,6 +28,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     not_an_input(Some(&options.output), inputs())?;
     check_page(&options.page, inputs())?;
     replaces_only("vehicle file", &options.output, is_vehicle_file)?;
+    check_map(options, inputs())?;
     let vehicle = VehicleFile::read(&options.vehicle)?;
     let how = FitOptions {
         sensors: options.sensors.as_deref().map(read_sensors).transpose()?,
@@ -42,6 +46,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     let found = found?;
     // Nobody has to read the report to its end.
     write_text(&options.output, found.vehicle.text())?;
+    let left_out = write_map(options, &found)?;
     if options.json {
         print_json(options, &found)?;
     } else {
@@ -49,7 +54,45 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
         found.channels.iter().chain(&found.statements).try_for_each(|line| output::line(line))?;
     }
     report_file(options, &found);
+    report_map(options, &found, &left_out);
     found.page.map_or(Ok(()), |page| write_html(&options.page, &page))
+}
+
+/// Checks the new channel map before the work starts.
+fn check_map<'a>(options: &'a Fit, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+    let Some(new) = &options.write_map else { return Ok(()) };
+    if [Some(&options.output), options.page.page.as_ref()].contains(&Some(new)) {
+        let message = format!(
+            "{}: this is another output of this command\nhint: choose another name after --write-map",
+            new.shown()
+        );
+        return Err(Failure::Input(message));
+    }
+    check_output(Some(new))?;
+    not_an_input(Some(new), inputs)?;
+    replaces_only("channel map of a fit", new, |path| head(path).starts_with(MAP_MARK))
+}
+
+/// Writes the channel map with what was found, and returns what it does not have.
+fn write_map(options: &Fit, found: &Fitted) -> Result<Vec<String>, Failure> {
+    let (Some(given), Some(new)) = (&options.mapping.map, &options.write_map) else { return Ok(Vec::new()) };
+    let text = trace::read_text(given).map_err(|error| Failure::Input(format!("{}: {error}", given.shown())))?;
+    // The line of an earlier fit.
+    let text = text.strip_prefix(MAP_MARK).and_then(|text| text.split_once('\n')).map_or(&*text, |(_, below)| below);
+    let changed = found.changed_map(given, text, new)?;
+    write_text(new, &format!("{MAP_MARK}{}\n{}", given.shown(), changed.text))?;
+    Ok(changed.left_out)
+}
+
+/// Reports what the new channel map has.
+fn report_map(options: &Fit, found: &Fitted, left_out: &[String]) {
+    let Some(new) = &options.write_map else { return };
+    let has = match found.map_changes.len() {
+        0 => "nothing to change in it",
+        _ => "with the delays, scales and zero offsets that were found",
+    };
+    output::note(&format!("channel map, {has}: {}", new.shown()));
+    left_out.iter().for_each(|reason| output::note(&format!("warning: {}: {reason}", new.shown())));
 }
 
 fn show(bar: &ProgressBar, at: FitProgress<'_>) {
@@ -70,12 +113,22 @@ fn print_json(options: &Fit, found: &Fitted) -> Result<(), Failure> {
             "verdict": row.verdict.name(),
         })
     };
+    let change = |change: &MapChange| {
+        json!({
+            "signal": change.channel.name(),
+            "key": change.key.name(),
+            "unit": change.key.unit(),
+            "value": change.value,
+            "standard_deviation": change.sd,
+        })
+    };
     output::json(&json!({
         "vehicle": options.vehicle.shown().to_string(),
         "fitted": options.output.shown().to_string(),
         "shifts": found.shifts,
         "given_values_kept_because": found.kept,
         "parameters": found.parameters.iter().map(parameter).collect::<Vec<_>>(),
+        "channel_map": found.map_changes.iter().map(change).collect::<Vec<_>>(),
         "statements": found.statements,
     }))
 }

@@ -2,8 +2,8 @@
 
 use drivetrain::Real;
 
-use crate::Verdict;
 use crate::verdict::SIDES;
+use crate::{MapChange, Verdict};
 
 /// Errors of scale, and delays, s, that are nothing to correct \[chosen\].
 pub(crate) const MIN_SCALE: f64 = 1e-3;
@@ -37,22 +37,28 @@ impl Known {
     }
 }
 
-/// What is said of the delay of a channel against another one, and where it belongs.
-pub(crate) fn said_of_delay(role: &str, against: &str, late_s: &Known, identified_by: &str) -> String {
+/// The change of the channel map for a signal that is late by this, s, where it is told and not about zero.
+pub(crate) fn change_of_delay(signal: &str, late_s: &Known) -> Option<MapChange> {
+    late_s.is_off_by(MIN_DELAY_S).then(|| MapChange::of_delay(signal, late_s))
+}
+
+/// What is said of the delay of a channel against another one, and where it belongs: `change` is that of the channel map.
+pub(crate) fn said_of_delay(
+    role: &str,
+    against: &str,
+    late_s: &Known,
+    change: Option<&MapChange>,
+    identified_by: &str,
+) -> String {
     let [late_ms, half_ms] = [late_s.value, SIDES * late_s.sd].map(|time_s| 1e3 * time_s);
     let found = format!("{role} is {late_ms:+.1} +- {half_ms:.1} ms behind {against}");
     if late_s.verdict() == Verdict::NotIdentifiable {
         return format!("{found}: its delay is not told by these logs; {identified_by}");
     }
-    match late_ms {
-        _ if !late_s.is_off_by(MIN_DELAY_S) => format!("{found}: they belong together"),
-        late_ms if late_ms > 0.0 => {
-            format!("{found}: add {:.4} to `delay_s` of its channel in the channel map", late_s.value)
-        }
-        _ => format!(
-            "{found}, ahead of it: take {:.4} off `delay_s` of its channel in the channel map; where that would be below 0, add as much to `delay_s` of all \
-             other channels",
-            -late_s.value
-        ),
+    let ahead = if late_s.is_off_by(MIN_DELAY_S) && late_ms < 0.0 { ", ahead of it" } else { "" };
+    match change {
+        None if late_s.is_off_by(MIN_DELAY_S) => format!("{found}{ahead}: its channel stays as it is"),
+        None => format!("{found}: they belong together"),
+        Some(change) => format!("{found}{ahead}: {}", change.instruction()),
     }
 }

@@ -29,7 +29,7 @@ pub use backlash::BacklashFit;
 pub(crate) use backlash::fit_backlash;
 pub(crate) use car::DrivenCar;
 pub use known::Known;
-pub(crate) use known::{MIN_DELAY_S, said_of_delay};
+pub(crate) use known::{MIN_DELAY_S, MIN_SCALE, change_of_delay, said_of_delay};
 pub(crate) use model::{Balance, DrivingModel, DrivingWeights, Evaluated};
 pub(crate) use recorder::{DrivingRecorder, RowState};
 pub use skew::SkewFit;

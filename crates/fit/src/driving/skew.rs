@@ -9,7 +9,7 @@
 //!
 //! Means over tenths of a second, with the rate between the means before and after; robust least squares ([`Identified`]).
 
-use super::known::{Known, MIN_DELAY_S, MIN_SCALE, said_of_delay};
+use super::known::{Known, MIN_DELAY_S, MIN_SCALE, change_of_delay, said_of_delay};
 use super::lines::{Identified, Line};
 use super::twist::{DELAY_S, SCALE};
 use crate::Series;
@@ -67,8 +67,9 @@ impl SkewFit {
             Ok(found) => found,
             Err(reason) => return format!("{role} against the turbine speed: delay not told: {reason}"),
         };
-        let mut text =
-            said_of_delay(role, "the turbine speed", &found.late_s, "speeds that change in a gear would tell it");
+        const IDENTIFIED_BY: &str = "speeds that change in a gear would tell it";
+        let change = change_of_delay(role, &found.late_s);
+        let mut text = said_of_delay(role, "the turbine speed", &found.late_s, change.as_ref(), IDENTIFIED_BY);
         if found.scale.is_off_by(MIN_SCALE) {
             text += &format!(
                 ". It has to be multiplied with {:.4} +- {:.4} to be that of the gear by the turbine speed: `scale` of one of both channels, or a ratio, is wrong",

@@ -5,11 +5,11 @@
 
 use drivetrain::Real;
 
-use super::known::{Known, MIN_SCALE, said_of_delay};
+use super::known::{Known, MIN_SCALE, change_of_delay, said_of_delay};
 use super::twist::{Cell, DELAY_S, InputTorque, SCALE, changes, identified};
 use super::{DrivenCar, Driving};
-use crate::Verdict;
 use crate::verdict::SIDES;
+use crate::{MapChange, MapKey, Verdict};
 
 /// Cells of a change: 0.5 s.
 const APART: usize = 5;
@@ -21,6 +21,8 @@ const OUTPUT_MIN_RAD_S: f64 = 15.0;
 /// Minimum standard deviations that are stated, as in the one-shift fit: of scale, delay, s, and stiffness.
 const FLOORS: [f64; 3] = [1e-4, 0.3e-3, 0.015];
 
+/// The signal in a channel map.
+const SIGNAL: &str = "wheel_speed";
 /// Which drive tells it.
 const WHEEL_IDENTIFIED_BY: &str =
     "press and release the accelerator in a gear on a straight road, with the speed of the driven wheels logged";
@@ -51,10 +53,12 @@ impl WheelFit {
         Real::exp(self.stiffness.value)
     }
 
-    /// What a fit says of it: what belongs into the channel map, and the stiffness.
-    pub(crate) fn statements(found: &Result<Self, String>) -> Vec<String> {
+    /// What a fit says of it: what belongs into the channel map, and the stiffness. `output_late_s` is by how much the output speed is late.
+    pub(crate) fn statements(found: &Result<Self, String>, output_late_s: Option<Known>) -> Vec<String> {
         match found {
-            Ok(found) => vec![found.said_of_scale(), found.said_of_delay(), found.said_of_stiffness()],
+            Ok(found) => {
+                vec![found.said_of_scale(), found.said_of_delay(output_late_s), found.said_of_stiffness()]
+            }
             Err(reason) => vec![format!("wheel speed and drive shafts: not told: {reason}")],
         }
     }
@@ -70,18 +74,40 @@ impl WheelFit {
         if self.scale.verdict() == Verdict::NotIdentifiable {
             return format!("{found}: its scale is not told by these logs; {WHEEL_IDENTIFIED_BY}");
         }
-        if value.abs() <= half.max(MIN_SCALE) {
+        let Some(change) = self.change_of_scale() else {
             return format!("{found}: its scale and the final ratio fit together");
-        }
+        };
         format!(
-            "{found}: multiply `scale` of its channel in the channel map by {:.4}, or the final ratio of the vehicle file is wrong. For a wheel speed in km/h it may \
-             be the wheel radius: the speeds tell the product alone",
-            1.0 + value
+            "{found}: {}, or the final ratio of the vehicle file is wrong. For a wheel speed in km/h it may be the wheel radius: the speeds tell the product \
+             alone",
+            change.instruction()
         )
     }
 
-    fn said_of_delay(&self) -> String {
-        said_of_delay("wheel_speed", "the output speed", &self.late_s, WHEEL_IDENTIFIED_BY)
+    fn said_of_delay(&self, output_late_s: Option<Known>) -> String {
+        let change = self.change_of_delay(output_late_s);
+        said_of_delay(SIGNAL, "the output speed", &self.late_s, change.as_ref(), WHEEL_IDENTIFIED_BY)
+    }
+
+    /// What belongs into the channel map. `output_late_s` is by how much the output speed is late.
+    pub(crate) fn changes(&self, output_late_s: Option<Known>) -> impl Iterator<Item = MapChange> {
+        self.change_of_scale().into_iter().chain(self.change_of_delay(output_late_s))
+    }
+
+    fn change_of_scale(&self) -> Option<MapChange> {
+        let Known { value, sd, .. } = self.scale;
+        self.scale.is_off_by(MIN_SCALE).then(|| MapChange::of_signal(SIGNAL, MapKey::Scale, 1.0 + value, sd))
+    }
+
+    /// Against the turbine speed, as all channels: the delay of the output speed is in it.
+    fn change_of_delay(&self, output_late_s: Option<Known>) -> Option<MapChange> {
+        let output = output_late_s.unwrap_or(Known { value: 0.0, sd: 0.0, before: 0.0 });
+        let late_s = Known {
+            value: self.late_s.value + output.value,
+            sd: Real::hypot(self.late_s.sd, output.sd),
+            before: Real::hypot(self.late_s.before, output.before),
+        };
+        if self.late_s.verdict() == Verdict::NotIdentifiable { None } else { change_of_delay(SIGNAL, &late_s) }
     }
 
     fn said_of_stiffness(&self) -> String {

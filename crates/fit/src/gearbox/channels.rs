@@ -4,7 +4,8 @@ use car::Car;
 use observer::ShiftTables;
 
 use super::shift_log::ShiftLog;
-use crate::driving::{Driving, SkewFit};
+use crate::Known;
+use crate::driving::{Driving, MIN_DELAY_S, SkewFit};
 
 /// What the driving of the logs tells of the channels of the speeds.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +39,16 @@ impl ChannelFits {
     pub(crate) fn late_s(&self) -> [f64; 2] {
         let late_s = |found: Option<&SkewFit>| found.and_then(SkewFit::identified_late_s).unwrap_or(0.0);
         [late_s(self.output.as_ref().ok()), late_s(self.engine.as_ref().and_then(|found| found.as_ref().ok()))]
+    }
+
+    /// By how much the readings of the output speed are late, s, where it is told and not small.
+    pub(crate) fn output_late_s(&self) -> Option<Known> {
+        self.output.as_ref().ok().map(|found| found.late_s).filter(|late_s| late_s.is_off_by(MIN_DELAY_S))
+    }
+
+    /// By how much the engine speed is late by driving with the lock-up clutch closed, s.
+    pub(crate) fn engine_late_s(&self) -> Option<Known> {
+        self.engine.as_ref().and_then(|found| found.as_ref().ok()).map(|found| found.late_s)
     }
 
     /// The shifts with the readings of output and engine speed at the times of the turbine speed, where driving tells by how much they are late. A delay of 10 ms is 1 to 2 rad/s of slip while a car

@@ -7,8 +7,8 @@
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::Problem;
-use crate::Known;
 use crate::verdict::SIDES;
+use crate::{Known, MapChange};
 
 /// Step of the delays that are looked at first, s, and how many there are to each side; then those between, in quarters.
 const STEP_S: f64 = 0.05;
@@ -57,14 +57,15 @@ pub(crate) fn with_commands_earlier(shifts: &[ShiftLog], late_s: f64) -> Vec<Shi
 }
 
 /// What a fit says of commands that are late by so much, s.
-pub(crate) fn said_of_commands(Known { value: late_s, sd, .. }: Known) -> String {
+pub(crate) fn said_of_commands(late: Known) -> String {
+    let Known { value: late_s, sd, .. } = late;
+    let instruction = MapChange::of_commands(&late).instruction();
     let (late, or) = match late_s > 0.0 {
         true => ("late", ""),
         false => ("early", ", unless the valves react so much later than the vehicle file says"),
     };
     format!(
-        "the commands of these logs are {:.0} +- {:.0} ms too {late} against the speeds: add {late_s:.3} to `late_s` of the channel of each command in the channel map{or}. \
-         Then fit again",
+        "the commands of these logs are {:.0} +- {:.0} ms too {late} against the speeds: {instruction}{or}. Then fit again",
         1e3 * late_s.abs(),
         1e3 * SIDES * sd
     )

@@ -1,6 +1,6 @@
 //! The vehicle file of a fit: the text of the given one with other values.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 use car::Car;
 use drivetrain::{ClutchValve, Real, Table1};
@@ -11,6 +11,7 @@ use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
 use super::validation::HeldOut;
 use crate::driving::DRAG_UNIT_N_M;
 use crate::fitted_file::fill_comment;
+use crate::moved::moved;
 use crate::vehicle_text::{FITTED, Step, VehicleText, headed, keys, number};
 use crate::verdict::SIDES;
 use crate::{FitError, Verdict};
@@ -318,17 +319,7 @@ impl Written {
 
     /// Keeps the gearbox file where it is when the vehicle file `from` moves to another folder.
     fn at(&mut self, from: GivenFile<'_>, to: &Path) -> Result<(), FitError> {
-        let gearbox = from.gearbox;
-        let folder = |path: &Path| match path.parent() {
-            Some(folder) if folder != Path::new("") => folder.to_owned(),
-            _ => PathBuf::from("."),
-        };
-        let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let (from, to) = (whole(&folder(from.path)), whole(&folder(to)));
-        if from == to || !gearbox.exists() {
-            return Ok(());
-        }
-        let moved = toml_string(&relative(&to, &whole(gearbox)).to_string_lossy().replace('\\', "/"));
+        let Some(moved) = moved(from.gearbox, from.path, to) else { return Ok(()) };
         self.text.set_text(&[Step::Key("gearbox".to_owned())], &moved, "a path from the folder of this file")
     }
 
@@ -352,15 +343,4 @@ fn bare_or_quoted(key: &str) -> String {
 
 pub(super) fn list(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
-}
-
-/// The way from a folder to a file, both from the root; the file itself where there is none.
-fn relative(folder: &Path, file: &Path) -> PathBuf {
-    let common = folder.components().zip(file.components()).take_while(|(one, other)| one == other).count();
-    // On another drive.
-    if !matches!(folder.components().nth(common.saturating_sub(1)), Some(Component::RootDir | Component::Normal(_))) {
-        return file.to_owned();
-    }
-    let up = folder.components().skip(common).map(|_| Component::ParentDir);
-    up.chain(file.components().skip(common)).collect()
 }

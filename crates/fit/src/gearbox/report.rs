@@ -5,11 +5,11 @@ use drivetrain::{Real, ShiftKind};
 use super::command_delay::said_of_commands;
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
-use crate::driving::{Balance, DRAG_UNIT_N_M, MIN_DELAY_S, said_of_delay};
+use crate::driving::{Balance, DRAG_UNIT_N_M, MIN_DELAY_S, change_of_delay, said_of_delay};
 use crate::fill::{FILL_IDENTIFIED_BY, FillFit};
-use crate::report::{MEAN_GRADE, cautions, fill_row, offset_row, said_of_offset};
+use crate::report::{MEAN_GRADE, cautions, change_of_offset, fill_row, offset_row, said_of_offset};
 use crate::verdict::SIDES;
-use crate::{BacklashFit, Known, Measure, ReportRow, Verdict, WheelFit, correlated};
+use crate::{BacklashFit, Known, MapChange, Measure, ReportRow, Verdict, WheelFit, correlated};
 
 /// Errors of the torque at the turbine, in their standard deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
@@ -107,10 +107,10 @@ impl GearboxFit {
         lines.extend(self.said_of_driving());
         lines.push(BacklashFit::statement(&self.backlash));
         lines.extend(self.said_of_channels());
-        lines.extend(WheelFit::statements(&self.wheel));
-        lines.extend(self.offsets().filter_map(|(at, Known { value, sd, .. })| {
-            let ends_pa = [value - SIDES * sd, value, value + SIDES * sd];
-            said_of_offset(&format!("the pressure of {}", self.quantities.elements[at]), ends_pa)
+        lines.extend(WheelFit::statements(&self.wheel, self.channels.output_late_s()));
+        lines.extend(self.offsets().filter_map(|(at, offset)| {
+            let change = self.change_of_offset(at, offset)?;
+            Some(said_of_offset(&format!("the pressure of {}", self.quantities.elements[at]), &change))
         }));
         lines.extend(self.given_is_possible().then(|| {
             "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
@@ -120,6 +120,24 @@ impl GearboxFit {
         lines.extend(self.proposals());
         lines.push(NOT_FITTED.to_owned());
         lines
+    }
+
+    /// What belongs into the channel map: delays and scale of the speeds, the times of the commands, and zero offsets of pressures.
+    pub fn map_changes(&self) -> Vec<MapChange> {
+        let output = self.channels.output_late_s();
+        let engine = self.engine_late_s().or_else(|| self.channels.engine_late_s());
+        let mut changes: Vec<MapChange> =
+            output.map(|late_s| MapChange::of_delay("output_speed", &late_s)).into_iter().collect();
+        changes.extend(engine.and_then(|late_s| change_of_delay("engine_speed", &late_s)));
+        changes.extend(self.wheel.iter().flat_map(|wheel| wheel.changes(output)));
+        changes.extend(self.commands_late_s().map(|late_s| MapChange::of_commands(&late_s)));
+        changes.extend(self.offsets().filter_map(|(at, offset)| self.change_of_offset(at, offset)));
+        changes
+    }
+
+    fn change_of_offset(&self, at: usize, offset: Known) -> Option<MapChange> {
+        let element = self.quantities.elements[at].to_lowercase();
+        change_of_offset(&format!("element_{element}_pressure"), offset.value, offset.sd)
     }
 
     /// What the common factor of all torques comes from.
@@ -194,7 +212,10 @@ impl GearboxFit {
         const IDENTIFIED_BY: &str = "shifts in which the engine changes its speed quickly would tell it";
         let mut lines = self.channels.statements();
         let engine = self.engine_late_s();
-        lines.extend(engine.map(|late_s| said_of_delay("engine_speed", "the turbine speed", &late_s, IDENTIFIED_BY)));
+        lines.extend(engine.map(|late_s| {
+            let change = change_of_delay("engine_speed", &late_s);
+            said_of_delay("engine_speed", "the turbine speed", &late_s, change.as_ref(), IDENTIFIED_BY)
+        }));
         let is_off = engine.is_some_and(|late_s| late_s.is_off_by(MIN_DELAY_S));
         if is_off || self.channels.late_s() != [0.0; 2] {
             lines.push(

@@ -79,6 +79,7 @@ pub(super) fn fit(
         vehicle: VehicleFile::Gearbox(Box::new(written)),
         parameters: found.report(),
         channels: Vec::new(),
+        map_changes: found.map_changes(),
         statements: statements.chain([checked.as_ref().map_or_else(nothing_held_out, said_of)]).collect(),
         shifts: found.shifts,
         kept,

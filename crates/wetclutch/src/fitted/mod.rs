@@ -13,7 +13,7 @@ use config::ConfigError;
 use report::sheet::{Part, Sheet};
 use trace::ShownPath as _;
 
-pub use ::fit::{Measure, ReportRow, Verdict};
+pub use ::fit::{ChangedChannel, ChangedMap, MapChange, MapKey, Measure, ReportRow, Verdict};
 
 use crate::{Column, Error, LogInput, Notes, Table, Values, VehicleFile};
 
@@ -87,6 +87,8 @@ pub struct Fitted {
     pub parameters: Vec<ReportRow>,
     /// One-step errors of the channels of a vehicle file of one shift, in words.
     pub channels: Vec<String>,
+    /// What belongs into the channel map of the logs.
+    pub map_changes: Vec<MapChange>,
     /// What else the logs show, in sentences.
     pub statements: Vec<String>,
     /// How many shifts were fitted.
@@ -147,6 +149,29 @@ impl Fitted {
             ("verdict", words(|row| row.verdict.name())),
         ];
         Table { columns: columns.map(|(name, values)| Column { name: name.to_owned(), values }).into() }
+    }
+
+    /// What belongs into the channel map, a row for each change: s are added to `delay_s` and `late_s`, Pa to `offset`, and `scale` is multiplied. The
+    /// signal `commands` is each command of a valve.
+    pub fn channel_map(&self) -> Table {
+        let words = |word: fn(&MapChange) -> &str| Values::Words(self.map_changes.iter().map(word).collect());
+        let numbers = |number: fn(&MapChange) -> f64| Values::Numbers(self.map_changes.iter().map(number).collect());
+        let columns = [
+            ("signal", words(|change| change.channel.name())),
+            ("key", words(|change| change.key.name())),
+            ("unit", words(|change| change.key.unit())),
+            ("value", numbers(|change| change.value)),
+            ("standard_deviation", numbers(|change| change.sd)),
+        ];
+        Table { columns: columns.map(|(name, values)| Column { name: name.to_owned(), values }).into() }
+    }
+
+    /// The channel map at `path` with these changes, as it is to stand at `to`.
+    ///
+    /// # Errors
+    /// The text is that of no channel map, or a changed value is outside of its range.
+    pub fn changed_map(&self, path: &Path, text: &str, to: &Path) -> Result<ChangedMap, Error> {
+        Ok(::fit::changed_map(path, text, to, &self.map_changes)?)
     }
 
     /// Names of the quantities that the logs do not identify: they are known no better than before.

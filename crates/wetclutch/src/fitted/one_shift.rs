@@ -51,6 +51,7 @@ pub(super) fn fit(
     let fitted = Fitted {
         vehicle: VehicleFile::OneShift(Box::new(written)),
         parameters: found.report(),
+        map_changes: found.map_changes(),
         channels: found.channels.iter().map(channel_error).collect(),
         statements: [found.statements(), vec![kinds, said_of(checked.as_ref())]].concat(),
         shifts: found.shifts,
