@@ -296,8 +296,8 @@ impl StepEstimate {
 }
 
 impl StepEstimate {
-    fn gear_named(&self, place: usize) -> Option<&str> {
-        Some(GearId::new(place).and_then(|gear| self.names.gears.get(gear.place())).map_or(NEUTRAL, String::as_str))
+    fn gear_named(&self, gear: Gear) -> Option<&str> {
+        Some(gear.place().and_then(|place| self.names.gears.get(place)).map_or(NEUTRAL, String::as_str))
     }
 
     fn clutch(&self, which: usize) -> Option<ClutchStep> {

@@ -3,7 +3,7 @@
 use drivetrain::{Converter, Driveline, Engine, RoadLoad, Tyre};
 use geartrain::Gearbox;
 
-use crate::{CarErrorBounds, ShiftClutch};
+use crate::{CarErrorBounds, Gear, ShiftClutch, ShiftCommand};
 
 /// The lock-up clutch of the converter, and when it is closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +55,26 @@ pub struct Car {
 }
 
 impl Car {
+    /// Turbine speed over output speed in a gear; `None` in neutral, and of a gear that the gearbox does not have.
+    pub fn ratio(&self, gear: Gear) -> Option<f64> {
+        Some(self.gearbox.gears.get(gear.place()?)?.ratio)
+    }
+
+    /// The name of a gear; `N` in neutral.
+    pub fn gear_name(&self, gear: Gear) -> &str {
+        gear.place().and_then(|place| self.gearbox.gears.get(place)).map_or("N", |gear| gear.name.as_str())
+    }
+
+    /// The names of the gears of a shift, as `1-2`.
+    pub fn shift_name(&self, shift: ShiftCommand) -> String {
+        format!("{}-{}", self.gear_name(shift.from), self.gear_name(shift.to))
+    }
+
+    /// Places of the offgoing and the oncoming element of a shift that changes one element each.
+    pub fn single_shift(&self, shift: ShiftCommand) -> Option<[usize; 2]> {
+        self.gearbox.shift(shift.from.place()?, shift.to.place()?)?.change.single()
+    }
+
     /// The car with another friction of all clutches, times `factor`.
     #[must_use]
     pub fn with_friction(mut self, factor: f64) -> Self {

@@ -63,6 +63,24 @@ impl GearId {
 }
 
 impl Gear {
+    /// The gear at this place; neutral, of which no more is known, from [`GearId::MAX_GEARS`] on.
+    #[inline]
+    pub const fn at(place: usize) -> Self {
+        match GearId::new(place) {
+            Some(gear) => Self::In(gear),
+            None => Self::Neutral,
+        }
+    }
+
+    /// Its place among the gears of the gearbox; `None` in neutral.
+    #[inline]
+    pub const fn place(self) -> Option<usize> {
+        match self {
+            Self::Neutral => None,
+            Self::In(gear) => Some(gear.place()),
+        }
+    }
+
     /// The gear; `None` in neutral.
     #[inline]
     pub const fn id(self) -> Option<GearId> {

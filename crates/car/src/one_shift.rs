@@ -161,12 +161,6 @@ impl Car {
         OneShiftError::NoShift { asked: asked.to_owned(), gears }
     }
 
-    /// A shift as it is written: `1-2`.
-    pub fn shift_name(&self, [from, to]: [usize; 2]) -> String {
-        let gear = |gear: usize| self.gearbox.gears.get(gear).map_or("", |gear| gear.name.as_str());
-        format!("{}-{}", gear(from), gear(to))
-    }
-
     /// The upshifts from each forward gear to the next in which one element opens and one closes.
     pub fn single_upshifts(&self) -> Vec<[usize; 2]> {
         let is_single = |gears: &[usize; 2]| {
@@ -185,7 +179,7 @@ impl Car {
     /// # Errors
     /// It is no shift between two wet clutches with a falling ratio, or the car has no converter; see [`OneShiftError`].
     pub fn of_shift(&self, gears: [usize; 2]) -> Result<Vehicle, OneShiftError> {
-        let name = self.shift_name(gears);
+        let name = self.shift_name(gears.into());
         let shift = self.gearbox.shift(gears[0], gears[1]).ok_or_else(|| self.no_shift(&name))?;
         Ok(OneShift::of(self, shift, name)?.vehicle())
     }
@@ -193,8 +187,9 @@ impl Car {
 
 impl<'c> OneShift<'c> {
     fn of(car: &'c Car, shift: &Shift, name: String) -> Result<Self, OneShiftError> {
-        let upshifts =
-            || car.single_upshifts().into_iter().map(|gears| car.shift_name(gears)).collect::<Vec<_>>().join(", ");
+        let upshifts = || {
+            car.single_upshifts().into_iter().map(|gears| car.shift_name(gears.into())).collect::<Vec<_>>().join(", ")
+        };
         let [before, after] = [shift.from, shift.to].map(|gear| car.gearbox.gears[gear].ratio);
         if !(before > after && after > 0.0) {
             return Err(OneShiftError::NoUpshift { shift: name, upshifts: upshifts() });

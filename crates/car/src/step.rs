@@ -133,10 +133,28 @@ impl ShiftCommand {
         Self { from: Gear::In(gear), to: Gear::In(gear) }
     }
 
+    /// From one gear to another, each by its place among the gears of the gearbox.
+    pub const fn between(from: usize, to: usize) -> Self {
+        Self { from: Gear::at(from), to: Gear::at(to) }
+    }
+
+    /// Whether a gear or neutral is commanded, and no shift.
+    #[inline]
+    pub fn is_steady(self) -> bool {
+        self.from == self.to
+    }
+
     /// The shift between two gears; `None` while there is no shift, and from or to neutral.
     pub fn shift(self) -> Option<ShiftId> {
         let (from, to) = (self.from.id()?, self.to.id()?);
         (from != to).then_some(ShiftId { from, to })
+    }
+}
+
+impl From<[usize; 2]> for ShiftCommand {
+    /// From one gear to another, each by its place among the gears of the gearbox.
+    fn from([from, to]: [usize; 2]) -> Self {
+        Self::between(from, to)
     }
 }
 

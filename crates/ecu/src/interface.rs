@@ -2,8 +2,9 @@
 
 use core::mem::offset_of;
 
+use car::{Gear, ShiftCommand};
 use drivetrain::Real;
-use observer::gearbox::{ClutchEstimate, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput, ShiftPhase};
+use observer::gearbox::{ClutchEstimate, MAX_ELEMENTS, ShiftEstimate, ShiftInput, ShiftPhase};
 use observer::{ChannelHealth, Channels};
 
 /// A reading of a channel.
@@ -221,8 +222,8 @@ impl Reading {
 }
 
 /// The place of a gear as C has it.
-fn place_of(gear: usize) -> i32 {
-    if gear == GearCommand::NEUTRAL { -1 } else { gear as i32 }
+fn place_of(gear: Gear) -> i32 {
+    gear.place().map_or(-1, |place| place as i32)
 }
 
 impl Input {
@@ -244,7 +245,7 @@ impl Input {
     }
 
     /// As the filter takes it, in this gear.
-    pub(crate) fn shift_input(&self, gear: GearCommand) -> ShiftInput<f32> {
+    pub(crate) fn shift_input(&self, gear: ShiftCommand) -> ShiftInput<f32> {
         ShiftInput {
             dt_s: self.dt_s,
             engine_rad_s: self.engine_rad_s.reading(),
@@ -259,13 +260,13 @@ impl Input {
     }
 
     /// The gear, among so many; `None` if it is none of them.
-    pub(crate) fn gear(&self, gears: usize) -> Option<GearCommand> {
+    pub(crate) fn gear(&self, gears: usize) -> Option<ShiftCommand> {
         let place = |of: i32| match usize::try_from(of) {
-            Ok(place) if place < gears => Some(place),
-            Err(_) if of == -1 => Some(GearCommand::NEUTRAL),
+            Ok(place) if place < gears => Some(Gear::at(place)),
+            Err(_) if of == -1 => Some(Gear::Neutral),
             _ => None,
         };
-        Some(GearCommand { from: place(self.gear_from)?, to: place(self.gear_to)? })
+        Some(ShiftCommand { from: place(self.gear_from)?, to: place(self.gear_to)? })
     }
 }
 

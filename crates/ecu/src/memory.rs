@@ -3,9 +3,10 @@
 //! The memory begins with a head of fixed size; behind it are the tables of the car. It has no pointers and may be copied and moved as
 //! bytes. On a machine of 64 bits it is a little larger than on one of 32.
 
+use car::ShiftCommand;
 use observer::LOST_S;
 use observer::gearbox::{
-    FrictionElement, GearCommand, GearRow, GearboxFilter, GearboxState, GearboxTables, ShiftEstimate, ShiftRow,
+    FrictionElement, GearRow, GearboxFilter, GearboxState, GearboxTables, ShiftEstimate, ShiftRow,
 };
 use observer::{ChannelHealth, Health};
 
@@ -31,7 +32,7 @@ struct Head {
     state: GearboxState<f32>,
     estimate: Estimate,
     /// The last gear that was in the tables.
-    gear: GearCommand,
+    gear: ShiftCommand,
     has_stepped: bool,
 }
 
@@ -100,14 +101,13 @@ impl<'m> Observer<'m> {
         if !words.is_empty() {
             return Err(status::IMAGE_CONTENT);
         }
-        let neutral = GearCommand { from: GearCommand::NEUTRAL, to: GearCommand::NEUTRAL };
         let head = Head {
             seal: SEAL,
             header,
             parameters,
             state: parameters.filter(tables).start(),
             estimate: Estimate::default(),
-            gear: neutral,
+            gear: ShiftCommand::NEUTRAL,
             has_stepped: false,
         };
         let place = memory.cast::<Head>();
@@ -196,7 +196,7 @@ impl<'m> Observer<'m> {
 
     fn begin(&mut self) {
         self.head.estimate = Estimate::default();
-        self.head.gear = GearCommand { from: GearCommand::NEUTRAL, to: GearCommand::NEUTRAL };
+        self.head.gear = ShiftCommand::NEUTRAL;
         self.head.has_stepped = false;
     }
 

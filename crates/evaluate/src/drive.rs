@@ -1,12 +1,12 @@
 //! A whole drive: what the filter says of every shift of it, beside the truth and the valve model alone.
 
-use car::ErrorBudget;
 use car::{Car, Sensors};
+use car::{ErrorBudget, ShiftCommand};
 use drivetrain::ShiftKind;
 use observer::Health;
 use observer::gearbox::{GearboxFilter, GearboxState, ShiftInput};
 use observer::{ShiftTables, gearbox_filter};
-use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR};
+use plant::car::{CarModel, CarSample, CarShiftQuality, CarShiftRating};
 
 use crate::EvaluateError;
 use crate::checks::log_beside::is_of_its_gears;
@@ -82,8 +82,8 @@ impl PassingShifts {
     }
 
     /// Whether a shift ends with the first row that is in a gear or in this other shift. A change of mind begins another shift.
-    pub(crate) fn ends(&self, gears: Option<[usize; 2]>) -> bool {
-        self.open.as_ref().is_some_and(|open| gears != Some([open.from, open.to]))
+    pub(crate) fn ends(&self, gears: Option<ShiftCommand>) -> bool {
+        self.open.as_ref().is_some_and(|open| gears != Some(open.gears))
     }
 
     /// Gives its jerk to the shift that ended last, m/s^3, where it is known.
@@ -153,17 +153,16 @@ impl PassingShifts {
     pub(crate) fn begin(
         &mut self,
         car: &Car,
-        [from, to]: [usize; 2],
+        gears: ShiftCommand,
         elements: [Option<usize>; 2],
         (time_s, turbine_n_m): (f64, f64),
     ) {
-        let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
+        let [from, to] = [gears.from, gears.to].map(|gear| car.ratio(gear).unwrap_or(f64::NAN));
         self.open = Some(ScoredShift {
             number: self.drive.shifts.len() + 1,
-            from,
-            to,
-            kind: ShiftKind::of(turbine_n_m, ratio(from), ratio(to)),
-            is_garage: !same_direction(ratio(from), ratio(to)),
+            gears,
+            kind: ShiftKind::of(turbine_n_m, from, to),
+            is_garage: !same_direction(from, to),
             elements,
             time_s: [time_s; 2],
             quality: CarShiftQuality::default(),
@@ -177,8 +176,8 @@ impl PassingShifts {
 }
 
 /// Slips of these gears at these speeds of turbine and output, rad/s at the turbine; not a number of neutral.
-pub(crate) fn slips_rad_s(car: &Car, gears: [usize; 2], [turbine, output]: [f64; 2]) -> [f64; 2] {
-    gears.map(|gear| turbine - car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio) * output)
+pub(crate) fn slips_rad_s(car: &Car, gears: ShiftCommand, [turbine, output]: [f64; 2]) -> [f64; 2] {
+    [gears.from, gears.to].map(|gear| turbine - car.ratio(gear).unwrap_or(f64::NAN) * output)
 }
 
 /// Whether two ratios are of gears in one direction; neutral has no number.
@@ -240,8 +239,8 @@ impl<'a> DriveScorer<'a> {
         let estimate = self.filter.step(&mut self.state, input);
         passing.state(state_of(sample, estimate.health));
         self.last = Some(*sample);
-        let [from, to] = sample.gears().map(|gear| gear.unwrap_or(NO_GEAR));
-        let gears = (from != to).then_some([from, to]);
+        let shown = sample.gears();
+        let gears = Some(shown).filter(|shown| !shown.is_steady());
         if passing.ends(gears) {
             end(known, passing, rating, sample);
             let complete = passing.drive.shifts.last().filter(|shift| shift.quality.complete_s.is_some());
@@ -253,7 +252,7 @@ impl<'a> DriveScorer<'a> {
         felt.push(Motion {
             time_s: sample.time_s,
             value: sample.vehicle_m_s2,
-            slips_rad_s: slips_rad_s(known, [from, to], [sample.torques.turbine_rad_s, sample.torques.output_rad_s]),
+            slips_rad_s: slips_rad_s(known, shown, [sample.torques.turbine_rad_s, sample.torques.output_rad_s]),
         });
         passing.take_comfort(felt.ended(sample.time_s));
         if gears.is_none() {
@@ -264,9 +263,8 @@ impl<'a> DriveScorer<'a> {
                 let offgoing = (!under_way.is_from_neutral).then_some(under_way.offgoing.element);
                 [offgoing, Some(under_way.oncoming.element)]
             });
-            passing.begin(known, [from, to], elements, (sample.time_s, sample.turbine_n_m));
-            let begun = CarShift { request_s: sample.time_s, ..CarShift::usual(known, from, to, 0.0) };
-            *rating = Some(CarShiftRating::new(self.model, &begun));
+            passing.begin(known, shown, elements, (sample.time_s, sample.turbine_n_m));
+            *rating = Some(CarShiftRating::new(self.model, shown, sample.time_s));
         }
         if let (Some(shift), Some(rating)) = (&mut passing.open, rating) {
             rating.push(sample);
@@ -298,7 +296,7 @@ fn state_of(sample: &CarSample, health: Health) -> DriveState {
     let torques = &sample.torques;
     DriveState {
         time_s: sample.time_s,
-        gear: sample.gears()[0].unwrap_or(NO_GEAR),
+        gear: sample.gears().from,
         pedals: [sample.driver.throttle, sample.driver.brake],
         vehicle_m_s: sample.vehicle_m_s,
         speeds_rad_s: [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s],
@@ -344,8 +342,7 @@ mod tests {
         let (rows, kind) = (rows(error_n_m), Some(ShiftKind::PowerOnUp));
         ScoredShift {
             number,
-            from: 1,
-            to: 2,
+            gears: ShiftCommand::between(1, 2),
             kind,
             is_garage: false,
             elements: [Some(0), Some(1)],

@@ -1,9 +1,8 @@
 //! The gearbox filter step by step, for a log that is not there yet: on a test bench, in a loop, behind another language.
 
-use car::{Car, ElementId, ErrorBudget, Gear, GearId, Sensors, Step};
+use car::{Car, ElementId, ErrorBudget, GearId, Sensors, ShiftCommand, Step};
 use observer::gearbox::{
-    GearCommand, GearboxFilter, GearboxState, GearboxTables, Learnt, MAX_ELEMENTS, ShiftElement, ShiftEstimate,
-    ShiftInput,
+    GearboxFilter, GearboxState, GearboxTables, Learnt, MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftInput,
 };
 use observer::{ShiftTables, gearbox_filter};
 
@@ -105,8 +104,6 @@ impl Estimator {
                 commands[place] = Some(*command);
             }
         }
-        let place = |gear: Gear| gear.id().map_or(GearCommand::NEUTRAL, GearId::place);
-        let gear = step.shift.map_or([GearCommand::NEUTRAL; 2], |shift| [place(shift.from), place(shift.to)]);
         ShiftInput {
             dt_s: step.dt_s,
             engine_rad_s: step.speeds.engine,
@@ -116,7 +113,7 @@ impl Estimator {
             engine_n_m: step.engine_torque_n_m,
             lock_up_applied: step.lock_up_applied,
             commands,
-            gear: GearCommand { from: gear[0], to: gear[1] },
+            gear: step.shift.unwrap_or(ShiftCommand::NEUTRAL),
         }
     }
 }
@@ -129,7 +126,7 @@ fn without_tables(filter: &GearboxFilter<'_, f64>) -> GearboxFilter<'static, f64
 
 #[cfg(test)]
 mod tests {
-    use car::{Reading, ShiftCommand};
+    use car::{Gear, Reading};
 
     use super::*;
 
@@ -165,8 +162,8 @@ mod tests {
                 step.commands[element] = Some(Reading::now(0.02 * element.place() as f64));
             }
             let input = estimator.input(&step);
-            let [from, to] = if is_shifting { [first, second] } else { [gear; 2] }.map(GearId::place);
-            assert_eq!(input.gear, GearCommand { from, to });
+            let [from, to] = if is_shifting { [first, second] } else { [gear; 2] }.map(Gear::In);
+            assert_eq!(input.gear, ShiftCommand { from, to });
             let expected = filter.step(&mut state, &input);
             assert_eq!(format!("{:?}", estimator.step(&step)), format!("{expected:?}"), "step {at}");
             for element in (0..car.gearbox.elements.len()).filter_map(ElementId::new) {

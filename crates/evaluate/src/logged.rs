@@ -1,13 +1,11 @@
 //! The filter of a car with any gearbox on its way through a log, and what it says of the shifts.
 
-use car::ErrorBudget;
 use car::{Car, Sensors};
-use observer::gearbox::{
-    ClutchEstimate, GearCommand, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftPhase,
-};
+use car::{ErrorBudget, Gear, ShiftCommand};
+use observer::gearbox::{ClutchEstimate, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftPhase};
 use observer::{Health, Reading};
 use observer::{ShiftTables, gearbox_filter};
-use plant::car::{BeyondGears, CarShiftQuality, NO_GEAR};
+use plant::car::{BeyondGears, CarShiftQuality};
 
 use crate::LogStep;
 use crate::checks::CameSpeed;
@@ -50,7 +48,7 @@ pub struct LoggedDrive<'c> {
     beyond: BeyondGears,
     in_gear: InGear<'c>,
     /// The gear of the row before, and changes of the gear which no target gear announced.
-    gear: Option<usize>,
+    gear: Option<Gear>,
     unannounced: u64,
     commands: CommandCheck<'c>,
     delay: CommandDelay<'c>,
@@ -71,7 +69,7 @@ pub struct LoggedDrive<'c> {
 struct Holes {
     count: u64,
     /// The shift that the last one cut, as long as the log goes on in it: the rest is no other shift.
-    cut: Option<[usize; 2]>,
+    cut: Option<ShiftCommand>,
     /// The last times between rows, s; the oldest is at `at`.
     steps_s: [f64; 31],
     at: usize,
@@ -126,7 +124,7 @@ impl<'c> LoggedDrive<'c> {
             came: [CameSpeed::default(); 3],
             speeds_rad_s: [f64::NAN; 3],
             begun_s: f64::NAN,
-            beyond: BeyondGears::new(&car.gearbox, [NO_GEAR; 2], [f64::NAN; 2]),
+            beyond: BeyondGears::new(car, ShiftCommand::NEUTRAL, [f64::NAN; 2]),
             in_gear: InGear::new(car),
             gear: None,
             unannounced: 0,
@@ -187,7 +185,7 @@ impl<'c> LoggedDrive<'c> {
         }
         self.carried.push(step.time_s, &estimate.valve_pa);
         self.jerk.push(step);
-        let GearCommand { from, to } = input.gear;
+        let from = input.gear.from;
         self.passing.state(DriveState {
             time_s: step.time_s,
             gear: from,
@@ -196,7 +194,7 @@ impl<'c> LoggedDrive<'c> {
             speeds_rad_s: self.speeds_rad_s,
             health: estimate.health,
         });
-        let gears = (from != to).then_some([from, to]);
+        let gears = Some(input.gear).filter(|gear| !gear.is_steady());
         if gears != self.holes.cut {
             self.holes.cut = None;
         }
@@ -204,12 +202,12 @@ impl<'c> LoggedDrive<'c> {
         let came_rad_s = self.came.each_ref().map(|came| came.at(step.time_s));
         if let Some(open) = self.passing.open.as_ref().filter(|_| is_hole) {
             self.holes.count += 1;
-            self.holes.cut = gears.filter(|gears| *gears == [open.from, open.to]);
+            self.holes.cut = gears.filter(|gears| *gears == open.gears);
             self.end(None);
         } else if self.passing.ends(gears) {
             self.end(Some((step.time_s, from)));
         }
-        let is_same = self.gear.is_none_or(|before| before == from || before == NO_GEAR || from == NO_GEAR);
+        let is_same = self.gear.is_none_or(|before| before == from || before.is_neutral() || from.is_neutral());
         match gears {
             Some(_) if self.holes.cut.is_some() => {}
             Some(_) => self.during(step, &estimate),
@@ -248,7 +246,7 @@ impl<'c> LoggedDrive<'c> {
             self.felt.push(Motion {
                 time_s: step.time_s - reading.age_s,
                 value: reading.value / self.car.driveline.final_ratio * self.car.road.wheel_radius_m,
-                slips_rad_s: slips_rad_s(self.car, [from, to], [turbine, output]),
+                slips_rad_s: slips_rad_s(self.car, input.gear, [turbine, output]),
             });
         }
         let comfort = self.felt.ended(step.time_s);
@@ -304,21 +302,22 @@ impl<'c> LoggedDrive<'c> {
     }
 
     fn during(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>) {
-        let GearCommand { from, to } = step.input.gear;
-        let elements = self.tables.tables().shift(from, to).map(|row| row.clutches.map(|clutch| clutch.element));
+        let gears = step.input.gear;
+        let row = self.tables.tables().commanded(gears).copied();
+        let elements = row.map(|row| row.clutches.map(|clutch| clutch.element));
         if self.passing.open.is_none() {
-            let single = || self.car.gearbox.shift(from, to).and_then(|shift| shift.change.single());
-            let elements = elements.and_then(|_| single()).map_or([None; 2], |elements| elements.map(Some));
+            let elements =
+                elements.and_then(|_| self.car.single_shift(gears)).map_or([None; 2], |elements| elements.map(Some));
             let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
-            self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
+            self.passing.begin(self.car, gears, elements, (step.time_s, turbine_n_m));
             self.begun_s = step.time_s;
             let jerk_m_s3 = self.jerk.begin(step.time_s);
             self.passing.take_jerk(jerk_m_s3);
             let comfort = self.felt.begin(step.time_s);
             self.passing.take_comfort(comfort);
             self.still.begin();
-            let ratios = [from, to].map(|gear| self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
-            self.beyond = BeyondGears::new(&self.car.gearbox, [from, to], ratios);
+            let ratios = [gears.from, gears.to].map(|gear| self.car.ratio(gear).unwrap_or(f64::NAN));
+            self.beyond = BeyondGears::new(self.car, gears, ratios);
         }
         let Some(shift) = &mut self.passing.open else { return };
         shift.time_s[1] = step.time_s;
@@ -326,7 +325,6 @@ impl<'c> LoggedDrive<'c> {
         self.beyond.push(&mut shift.quality, [turbine, output]);
         let found = estimate.clutches.filter(|found| Some(found.map(|clutch| clutch.element)) == elements);
         let at_turbine_n_m = estimate.at_turbine.map(|clutches| [clutches.torque_n_m, clutches.std_dev_n_m]);
-        let row = self.tables.tables().shift(from, to).copied();
         let clutches = match (found.zip(row), self.car.gearbox.has_ratios_alone()) {
             (Some((found, row)), _) => {
                 let pressures_pa = self.carried.pressures_pa(step, self.tables);
@@ -363,12 +361,12 @@ impl<'c> LoggedDrive<'c> {
     }
 
     /// Ends the open shift: at the time, s, of the first row after it, and in its gear; `None` where the log does not have it.
-    fn end(&mut self, at: Option<(f64, usize)>) {
+    fn end(&mut self, at: Option<(f64, Gear)>) {
         let Some(shift) = &self.passing.open else { return };
-        let completed_s = at.filter(|(_, gear)| *gear == shift.to).map(|(time_s, _)| time_s);
-        if let Some((row, time_s)) = self.tables.tables().shift(shift.from, shift.to).zip(completed_s) {
+        let completed_s = at.filter(|(_, gear)| *gear == shift.gears.to).map(|(time_s, _)| time_s);
+        if let Some((row, time_s)) = self.tables.tables().commanded(shift.gears).zip(completed_s) {
             self.still.end(row.clutches.map(|clutch| clutch.element));
-            self.delay.end([shift.from, shift.to], [self.begun_s, time_s]);
+            self.delay.end(shift.gears, [self.begun_s, time_s]);
         }
         let complete_s = completed_s.map(|time_s| time_s - self.begun_s);
         // A log has no slip of the held elements.

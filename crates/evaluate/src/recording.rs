@@ -4,14 +4,11 @@ use car::{Car, Sensors};
 use drivetrain::Real;
 use observer::Reading;
 use observer::ShiftTables;
-use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
-use plant::car::{CarSample, NO_GEAR};
+use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
+use plant::car::CarSample;
 use plant::sensors::{Channel, Readings, Rows, read_speed};
 
 use crate::{RECORD_S, SAMPLE_S};
-
-/// Cars and the filter have the same place for neutral.
-const _: () = assert!(NO_GEAR == GearCommand::NEUTRAL);
 
 /// Torque of the lock-up clutch from which on it counts as applied, N m.
 const LOCK_UP_N_M: f64 = 0.1;
@@ -93,7 +90,6 @@ pub(crate) fn input(
             commands[place] = command(element);
         }
     }
-    let [from, to] = sample.gears().map(|gear| gear.unwrap_or(NO_GEAR));
     let lock_up_applied = lock_up_is_applied(car, sample);
     // Without a converter, or where it is locked, nothing else gives the torque at the gearbox input.
     let engine_n_m = reported_engine_n_m(car, sample);
@@ -107,7 +103,7 @@ pub(crate) fn input(
         engine_n_m: (car.converter.is_none() || lock_up_applied).then_some(Reading::now(engine_n_m)),
         lock_up_applied,
         commands,
-        gear: GearCommand { from, to },
+        gear: sample.gears(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! A shift of a drive: truth and estimates of it, and what they say together.
 
+use car::{Gear, ShiftCommand};
 use drivetrain::ShiftKind;
 use observer::Health;
 use plant::car::CarShiftQuality;
@@ -15,7 +16,7 @@ pub struct DriveState {
     /// Time, s.
     pub time_s: f64,
     /// Gear; during a shift the one that is left.
-    pub gear: usize,
+    pub gear: Gear,
     /// Throttle and brake, 0 to 1.
     pub pedals: [f64; 2],
     /// Vehicle speed, m/s.
@@ -31,10 +32,8 @@ pub struct DriveState {
 pub struct ScoredShift {
     /// Its number, from 1.
     pub number: usize,
-    /// The gear before.
-    pub from: usize,
-    /// The gear after.
-    pub to: usize,
+    /// The gear before and the gear after.
+    pub gears: ShiftCommand,
     /// Direction and power at the request; `None` without torque, and of a garage shift.
     pub kind: Option<ShiftKind>,
     /// Whether it is a garage shift: from or to neutral, or from one direction to the other. It has no old and new speed of the turbine.

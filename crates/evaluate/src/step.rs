@@ -1,6 +1,6 @@
 //! A row of a log, measured or simulated.
 
-use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 use observer::{Reading, ShiftTables};
 
 /// A row of a log.
@@ -44,8 +44,7 @@ impl LogStep {
 
     /// Measured pressures of the offgoing and the oncoming clutch of the shift that is under way, Pa, where this row has readings of them.
     pub fn shift_pressures(&self, tables: &ShiftTables<f64>) -> [Option<Reading<f64>>; 2] {
-        let GearCommand { from, to } = self.input.gear;
-        let clutches = tables.tables().shift(from, to).map(|row| row.clutches);
+        let clutches = tables.tables().commanded(self.input.gear).map(|row| row.clutches);
         [0, 1].map(|c| {
             let of_shift = self.truth[c][0];
             if of_shift.is_finite() {

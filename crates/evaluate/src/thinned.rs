@@ -36,6 +36,8 @@ pub(crate) fn thinned(
 
 #[cfg(test)]
 mod tests {
+    use car::Gear;
+
     use super::*;
     use observer::Health;
 
@@ -43,7 +45,7 @@ mod tests {
     fn a_drive_is_thinned_where_nothing_happens() {
         let state = |at: u32| DriveState {
             time_s: 0.01 * f64::from(at),
-            gear: usize::from(at >= 5000),
+            gear: Gear::at(usize::from(at >= 5000)),
             pedals: [0.0; 2],
             vehicle_m_s: 10.0,
             speeds_rad_s: [100.0; 3],

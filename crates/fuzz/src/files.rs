@@ -4,11 +4,11 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use car::Car;
+use car::{Car, ShiftCommand};
 use config::{CarFile, ExperimentFile, GearboxFile, Source, Study, VehicleFile, read_learnt, write_learnt};
 use design::{design_compliant, design_rigid};
 use observer::Reading;
-use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_shift};
 use report::gearbox_figure::{gear_figure, train_figure};
 use study::campaign::{factor_values, run_seed};
@@ -66,7 +66,7 @@ pub(crate) fn learnt(car: &Car, input: &[u8]) {
     let mut drive = LoggedDrive::new(car, &tables, None, Some(&learnt));
     let reading = |value: f64| Some(Reading { value, age_s: 0.0 });
     for row in 0..20_u32 {
-        let (gear, fraction) = (GearCommand { from: 2, to: 2 + usize::from(row > 9) }, f64::from(row) / 20.0);
+        let (gear, fraction) = (ShiftCommand::between(2, 2 + usize::from(row > 9)), f64::from(row) / 20.0);
         let input = ShiftInput {
             dt_s: 0.01,
             engine_rad_s: reading(210.0),

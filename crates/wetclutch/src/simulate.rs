@@ -210,8 +210,8 @@ pub fn drive_columns(car: &Car) -> Vec<DriveColumn> {
         measured("engine_share", |_, s| Cell::Number(s.engine_share)),
         measured(signal::REPORTED_ENGINE_TORQUE, |car, s| Cell::Number(reported_engine_n_m(car, s))),
         measured(signal::LOCK_UP_APPLIED, |car, s| Cell::Whole(u64::from(lock_up_is_applied(car, s)))),
-        measured(signal::GEAR, |car, s| gear_name(car, s.gears()[0])),
-        measured(signal::TARGET_GEAR, |car, s| gear_name(car, s.gears()[1])),
+        measured(signal::GEAR, |car, s| Cell::Word(car.gear_name(s.gears().from))),
+        measured(signal::TARGET_GEAR, |car, s| Cell::Word(car.gear_name(s.gears().to))),
         measured("shift_stage", |_, s| Cell::Word(s.shift.map_or("", |shift| stage_name(shift.stage)))),
         measured("offgoing", |car, s| element_name(car, offgoing(s))),
         measured("oncoming", |car, s| element_name(car, oncoming(s))),
@@ -239,12 +239,6 @@ pub fn drive_columns(car: &Car) -> Vec<DriveColumn> {
 /// The torque of the clutch between engine and gearbox.
 fn input_clutch_signal(car: &Car) -> &'static str {
     if car.converter.is_some() { signal::LOCK_UP_TORQUE } else { signal::LAUNCH_CLUTCH_TORQUE }
-}
-
-/// The name of a gear, or of neutral.
-fn gear_name(car: &Car, gear: Option<usize>) -> Cell<'_> {
-    let Some(gear) = gear else { return Cell::Word("N") };
-    Cell::Word(car.gearbox.gears.get(gear).map_or("", |gear| gear.name.as_str()))
 }
 
 /// The clutch that opens in a shift; from neutral none does.

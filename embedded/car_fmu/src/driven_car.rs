@@ -1,5 +1,6 @@
 //! The model: a car with its shift controller, on which driver and road act.
 
+use car::{Gear, ShiftCommand};
 use std::collections::HashMap;
 use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -214,9 +215,9 @@ impl Simulated for DrivenCar {
     }
 
     fn whole(&self, reference: u32) -> Option<i32> {
-        let place = |gear: Option<usize>| gear.map_or(-1, |gear| gear as i32);
+        let place = |gear: Gear| gear.place().map_or(-1, |place| place as i32);
         let sample = self.state.running.as_ref().map(|running| &running.sample);
-        let [from, to] = sample.map_or([None; 2], CarSample::gears);
+        let ShiftCommand { from, to } = sample.map_or(ShiftCommand::NEUTRAL, CarSample::gears);
         let is_shifting = sample.is_some_and(|sample| sample.shift.is_some());
         [place(from), place(to), i32::from(is_shifting)].get(reference.checked_sub(WHOLE)? as usize).copied()
     }

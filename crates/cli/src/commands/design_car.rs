@@ -181,7 +181,7 @@ impl Row<'_> {
     /// Its cells.
     fn cells(&self, car: &Car, quantity: Quantity) -> Vec<String> {
         let mut cells = vec![
-            car.shift_name(self.gears),
+            car.shift_name(self.gears.into()),
             self.oncoming.to_owned(),
             format!("{:.3}", self.vehicle.shift.slip_oncoming[0]),
             format!("{:.2}", ratio_gain(&self.vehicle)),

@@ -73,7 +73,7 @@ fn backwards(km: f64) -> String {
 /// What a drive asks of the engine that it cannot do.
 fn over_speed(over: &OverSpeed, car: &Car) -> String {
     let OverSpeed { time_s, engine_rad_s, map_rad_s, gears } = *over;
-    let [from, to] = gears.map(|gear| car.gearbox.gears.get(gear).map_or("N", |gear| gear.name.as_str()));
+    let [from, to] = [gears.from, gears.to].map(|gear| car.gear_name(gear));
     let in_gear = if from == to { format!("in gear {from}") } else { format!("in the shift {from}-{to}") };
     format!(
         "warning: the engine turns at {:.0} rpm {in_gear} at {time_s:.2} s, and its torque map ends at {:.0} rpm: beyond, the last torque of the \

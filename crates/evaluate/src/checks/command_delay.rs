@@ -9,7 +9,7 @@
 
 use std::collections::VecDeque;
 
-use car::{ElementErrors, ErrorBudget};
+use car::{ElementErrors, ErrorBudget, ShiftCommand};
 use observer::ShiftTables;
 use observer::gearbox::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
 
@@ -87,8 +87,7 @@ impl Point {
 
 /// A completed shift that waits for the rows after it.
 struct Waiting {
-    from: usize,
-    to: usize,
+    shift: ShiftCommand,
     begin_s: f64,
     end_s: f64,
 }
@@ -172,14 +171,14 @@ impl<'c> CommandDelay<'c> {
     }
 
     /// A shift between these gears is completed.
-    pub(crate) fn end(&mut self, [from, to]: [usize; 2], [begin_s, end_s]: [f64; 2]) {
+    pub(crate) fn end(&mut self, shift: ShiftCommand, [begin_s, end_s]: [f64; 2]) {
         if end_s - begin_s <= LONGEST_S {
-            self.waiting.push_back(Waiting { from, to, begin_s, end_s });
+            self.waiting.push_back(Waiting { shift, begin_s, end_s });
         }
     }
 
     fn judge(&mut self, waiting: &Waiting) {
-        let Some(&shift) = self.tables.tables().shift(waiting.from, waiting.to) else { return };
+        let Some(&shift) = self.tables.tables().commanded(waiting.shift) else { return };
         // A one-way clutch has no pressure.
         if shift.clutches.iter().any(|clutch| clutch.is_one_way()) {
             return;

@@ -4,8 +4,8 @@
 //! element, with all errors of the valve in its favour, can hold nothing: then the channel is another signal. Which one, an element tells
 //! that is open in that gear and whose command presses.
 
-use car::Car;
 use car::ErrorBudget;
+use car::{Car, Gear};
 use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
 
@@ -25,7 +25,7 @@ pub(crate) struct CommandCheck<'c> {
     places: Vec<(usize, usize)>,
     /// Pressures by the valve model, Pa, below which an element presses by no means, and above which it does, by their place.
     limits_pa: Vec<[f64; 2]>,
-    gear: usize,
+    gear: Option<Gear>,
     since_s: f64,
     of_gears: Vec<OfGear>,
 }
@@ -56,27 +56,26 @@ impl<'c> CommandCheck<'c> {
             ];
         }
         let of_gears = vec![OfGear::default(); car.gearbox.gears.len()];
-        Self { car, places, limits_pa, gear: usize::MAX, since_s: f64::NAN, of_gears }
+        Self { car, places, limits_pa, gear: None, since_s: f64::NAN, of_gears }
     }
 
     /// Takes a row: the gear, none while the gearbox shifts, turbine and output speed, and the pressures by the valve models.
     pub(crate) fn push(
         &mut self,
         time_s: f64,
-        gear: Option<usize>,
+        gear: Option<Gear>,
         [turbine, output]: [f64; 2],
         valve_pa: &[f64; MAX_ELEMENTS],
     ) {
-        let gear = gear.unwrap_or(usize::MAX);
-        let ratio = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
+        let ratio = gear.and_then(|gear| self.car.ratio(gear)).unwrap_or(f64::NAN);
         let in_gear = ratio * output;
         let fits = output > OUTPUT_MIN_RAD_S && (turbine - in_gear).abs() <= FITS * in_gear.abs();
         if gear != self.gear || !fits {
             (self.gear, self.since_s) = (gear, time_s);
         }
-        let Some(of_gear) = self.of_gears.get_mut(gear).filter(|_| fits && time_s - self.since_s >= STEADY_S) else {
-            return;
-        };
+        let is_steady = fits && time_s - self.since_s >= STEADY_S;
+        let place = gear.and_then(Gear::place).filter(|_| is_steady);
+        let Some(of_gear) = place.and_then(|place| self.of_gears.get_mut(place)) else { return };
         of_gear.rows += 1;
         for (place, ([opens_pa, presses_pa], valve_pa)) in self.limits_pa.iter().zip(valve_pa).enumerate() {
             of_gear.opens[place] += u64::from(valve_pa < opens_pa);

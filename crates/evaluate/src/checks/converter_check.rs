@@ -77,9 +77,10 @@ impl ConverterCheck {
 mod tests {
     use super::*;
     use crate::{LogStep, SAMPLE_S};
+    use car::ShiftCommand;
     use config::CarFile;
     use observer::Reading;
-    use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
+    use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 
     /// A log in which the engine has this fraction of the torque that the converter takes; its speed changes at this rate, rad/s^2.
     fn said(fraction: f64, rate: f64, lock_up_applied: bool, rows: u32) -> Option<String> {
@@ -98,7 +99,7 @@ mod tests {
                 engine_n_m: None,
                 lock_up_applied,
                 commands: [None; MAX_ELEMENTS],
-                gear: GearCommand { from: 1, to: 1 },
+                gear: ShiftCommand::between(1, 1),
             };
             let reported_n_m = (row % 4 == 0).then(|| Reading::now(fraction * torque));
             let step = LogStep { reported_n_m, ..LogStep::of(time_s, input) };

@@ -1,6 +1,6 @@
 //! What the rows in a gear tell of a log: whether their speeds fit the gear, and whether the filter could use them.
 
-use car::Car;
+use car::{Car, Gear};
 use observer::{Health, Reading};
 
 use crate::checks::CameSpeed;
@@ -44,8 +44,8 @@ pub(crate) struct InGear<'c> {
 
 /// A row in a gear.
 pub(crate) struct InGearRow {
-    /// The gear, by its place in the gearbox.
-    pub(crate) gear: usize,
+    /// The gear.
+    pub(crate) gear: Gear,
     /// Its time, and that since the row before, s.
     pub(crate) time_s: f64,
     pub(crate) dt_s: f64,
@@ -81,13 +81,10 @@ impl<'c> InGear<'c> {
         if let Some(Reading { value, .. }) = wheel {
             self.wheel.push(row.time_s, value);
         }
-        let ratio = self.car.gearbox.gears.get(row.gear).map_or(f64::NAN, |gear| gear.ratio);
+        let Some((gear, ratio)) = row.gear.place().zip(self.car.ratio(row.gear)) else { return };
         // An output speed in a wrong unit may be too slow to count. Without a converter the turbine turns with the engine at a standstill.
         let by_turbine = if self.car.converter.is_some() { turbine / ratio } else { f64::NAN };
         let by_wheels = self.wheel.at(row.time_s) * self.car.driveline.final_ratio;
-        if ratio.is_nan() {
-            return;
-        }
         let is_at_speed = output.max(by_turbine).max(by_wheels) > RATIO_FROM_RAD_S;
         // A car that creeps is rightly too slow, and its clutch may be open; not where the turbine is too fast for that in this gear.
         let is_rightly_slow =
@@ -105,7 +102,7 @@ impl<'c> InGear<'c> {
             return;
         }
         self.swapped.push(engine, turbine, &[by_output]);
-        self.scale.push(row.gear, ratio, row.came_rad_s);
+        self.scale.push(gear, ratio, row.came_rad_s);
         self.rows[0] += 1;
         self.rows[1] += u64::from((turbine - by_output).abs() > RATIO_FRACTION * by_output.abs());
         if let (Some(output), Some(wheel)) = (row.output.filter(|reading| reading.value.is_finite()), wheel) {

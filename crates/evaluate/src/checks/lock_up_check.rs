@@ -88,9 +88,10 @@ impl LockUpCheck {
 mod tests {
     use super::*;
     use crate::SAMPLE_S;
+    use car::ShiftCommand;
     use config::CarFile;
     use observer::Reading;
-    use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
+    use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 
     /// What is said of so long a log with this slip, rad/s, an engine that reports the pump's torque and more, N m, and a flag.
     fn said(seconds: u32, slip: f64, more_n_m: Option<f64>, lock_up_applied: bool) -> Option<String> {
@@ -109,7 +110,7 @@ mod tests {
                 engine_n_m: None,
                 lock_up_applied,
                 commands: [None; MAX_ELEMENTS],
-                gear: GearCommand { from: 1, to: 1 },
+                gear: ShiftCommand::between(1, 1),
             };
             let pump_n_m = car.converter.unwrap().torques(speeds[0], turbine).pump_n_m;
             let reported_n_m = more_n_m.map(|more_n_m| Reading::now(pump_n_m + more_n_m));

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use car::Car;
 use drivetrain::ShiftKind;
 use observer::ShiftTables;
-use observer::gearbox::{GearCommand, MAX_ELEMENTS};
+use observer::gearbox::MAX_ELEMENTS;
 use plant::car::CarShiftQuality;
 
 use crate::LogStep;
@@ -45,8 +45,7 @@ impl CarriedPressures {
 
     /// Pressures of the offgoing and the oncoming clutch of the shift that is under way, Pa; not a number where the row brings none.
     pub(crate) fn pressures_pa(&self, step: &LogStep, tables: &ShiftTables<f64>) -> [f64; 2] {
-        let GearCommand { from, to } = step.input.gear;
-        let row = tables.tables().shift(from, to).copied();
+        let row = tables.tables().commanded(step.input.gear).copied();
         let readings = step.shift_pressures(tables);
         [0, 1].map(|c| {
             let Some(reading) = readings[c].filter(|reading| reading.age_s <= OLDEST_S) else { return f64::NAN };

@@ -1,13 +1,12 @@
 //! The quantities of a fit, and what is known of them before.
 
-use car::Car;
-use car::ErrorBudget;
+use car::{Car, ErrorBudget};
 use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::gearbox::{ElementUncertainty, GearboxFilter};
 use observer::{ShiftTables, element_uncertainty, gearbox_filter};
 
-use super::shift_log::{ShiftLog, named_pair};
+use super::shift_log::ShiftLog;
 use super::zero_offset::{sd_before_pa, zero_offsets};
 use crate::driving::{AIR, DRAG_UNIT_N_M, ROLLING, Term, WIND, rolling_floor};
 use crate::parameters::OFFSET_FLOOR_PA;
@@ -143,7 +142,7 @@ impl Quantities {
         let mut named: Vec<(usize, String)> =
             names.filter_map(|(at, element)| Some((tables.place(at)?, element.name.clone()))).collect();
         named.sort_by_key(|(place, _)| *place);
-        let pair_names = pairs.iter().map(|pair| named_pair(car, *pair)).collect();
+        let pair_names = pairs.iter().map(|&pair| car.shift_name(pair.into())).collect();
         let elements = named.into_iter().map(|(_, name)| name).collect();
         let rolling_floor = rolling_floor(&car.road);
         Self { all, elements, pairs, pair_names, before, measured, has_converter, rolling_floor }

@@ -1,11 +1,11 @@
 //! From the steps of a log to its shifts.
 
-use car::Car;
+use car::{Car, Gear, ShiftCommand};
 use observer::Reading;
 use observer::ShiftTables;
-use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftClutch, ShiftInput};
+use observer::gearbox::{MAX_ELEMENTS, ShiftClutch, ShiftInput};
 
-use super::shift_log::{ShiftLog, named_pair};
+use super::shift_log::ShiftLog;
 use crate::driving::{DrivenCar, Driving, DrivingRecorder, RowState};
 use crate::{ReadingAges, Series};
 
@@ -55,7 +55,7 @@ impl Recorded {
 /// A shift that is under way, or has just ended.
 #[derive(Debug, Clone, Copy)]
 struct Open {
-    gears: [usize; 2],
+    gears: ShiftCommand,
     begun_s: f64,
     ended_s: Option<f64>,
     lock_up: bool,
@@ -122,8 +122,8 @@ impl<'a> Recorder<'a> {
             self.close(open);
         }
         self.take(time_s, input);
-        let gears = [input.gear.from, input.gear.to];
-        let is_shift = gears[0] != gears[1];
+        let gears = input.gear;
+        let is_shift = !gears.is_steady();
         match &mut self.open {
             Some(open) if is_shift && open.gears == gears && open.ended_s.is_none() => {
                 open.lock_up |= input.lock_up_applied;
@@ -135,7 +135,7 @@ impl<'a> Recorder<'a> {
             }
             Some(open) => open.ended_s = open.ended_s.or(Some(time_s)),
             None if is_shift => self.begin(time_s, gears, input.lock_up_applied),
-            None => self.compare_ratio(gears[0], input),
+            None => self.compare_ratio(gears.from, input),
         }
         self.forget(time_s);
     }
@@ -193,23 +193,23 @@ impl<'a> Recorder<'a> {
                 series.push(time_s, value);
             }
         }
-        let GearCommand { from, to } = input.gear;
-        let state = RowState { gear: (from == to).then_some(from), lock_up: input.lock_up_applied };
+        let gear = input.gear.from.place().filter(|_| input.gear.is_steady());
+        let state = RowState { gear, lock_up: input.lock_up_applied };
         let reported = dated(self.reported.take(), 0.0).or(torque);
         let [engine, turbine, output] = speeds;
         self.driving.push(time_s, [engine, turbine, output, wheel], reported, state);
     }
 
-    fn begin(&mut self, time_s: f64, gears: [usize; 2], lock_up: bool) {
+    fn begin(&mut self, time_s: f64, gears: ShiftCommand, lock_up: bool) {
         self.pressure = Default::default();
         self.open = Some(Open { gears, begun_s: time_s, ended_s: None, lock_up });
     }
 
-    fn compare_ratio(&mut self, gear: usize, input: &ShiftInput<f64>) {
+    fn compare_ratio(&mut self, gear: Gear, input: &ShiftInput<f64>) {
         self.last_output = input.output_rad_s.map_or(self.last_output, |reading| reading.value);
-        let (Some(turbine), Some(gear)) = (input.turbine_rad_s, self.car.gearbox.gears.get(gear)) else { return };
+        let (Some(turbine), Some(ratio)) = (input.turbine_rad_s, self.car.ratio(gear)) else { return };
         if self.last_output > RATIO_FROM_RAD_S {
-            let by_output = gear.ratio * self.last_output;
+            let by_output = ratio * self.last_output;
             self.found.in_gear[0] += 1;
             self.found.in_gear[1] += u64::from((turbine.value - by_output).abs() > RATIO_FRACTION * by_output.abs());
         }
@@ -231,13 +231,13 @@ impl<'a> Recorder<'a> {
     fn close(&mut self, open: Open) {
         self.open = None;
         let Open { gears, begun_s, lock_up, .. } = open;
-        let name = format!("{} at {begun_s:.2} s", named_pair(self.car, gears));
+        let name = format!("{} at {begun_s:.2} s", self.car.shift_name(gears));
         let mut log = match self.cut(open, &name) {
             Ok(log) => log,
             Err(reason) => return self.found.skipped.push(format!("{name}: {reason}")),
         };
         let rows = self.tables.tables();
-        let Some(row) = rows.shift(gears[0], gears[1]) else { return };
+        let Some(row) = rows.commanded(gears) else { return };
         let found = log.find_slip(row).and_then(|()| match (&self.car.converter, lock_up) {
             _ if self.begins_within(&log) => Err("its commands begin too late to say how much oil its pistons had"),
             (Some(_), true) => Err("the lock-up clutch of the converter was applied"),
@@ -265,17 +265,17 @@ impl<'a> Recorder<'a> {
 
     /// The readings of a shift.
     fn cut(&self, open: Open, name: &str) -> Result<ShiftLog, &'static str> {
-        let [from, to] = open.gears;
+        let gears = open.gears;
         let ended_s = open.ended_s.ok_or("the log ends within it")?;
         if ended_s - open.begun_s > LONGEST_S {
             return Err("it takes longer than any shift");
         }
-        let is_forward = |gear: usize| self.car.gearbox.gears.get(gear).is_some_and(|gear| gear.ratio > 0.0);
-        if !(is_forward(from) && is_forward(to)) {
+        let forward = |gear: Gear| gear.place().filter(|_| self.car.ratio(gear).is_some_and(|ratio| ratio > 0.0));
+        let [Some(from), Some(to)] = [gears.from, gears.to].map(forward) else {
             return Err("it is not between forward gears");
-        }
+        };
         let rows = self.tables.tables();
-        let row = rows.shift(from, to).ok_or("it is not from one clutch to another")?;
+        let row = rows.commanded(gears).ok_or("it is not from one clutch to another")?;
         if row.clutches.iter().any(ShiftClutch::is_one_way) {
             return Err("one of its elements is a one-way clutch");
         }
@@ -291,7 +291,7 @@ impl<'a> Recorder<'a> {
         });
         Ok(ShiftLog {
             name: name.to_owned(),
-            gears: open.gears,
+            gears: [from, to],
             command_s: [open.begun_s, ended_s],
             engine: self.engine.part(span),
             turbine: self.turbine.part(span),

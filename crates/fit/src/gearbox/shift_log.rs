@@ -98,9 +98,3 @@ impl ShiftLog {
         ShiftKind::of(input_n_m, ratio(self.gears[0]), ratio(self.gears[1]))
     }
 }
-
-/// Two gears by their names, as `1-2`.
-pub(crate) fn named_pair(car: &Car, pair: [usize; 2]) -> String {
-    let [from, to] = pair.map(|gear| car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str()));
-    format!("{from}-{to}")
-}

@@ -2,12 +2,12 @@
 
 use std::ops::ControlFlow::Continue;
 
-use car::Car;
+use car::{Car, ShiftCommand};
 use config::CarFile;
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, fit};
 use fit::{Known, ReadingAges, Verdict};
 use observer::Reading;
-use observer::gearbox::{GearCommand, ShiftInput};
+use observer::gearbox::ShiftInput;
 
 use super::drawn::{Case, Drawn, FittedFile as _, car, city, hilly, with_tip_ins};
 
@@ -113,7 +113,7 @@ fn locked(drawn: &Drawn, output_s: f64, output_scale: f64, engine_s: f64) -> Dri
             engine_n_m: None,
             lock_up_applied: true,
             commands: [None; 8],
-            gear: GearCommand { from: gear, to: gear },
+            gear: ShiftCommand::between(gear, gear),
         };
         recorder.push(time_s, &input);
     }

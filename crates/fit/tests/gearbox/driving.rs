@@ -1,11 +1,12 @@
 //! Mass, road load and the reported engine torque from driving between shifts.
 
+use car::ShiftCommand;
 use std::ops::ControlFlow::Continue;
 
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorded, Recorder, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
-use observer::gearbox::{GearCommand, ShiftInput};
+use observer::gearbox::ShiftInput;
 
 use super::drawn::{self, Case, Drawn, FittedFile as _, car, city, hilly};
 
@@ -202,7 +203,7 @@ fn constant_speed_in_one_gear_tells_no_mass() {
                 engine_n_m: None,
                 lock_up_applied: false,
                 commands: [None; 8],
-                gear: GearCommand { from: gear, to: gear },
+                gear: ShiftCommand::between(gear, gear),
             };
             recorder.push(0.01 * at as f64, &input);
         }
@@ -231,7 +232,7 @@ fn what_no_car_does_is_no_driving() {
         recorded(&drawn, &rows).driving.time_s()
     };
     assert_eq!(driving(&|_, row| row.time_s = 1.0), 0.0);
-    assert_eq!(driving(&|_, row| (row.input.gear.from, row.input.gear.to) = (usize::MAX, usize::MAX)), 0.0);
+    assert_eq!(driving(&|_, row| row.input.gear = ShiftCommand::NEUTRAL), 0.0);
     assert_eq!(driving(&|_, row| row.input.turbine_rad_s = Some(Reading::now(1e300))), 0.0);
     assert_eq!(driving(&|_, row| row.input.lock_up_applied = true), 0.0);
     assert_eq!(driving(&|_, row| row.input.engine_rad_s = None), 0.0);

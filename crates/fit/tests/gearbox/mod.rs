@@ -8,8 +8,8 @@ mod pressures;
 use std::ops::ControlFlow::Continue;
 use std::path::Path;
 
-use car::ErrorBudget;
 use car::{Car, CarErrorBounds};
+use car::{ErrorBudget, Gear, ShiftCommand};
 use config::{CarFile, Source};
 use drawn::{Case, Drawn, FittedFile as _, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
@@ -205,9 +205,9 @@ fn what_no_car_does_is_left_out() {
     assert_eq!(recorded(&|_, _, input| input.turbine_rad_s = None).shifts.len(), 0);
     assert_eq!(recorded(&|_, time_s, _| *time_s = 1.0).shifts.len(), 0);
     // A gear of no gearbox, a shift that never ends, and two that change all the time.
-    assert_eq!(recorded(&|_, _, input| input.gear.to = usize::MAX).shifts.len(), 0);
-    assert_eq!(recorded(&|_, _, input| (input.gear.from, input.gear.to) = (1, 2)).shifts.len(), 0);
-    recorded(&|at, _, input| (input.gear.from, input.gear.to) = (1 + at % 3, 2));
+    assert_eq!(recorded(&|_, _, input| input.gear.to = Gear::at(63)).shifts.len(), 0);
+    assert_eq!(recorded(&|_, _, input| input.gear = ShiftCommand::between(1, 2)).shifts.len(), 0);
+    recorded(&|at, _, input| input.gear = ShiftCommand::between(1 + at % 3, 2));
     // Speeds that are huge: the model must not be left with numbers that are none.
     let huge = recorded(&|_, _, input| input.engine_rad_s = Some(Reading::now(1e300)));
     if let Ok(fit) = fit::gearbox::fit(&drawn.file, &tables, &huge.shifts, &huge.driving, &mut |_| Continue(())) {

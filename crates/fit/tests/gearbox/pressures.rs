@@ -220,7 +220,7 @@ fn readings_of_an_element_around_a_shift_show_the_zero_offset_of_its_sensor() {
     let (tables, place) = (drawn.tables(), place_of_c(&drawn));
     let mut recorder = Recorder::new(&drawn.file, &tables, ReadingAges::of(&drawn::sensors()));
     let is_of_c = |input: &ShiftInput<f64>| {
-        let row = tables.tables().shift(input.gear.from, input.gear.to).copied();
+        let row = tables.tables().commanded(input.gear).copied();
         row.and_then(|row| row.clutches.iter().position(|clutch| clutch.element.place() == Some(place)))
     };
     for (time_s, input) in rows(&drawn, 1) {

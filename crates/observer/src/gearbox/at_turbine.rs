@@ -8,10 +8,11 @@
 //! inertia phase, it is that clutch's. What the clutch itself has is `1/alpha` of it, which the ratios do not tell; its pressure
 //! needs its plates and piston besides.
 
+use car::ShiftCommand;
 use drivetrain::Real;
 
 use super::turbine::{Found, MIN_N_M};
-use super::{GearCommand, GearboxFilter, GearboxState, OUTPUT, ShiftPhase, TURBINE, square};
+use super::{GearboxFilter, GearboxState, OUTPUT, ShiftPhase, TURBINE, square};
 
 /// Torque of all clutches together, at the turbine.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +25,7 @@ pub struct ClutchesAtTurbine<T> {
 
 impl<T: Real> GearboxFilter<'_, T> {
     /// Whether a change of the gear is one of a gearbox by its ratios alone, whose torques at the turbine are known.
-    pub(super) fn is_at_turbine(&self, gear: GearCommand) -> bool {
+    pub(super) fn is_at_turbine(&self, gear: ShiftCommand) -> bool {
         self.tables.elements.is_empty() && self.tables.mass(gear).is_some()
     }
 
@@ -32,7 +33,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     pub(super) fn at_turbine(
         &self,
         state: &GearboxState<T>,
-        gear: GearCommand,
+        gear: ShiftCommand,
         input: &Found<T>,
     ) -> Option<ClutchesAtTurbine<T>> {
         if !self.tables.elements.is_empty() || !self.are_read(&state.newest) {
@@ -51,9 +52,9 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// Which gear's speeds the readings show in a shift of such a gearbox.
-    pub(super) fn phase_at_turbine(&self, state: &GearboxState<T>, gear: GearCommand) -> Option<ShiftPhase> {
+    pub(super) fn phase_at_turbine(&self, state: &GearboxState<T>, gear: ShiftCommand) -> Option<ShiftPhase> {
         let speeds = self.measured(&state.newest, None);
-        let is_in = |gear: usize| Some(!self.slip(self.tables.gears.get(gear)?.ratio, speeds).is_over());
+        let is_in = |gear| Some(!self.slip(self.tables.gear(gear)?.ratio, speeds).is_over());
         self.are_read(&state.newest).then_some(match (is_in(gear.from)?, is_in(gear.to)?) {
             (true, _) => ShiftPhase::OffgoingHolds,
             (_, true) => ShiftPhase::OncomingHolds,

@@ -2,11 +2,12 @@
 
 use super::running::TURBINE_ACTS;
 use super::{
-    Compared, FIRST_S, FRACTION, GATE, Gate, Gaussian, GearCommand, GearboxFilter, GearboxState, Health, LOAD,
-    LOAD_START, LOST_S, MISFIT, N, NOT_CAUGHT, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SLIPS_IN_GEAR,
-    SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, Slip, TURBINE, WHEEL,
-    WHEEL_START_RAD_S, at_start, square, turbine,
+    Compared, FIRST_S, FRACTION, GATE, Gate, Gaussian, GearboxFilter, GearboxState, Health, LOAD, LOAD_START, LOST_S,
+    MISFIT, N, NOT_CAUGHT, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SLIPS_IN_GEAR, SLOW_FRACTION,
+    SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, Slip, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start,
+    square, turbine,
 };
+use car::ShiftCommand;
 use drivetrain::Real;
 
 impl<T: Real> GearboxFilter<'_, T> {
@@ -60,7 +61,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             let stands = state.running.is_none();
             state.launches = stands && self.turbine.converter.is_none() && (state.launches || slow || opens);
             state.slips = stands && !slow && !state.launches && !overruns && (state.slips || slips);
-            let neutral = [input.gear.from, input.gear.to] == [GearCommand::NEUTRAL; 2];
+            let neutral = input.gear == ShiftCommand::NEUTRAL;
             health = match (stands && neutral, stands && slow, state.launches && slips, state.slips) {
                 (true, ..) => Health::ClutchOpen,
                 (_, true, ..) => Health::TooSlow,
@@ -77,13 +78,13 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// Slip of the gear that is commanded.
-    fn slip_in_gear(&self, gear: GearCommand, speeds: [T; 2]) -> Option<Slip<T>> {
-        let row = self.tables.gears.get(gear.to).filter(|_| gear.from == gear.to)?;
+    fn slip_in_gear(&self, gear: ShiftCommand, speeds: [T; 2]) -> Option<Slip<T>> {
+        let row = self.tables.gear(gear.to).filter(|_| gear.is_steady())?;
         Some(self.slip(row.ratio, speeds))
     }
 
     /// Whether the turbine turns slower than the gear would let it, behind a one-way clutch that overruns.
-    fn overruns(&self, gear: GearCommand, speeds: [T; 2]) -> bool {
+    fn overruns(&self, gear: ShiftCommand, speeds: [T; 2]) -> bool {
         // The slip comes first: the tables are not searched in every step.
         let is_slower = self.slip_in_gear(gear, speeds).is_some_and(|slip| slip.is_over() && slip.value < T::zero());
         is_slower && self.tables.is_one_way(gear.to)
@@ -91,7 +92,7 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// Whether it may begin to do so where the readings do not show it yet: an element that slips makes the turbine faster. In a shift
     /// it does while the car coasts.
-    fn may_overrun(&self, running: &Running<T>, gear: GearCommand, speeds: [T; 2]) -> bool {
+    fn may_overrun(&self, running: &Running<T>, gear: ShiftCommand, speeds: [T; 2]) -> bool {
         let in_gear = self.slip_in_gear(gear, speeds).is_some_and(|slip| !slip.is_over() || slip.value < T::zero())
             && self.tables.is_one_way(gear.to);
         let coasts = running.phase.phase == ShiftPhase::BothSlip && running.slow_n_m <= T::zero();
@@ -105,8 +106,8 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// Whether the command opens the clutch that ties the engine of a car without a converter to a gear.
-    pub(super) fn is_open(&self, state: &GearboxState<T>, gear: GearCommand) -> bool {
-        if self.turbine.converter.is_some() || gear.from != gear.to {
+    pub(super) fn is_open(&self, state: &GearboxState<T>, gear: ShiftCommand) -> bool {
+        if self.turbine.converter.is_some() || !gear.is_steady() {
             return false;
         }
         let found =
@@ -133,23 +134,23 @@ impl<T: Real> GearboxFilter<'_, T> {
         if output.abs() <= self.uncertainty.output_least_rad_s {
             return (None, false);
         }
-        let shift = self.tables.shift(gear.from, gear.to).copied().filter(|_| gear.from != gear.to);
+        let shift = self.tables.commanded(gear).copied();
         let held = [(gear.from, ShiftPhase::OffgoingHolds), (gear.to, ShiftPhase::OncomingHolds)].into_iter().find_map(
             |(gear, phase)| {
-                let ratio = self.tables.gears.get(gear)?.ratio;
+                let ratio = self.tables.gear(gear)?.ratio;
                 (!self.slip(ratio, [turbine, output]).is_over()).then_some((ratio, phase))
             },
         );
         // Of a gear that is in no table nothing can be said.
-        let known = self.tables.gears.get(gear.from).is_some();
+        let known = self.tables.gear(gear.from).is_some();
         // Behind a one-way clutch that overruns the turbine turns freely.
         let is_free = |shift: &ShiftRow<T>| {
             let [off, _] = &shift.clutches;
             off.is_one_way() && self.slip(off.ratio, [turbine, output]).value < T::zero()
         };
         let held = held.or(shift.as_ref().filter(|shift| is_free(shift)).map(|_| (T::zero(), ShiftPhase::BothSlip)));
-        let Some((ratio, phase)) = held else { return (None, known && gear.from == gear.to) };
-        if gear.from != gear.to && shift.is_none() {
+        let Some((ratio, phase)) = held else { return (None, known && gear.is_steady()) };
+        if !gear.is_steady() && shift.is_none() {
             return (None, false);
         }
         let phase = if shift.is_some() { phase } else { ShiftPhase::InGear };

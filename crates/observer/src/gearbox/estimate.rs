@@ -1,14 +1,15 @@
 //! What the filter says after a step.
 
+use car::ShiftCommand;
 use drivetrain::Real;
 
 use super::elements::{ElementState, PressureError};
 use super::phases::Slip;
 use super::powertrain::{ClutchTorque, Torques};
 use super::{
-    ClutchesAtTurbine, FRACTION, FRICTION, GearCommand, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS,
-    N, Newest, OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftElement, ShiftInput, ShiftPhase,
-    ShiftRow, WHEEL, square,
+    ClutchesAtTurbine, FRACTION, FRICTION, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS, N, Newest,
+    OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftElement, ShiftInput, ShiftPhase, ShiftRow,
+    WHEEL, square,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -50,7 +51,7 @@ pub struct ClutchEstimate<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftEstimate<T> {
     /// The gear or shift that the filter is in; none while it has only the valve models.
-    pub gear: Option<GearCommand>,
+    pub gear: Option<ShiftCommand>,
     /// Which clutches hold.
     pub phase: Option<ShiftPhase>,
     /// The offgoing and the oncoming clutch of the shift; none in a gear.
@@ -131,8 +132,8 @@ impl<T: Real> GearboxFilter<'_, T> {
                         + x[SLOW_FRACTION] * torques.slow_fraction_n_m
                 });
                 estimate.gear = Some(match &running.shift {
-                    Some(shift) => GearCommand { from: shift.from, to: shift.to },
-                    None => GearCommand { from: running.gear, to: running.gear },
+                    Some(shift) => shift.command(),
+                    None => ShiftCommand { from: running.gear, to: running.gear },
                 });
                 estimate.phase = Some(running.phase.phase);
                 estimate.shaft_n_m = Some(x[SPRING] + damper);
@@ -152,9 +153,9 @@ impl<T: Real> GearboxFilter<'_, T> {
                 });
             }
             None => {
-                let GearCommand { from, to } = input.gear;
-                let at_turbine = from != to && self.is_at_turbine(input.gear);
-                let is_modelled = from == to || at_turbine || self.tables.shift(from, to).is_some();
+                let shift = self.tables.commanded(input.gear);
+                let at_turbine = !input.gear.is_steady() && self.is_at_turbine(input.gear);
+                let is_modelled = input.gear.is_steady() || at_turbine || shift.is_some();
                 let without = match is_modelled || !self.are_read(&state.newest) {
                     true => Health::SpeedsRejected,
                     false => Health::ShiftNotModelled,
@@ -167,21 +168,18 @@ impl<T: Real> GearboxFilter<'_, T> {
                     health = without;
                 }
                 let then = self.measured(&state.newest, None);
-                estimate.clutches =
-                    self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(
-                        |shift| {
-                            let learnt = state.learnt.known_mean(&self.acting(shift));
-                            [0, 1].map(|c| {
-                                let clutch = &shift.clutches[c];
-                                let lasting = [learnt[c], learnt[c + 2]];
-                                let slip = self.slip(clutch.ratio, then);
-                                let direction = Self::direction_by_valve(&slip, turbine_n_m);
-                                let estimate = self.by_valve(&state.elements, clutch, [slip.value, direction], lasting);
-                                let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
-                                self.in_range(estimate, &state.elements, (clutch, is_tied), &state.newest)
-                            })
-                        },
-                    );
+                estimate.clutches = shift.map(|shift| {
+                    let learnt = state.learnt.known_mean(&self.acting(shift));
+                    [0, 1].map(|c| {
+                        let clutch = &shift.clutches[c];
+                        let lasting = [learnt[c], learnt[c + 2]];
+                        let slip = self.slip(clutch.ratio, then);
+                        let direction = Self::direction_by_valve(&slip, turbine_n_m);
+                        let estimate = self.by_valve(&state.elements, clutch, [slip.value, direction], lasting);
+                        let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
+                        self.in_range(estimate, &state.elements, (clutch, is_tied), &state.newest)
+                    })
+                });
             }
         }
         state.estimate.health = health;

@@ -11,10 +11,11 @@
 //! It holds where the upper bound of this torque is below the lower bound of its capacity. The inertia of shafts inside the gearbox is left out.
 //! An element whose command was never read is taken to hold.
 
+use car::ShiftCommand;
 use drivetrain::Real;
 
 use super::turbine::Found;
-use super::{GearCommand, GearboxFilter, GearboxState, OUTPUT, ShiftRow, TURBINE};
+use super::{GearboxFilter, GearboxState, OUTPUT, ShiftRow, TURBINE};
 
 /// A bound of a uniform distribution over its standard deviation.
 const BOUND: f64 = 1.732_050_807_568_877_2;
@@ -24,8 +25,8 @@ const NOISE: f64 = 3.0;
 impl<T: Real> GearboxFilter<'_, T> {
     /// Follows whether an element that is engaged in both gears may slip. Once it may, it may until the gear holds: a slip that has begun does
     /// not end as soon as the torque is small enough.
-    pub(super) fn follow_held(&self, state: &mut GearboxState<T>, command: GearCommand, torque: Option<&Found<T>>) {
-        let may_slip = match self.tables.shift(command.from, command.to).filter(|_| command.from != command.to) {
+    pub(super) fn follow_held(&self, state: &mut GearboxState<T>, command: ShiftCommand, torque: Option<&Found<T>>) {
+        let may_slip = match self.tables.commanded(command) {
             None => false,
             Some(_) if state.held_may_slip || state.slips => true,
             Some(shift) => !self.all_hold(state, shift, torque),

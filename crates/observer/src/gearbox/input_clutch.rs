@@ -57,11 +57,10 @@ impl<T: Real> GearboxFilter<'_, T> {
         if self.turbine.converter.is_some() {
             return self.turbine.lock_up(side);
         }
-        let gear = input.gear.from;
-        if input.gear.to != gear {
+        if !input.gear.is_steady() {
             return None;
         }
-        let shift = self.tables.out_of(gear)?;
+        let shift = self.tables.out_of(input.gear.from)?;
         let reported = side.reported_n_m?;
         let (acceleration, acceleration_variance) = match side.engine {
             Some([_, _, acceleration, variance]) => (acceleration, variance),

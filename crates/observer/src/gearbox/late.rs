@@ -169,7 +169,8 @@ impl<T: Real> GearboxFilter<'_, T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::GearCommand;
+    use car::ShiftCommand;
+
     use super::*;
 
     fn input(dt_s: f64, command: f64) -> ShiftInput<f64> {
@@ -184,7 +185,7 @@ mod tests {
             engine_n_m: None,
             lock_up_applied: false,
             commands,
-            gear: GearCommand { from: 0, to: 0 },
+            gear: ShiftCommand::between(0, 0),
         }
     }
 

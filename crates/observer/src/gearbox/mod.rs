@@ -54,6 +54,7 @@ mod timing;
 mod turbine;
 mod uncertainty;
 
+use car::{Gear, ShiftCommand};
 use drivetrain::{Driveline, Real};
 
 use crate::kalman::engine::Engine;
@@ -141,20 +142,6 @@ const SLIPS_IN_GEAR: u8 = 3;
 /// The same after a shift to a gear whose one-way clutch has not caught the turbine \[chosen\]: half a second of a log at 100 Hz.
 const NOT_CAUGHT: u8 = 50;
 
-/// The gear, or the shift, that the controller commands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct GearCommand {
-    /// The gear before, by its place in [`GearboxTables::gears`].
-    pub from: usize,
-    /// The gear after; the same gear while there is no shift.
-    pub to: usize,
-}
-
-impl GearCommand {
-    /// The place of neutral, which is in no table.
-    pub const NEUTRAL: usize = usize::MAX;
-}
-
 /// What came since the step before: of each channel the newest reading, or none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftInput<T> {
@@ -175,7 +162,8 @@ pub struct ShiftInput<T> {
     /// Commands of the valves, in the order of [`GearboxTables::elements`]: current in A, or duty cycle in %.
     pub commands: [Option<Reading<T>>; MAX_ELEMENTS],
     /// Gear or shift.
-    pub gear: GearCommand,
+    /// The gear, or the shift, that the controller commands, by places in [`GearboxTables::gears`].
+    pub gear: ShiftCommand,
 }
 
 /// The filter.
@@ -230,7 +218,7 @@ pub struct GearboxState<T> {
     /// Without a converter: whether the clutch of the gear was open, or the car slow, and no gear has fitted since.
     launches: bool,
     /// The gears of the newest step, and since when they have been these, s.
-    gears: (GearCommand, T),
+    gears: (ShiftCommand, T),
     learnt: Learnt<T>,
     /// Time since what is learnt was last let fade, s.
     fading_s: T,
@@ -242,7 +230,7 @@ pub struct GearboxState<T> {
 struct Running<T> {
     x: Gaussian<T>,
     /// The gear, while there is no shift.
-    gear: usize,
+    gear: Gear,
     /// The shift.
     shift: Option<ShiftRow<T>>,
     phase: PhaseMemory<T>,
@@ -316,7 +304,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             slips: false,
             held_may_slip: false,
             launches: false,
-            gears: (GearCommand { from: GearCommand::NEUTRAL, to: GearCommand::NEUTRAL }, T::zero()),
+            gears: (ShiftCommand::NEUTRAL, T::zero()),
             learnt: *learnt,
             fading_s: T::zero(),
             estimate: ShiftEstimate::nothing(),
@@ -416,23 +404,27 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// Follows the shift command.
-    fn take_gear(&self, state: &mut GearboxState<T>, command: GearCommand) -> Health {
+    fn take_gear(&self, state: &mut GearboxState<T>, command: ShiftCommand) -> Health {
         let opens = self.is_open(state, command);
         let (learnt, fading_s, elements) = (&mut state.learnt, &mut state.fading_s, &mut state.elements);
         let Some(running) = &mut state.running else { return Health::Good };
-        let in_gear = command.from == command.to;
+        let in_gear = command.is_steady();
         match running.shift {
             None if in_gear && command.to == running.gear => Health::Good,
-            Some(shift) if !in_gear && (shift.from, shift.to) == (command.from, command.to) => Health::Good,
-            Some(shift) if in_gear && (command.to == shift.to || command.to == shift.from) => {
+            Some(shift) if !in_gear && shift.command() == command => Health::Good,
+            Some(shift) if in_gear && [shift.command().from, shift.command().to].contains(&command.to) => {
                 // The command may say so before the clutch holds.
-                let ends = if command.to == shift.to { ShiftPhase::OncomingHolds } else { ShiftPhase::OffgoingHolds };
+                let ends = if command.to == shift.command().to {
+                    ShiftPhase::OncomingHolds
+                } else {
+                    ShiftPhase::OffgoingHolds
+                };
                 if running.phase.phase == ends {
                     self.end_shift(running, command.to, learnt);
                 }
                 Health::Good
             }
-            _ => match self.tables.shift(command.from, command.to).filter(|_| !in_gear) {
+            _ => match self.tables.commanded(command) {
                 Some(shift) => {
                     let speeds = self.measured(&state.newest, Some(running));
                     let slips = shift.clutches.map(|clutch| self.slip(clutch.ratio, speeds));

@@ -11,6 +11,7 @@
 //! two of these above 1 counts, so that readings as stated are used as stated. Neither state nor equations of the filter take part: a wrong model cannot take
 //! its error for noise. Readings near standstill are left out: a wheel that stands has none.
 
+use car::Gear;
 use drivetrain::Real;
 
 use super::{GearboxFilter, GearboxState, Newest, OUTPUT, Reading, ShiftInput, TURBINE, square};
@@ -26,7 +27,7 @@ const OUTLIER: f64 = 5.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ReadingNoise<T> {
     /// The slip in the step before, rad/s, and the gear that it is of.
-    before: Option<(T, usize)>,
+    before: Option<(T, Gear)>,
     /// Mean of the squared differences over what is stated.
     mean: T,
     /// How many are in the mean.
@@ -52,7 +53,7 @@ impl<T: Real> ReadingNoise<T> {
     }
 
     /// Takes the slip in a gear, rad/s, and its stated variance.
-    fn take(&mut self, slip: T, gear: usize, variance: T) {
+    fn take(&mut self, slip: T, gear: Gear, variance: T) {
         let before = self.before.replace((slip, gear));
         let Some((before, _)) = before.filter(|&(_, of)| of == gear) else { return };
         let maximum = square(T::of(OUTLIER)) * self.mean.at_least(T::one());
@@ -84,7 +85,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Takes the readings of turbine and output that came together in a gear.
     pub(super) fn take_noise(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) {
         let gear = input.gear.to;
-        let row = self.tables.gears.get(gear).filter(|_| input.gear.from == gear);
+        let row = self.tables.gear(gear).filter(|_| input.gear.is_steady());
         let came = |k: usize, reading: &Option<Reading<T>>| {
             state.newest[k].filter(|newest| reading.is_some() && !newest.refused)
         };
@@ -114,7 +115,11 @@ mod tests {
         let (mut noise, mut random) = (ReadingNoise::stated(), Pcg64Mcg::new(u128::from(seed)));
         for k in 0..count {
             let normal: f64 = StandardNormal.sample(&mut random);
-            noise.take(slip(0.01 * f64::from(k)) + times * STATED_RAD_S * normal, 2, STATED_RAD_S * STATED_RAD_S);
+            noise.take(
+                slip(0.01 * f64::from(k)) + times * STATED_RAD_S * normal,
+                Gear::at(2),
+                STATED_RAD_S * STATED_RAD_S,
+            );
         }
         noise.factor()
     }
@@ -150,12 +155,12 @@ mod tests {
         assert!(factor(1, 400, 1.0, outlier) < 1.1);
         let mut noise = ReadingNoise::stated();
         for k in 0..100_u8 {
-            let gear = usize::from(k / 20);
+            let gear = Gear::at(usize::from(k / 20));
             noise.take(100.0 * f64::from(k / 20), gear, STATED_RAD_S * STATED_RAD_S);
         }
         assert_eq!(noise.factor(), 1.0);
-        noise.take(f64::NAN, 0, STATED_RAD_S * STATED_RAD_S);
-        noise.take(f64::INFINITY, 0, 0.0);
+        noise.take(f64::NAN, Gear::at(0), STATED_RAD_S * STATED_RAD_S);
+        noise.take(f64::INFINITY, Gear::at(0), 0.0);
         assert_eq!(noise.factor(), 1.0);
     }
 }

@@ -17,7 +17,7 @@ impl<T: Real> GearboxFilter<'_, T> {
                 let ratio = shift.clutches[held.min(1)].ratio;
                 tied(ratio, shift.inertia_at(ratio))
             }
-            (None, _) => match self.tables.gears.get(running.gear) {
+            (None, _) => match self.tables.gear(running.gear) {
                 Some(gear) => tied(gear.ratio, gear.inertia_kg_m2),
                 None => [[T::zero(); 2]; 2],
             },
@@ -154,7 +154,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     pub(super) fn tied_ratio(&self, running: &Running<T>) -> Option<T> {
         match (&running.shift, running.phase.phase.holding()) {
             (Some(shift), held) => held.map(|held| shift.clutches[held.min(1)].ratio),
-            (None, _) => self.tables.gears.get(running.gear).map(|gear| gear.ratio),
+            (None, _) => self.tables.gear(running.gear).map(|gear| gear.ratio),
         }
     }
 

@@ -1,10 +1,10 @@
 //! What a step gives: commands, readings, and from them slip and torque at the gearbox input.
 
 use super::{
-    ChannelHealth, Channels, Engine, FIRST_S, GearCommand, GearboxFilter, GearboxState, InputSide, LOST_S,
-    MAX_ELEMENTS, Newest, OUTPUT, Reading, Running, SPEEDS, ShiftElement, ShiftInput, Slip, SpeedReading, TURBINE,
-    Verdict, pieces, square,
+    ChannelHealth, Channels, Engine, FIRST_S, GearboxFilter, GearboxState, InputSide, LOST_S, MAX_ELEMENTS, Newest,
+    OUTPUT, Reading, Running, SPEEDS, ShiftElement, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, pieces, square,
 };
+use car::ShiftCommand;
 use drivetrain::Real;
 
 /// Largest torque over the largest speed that is one of an engine, N m s \[chosen\]: far above all.
@@ -35,10 +35,10 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// The health of all commands together: a refused one first, then a lost one of an element that shifts, which is what the
     /// estimate rests on.
-    pub(super) fn of_commands(&self, each: &[ChannelHealth; MAX_ELEMENTS], gear: GearCommand) -> ChannelHealth {
+    pub(super) fn of_commands(&self, each: &[ChannelHealth; MAX_ELEMENTS], gear: ShiftCommand) -> ChannelHealth {
         let is = |health: ChannelHealth| each.contains(&health);
         let lost = || {
-            let shift = self.tables.shift(gear.from, gear.to).filter(|_| gear.from != gear.to);
+            let shift = self.tables.commanded(gear);
             let elements = shift.map(|shift| shift.clutches.map(|clutch| clutch.element));
             let places = elements.into_iter().flatten().filter_map(ShiftElement::place);
             places.into_iter().any(|place| each.get(place) == Some(&ChannelHealth::Lost))

@@ -6,6 +6,7 @@ use super::{
     INERTIA, KISS, Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running,
     SCALE, SLOW_FRACTION, STATES_ACTING, ShiftElement, ShiftPhase, ShiftRow, Slip,
 };
+use car::Gear;
 use drivetrain::Real;
 
 /// Place of the torque at the gearbox input among the lasting states.
@@ -188,7 +189,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// The gear holds, and the shift is learnt from.
-    pub(super) fn end_shift(&self, running: &mut Running<T>, gear: usize, learnt: &mut Learnt<T>) {
+    pub(super) fn end_shift(&self, running: &mut Running<T>, gear: Gear, learnt: &mut Learnt<T>) {
         if let Some((before, shift)) = running.before.take().zip(running.shift) {
             let correlations = self.correlations();
             let shown = running.x.timing.together(before, running.lasting()).filter(|_| running.x.is_sound());

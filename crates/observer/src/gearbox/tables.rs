@@ -7,10 +7,11 @@
 //! M12 w_t' + M22 w_o' = -T_o + i_off U_off + i_on U_on          slip of element c = alpha_c (w_t - i_c w_o)
 //! ```
 
+use car::{Gear, ShiftCommand};
 use drivetrain::{Clutch, Real, ReducedShift};
 
+use super::ElementUncertainty;
 use super::pistons::Piston;
-use super::{ElementUncertainty, GearCommand};
 use crate::{Budget, Reading, ValveModel};
 
 /// Most clutches and brakes of a gearbox.
@@ -178,6 +179,12 @@ impl<T: Real> ShiftRow<T> {
         }
     }
 
+    /// As the controller commands it.
+    #[inline]
+    pub fn command(&self) -> ShiftCommand {
+        ShiftCommand::between(self.from, self.to)
+    }
+
     /// Whether the slip of its offgoing (0) or oncoming clutch (1) is that of the speeds, so long after the request.
     pub(super) fn is_tied(&self, clutch: usize, since_s: T) -> bool {
         clutch == 0 || !self.has_dog || since_s >= T::of(DOG_S)
@@ -229,6 +236,12 @@ impl<T: Real> FrictionElement<T> {
 }
 
 impl<'a, T: Real> GearboxTables<'a, T> {
+    /// A gear; `None` in neutral, and of a gear that is not in the tables.
+    #[inline]
+    pub fn gear(&self, gear: Gear) -> Option<&'a GearRow<T>> {
+        self.gears.get(gear.place()?)
+    }
+
     /// A clutch or brake that changes in a shift; `None` of an element that is not in the tables.
     #[inline]
     pub fn element(&self, of: ShiftElement) -> Option<&'a FrictionElement<T>> {
@@ -242,31 +255,36 @@ impl<'a, T: Real> GearboxTables<'a, T> {
     }
 
     /// A shift out of a gear: in the gear its balance of the turbine holds with the offgoing clutch alone.
-    pub(super) fn out_of(&self, gear: usize) -> Option<&ShiftRow<T>> {
-        self.shifts.iter().find(|shift| shift.from == gear)
+    pub(super) fn out_of(&self, gear: Gear) -> Option<&ShiftRow<T>> {
+        self.shifts.iter().find(|shift| shift.command().from == gear)
     }
 
     /// Mass of turbine and output speed in a gear or in a shift, kg m^2.
-    pub(super) fn mass(&self, gear: GearCommand) -> Option<&[[T; 2]; 2]> {
-        let of_shift = |row: &&ShiftRow<T>| (row.from, row.to) == (gear.from, gear.to);
-        let row = if gear.from == gear.to { self.out_of(gear.from) } else { self.shifts.iter().find(of_shift) };
+    pub(super) fn mass(&self, command: ShiftCommand) -> Option<&[[T; 2]; 2]> {
+        let of_shift = |row: &&ShiftRow<T>| row.command() == command;
+        let row = if command.is_steady() { self.out_of(command.from) } else { self.shifts.iter().find(of_shift) };
         row.map(|row| &row.mass_kg_m2)
     }
 
     /// Whether a one-way clutch holds a gear.
-    pub(super) fn is_one_way(&self, gear: usize) -> bool {
+    pub(super) fn is_one_way(&self, gear: Gear) -> bool {
         let holds = |row: &ShiftRow<T>| {
-            let [off, on] = &row.clutches;
-            (row.from == gear && off.is_one_way()) || (row.to == gear && on.is_one_way())
+            let ([off, on], ShiftCommand { from, to }) = (&row.clutches, row.command());
+            (from == gear && off.is_one_way()) || (to == gear && on.is_one_way())
         };
         self.shifts.iter().any(holds)
     }
 
     /// The shift between two gears, if it is one between two known elements.
     pub fn shift(&self, from: usize, to: usize) -> Option<&ShiftRow<T>> {
+        self.commanded(ShiftCommand::between(from, to))
+    }
+
+    /// The shift that is commanded, if it is one between two known elements; `None` in a gear.
+    pub fn commanded(&self, command: ShiftCommand) -> Option<&ShiftRow<T>> {
         let elements = self.elements.len().min(MAX_ELEMENTS);
         let known = |row: &&ShiftRow<T>| {
-            (row.from, row.to) == (from, to)
+            row.command() == command
                 && row
                     .clutches
                     .iter()

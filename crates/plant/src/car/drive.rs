@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use car::{Car, Drive, ShiftPlan, ShiftSchedule};
+use car::{Car, Drive, ShiftCommand, ShiftPlan, ShiftSchedule};
 
 use super::controller::CarCalibration;
 use super::follow::{Follower, SpeedError};
@@ -48,7 +48,7 @@ pub struct OverSpeed {
     /// The end of the torque map, rad/s.
     pub map_rad_s: f64,
     /// The gear, and the gear that is asked for.
-    pub gears: [usize; 2],
+    pub gears: ShiftCommand,
 }
 
 /// Simulates a drive and shows every sample to `record`. `nominal` is the car of the shift controller's model.
@@ -84,7 +84,7 @@ pub fn simulate_car_drive(
         let map_rad_s = model.car.engine.torque_n_m.rows().last().copied().unwrap_or(f64::INFINITY);
         if engine_rad_s > summary.over_speed.map_or(map_rad_s, |over| over.engine_rad_s) {
             let gear = run.controller().gear();
-            let gears = [gear, run.controller().shift().map_or(gear, |shift| shift.to)];
+            let gears = ShiftCommand::between(gear, run.controller().shift().map_or(gear, |shift| shift.to));
             summary.over_speed = Some(OverSpeed { time_s: now_s, engine_rad_s, map_rad_s, gears });
         }
         shifting.step(&mut run, &driver)?;

@@ -44,6 +44,6 @@ pub use integrate::{CarError, CarIntegrator, CarStep};
 pub use model::{CarInputs, CarModel, CarState, CarTorques, MAX_PACKS};
 pub use run::{CarRun, Driver};
 pub use sample::{CarSample, ElementSample, ShiftUnderWay};
-pub use shift::{BeyondGears, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR, simulate_car_shift};
+pub use shift::{BeyondGears, CarShift, CarShiftQuality, CarShiftRating, simulate_car_shift};
 pub use start::idle_throttle;
 pub use valves::CarValves;

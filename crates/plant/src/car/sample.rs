@@ -6,6 +6,7 @@ use super::model::{CarModel, CarTorques};
 use super::run::Driver;
 use crate::Contact;
 use crate::gear_train::MAX_ELEMENTS;
+use car::{Gear, ShiftCommand};
 
 /// One friction element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,13 +81,15 @@ pub struct CarSample {
 }
 
 impl CarSample {
-    /// The gear that is engaged or left, and the gear that is wanted; `None` is neutral.
-    pub fn gears(&self) -> [Option<usize>; 2] {
-        match &self.shift {
-            Some(shift) => [Some(shift.from).filter(|_| !shift.is_from_neutral), Some(shift.to)],
-            None if self.is_neutral => [self.left, None],
-            None => [Some(self.gear); 2],
-        }
+    /// The gear that is engaged or left, and the gear that is wanted.
+    pub fn gears(&self) -> ShiftCommand {
+        let [from, to] = match &self.shift {
+            Some(shift) if shift.is_from_neutral => [Gear::Neutral, Gear::at(shift.to)],
+            Some(shift) => [shift.from, shift.to].map(Gear::at),
+            None if self.is_neutral => [self.left.map_or(Gear::Neutral, Gear::at), Gear::Neutral],
+            None => [Gear::at(self.gear); 2],
+        };
+        ShiftCommand { from, to }
     }
 
     /// At a time within a step.

@@ -1,8 +1,8 @@
 //! One shift of a car.
 
-use car::Car;
+use car::{Car, ShiftCommand};
 use drivetrain::PeakJerk;
-use geartrain::{Change, Gearbox};
+use geartrain::Change;
 
 use super::controller::{CarCalibration, ShiftStage};
 use super::integrate::CarError;
@@ -79,7 +79,7 @@ pub fn simulate_car_shift(
     let state = model.in_gear(shift.from, Some(shift.to), shift.vehicle_m_s, shift.throttle)?;
     let mut run = CarRun::new(model, nominal, calibration, shift.from, state, (driver, shift.sample_time_s))?;
     run.preselect(Some(shift.to));
-    let mut rating = CarShiftRating::new(model, shift);
+    let mut rating = CarShiftRating::new(model, ShiftCommand::between(shift.from, shift.to), shift.request_s);
     let mut requested = false;
     while run.time_s() < shift.duration_s - 1e-9 {
         if !requested && run.time_s() >= shift.request_s - 1e-9 {
@@ -110,10 +110,10 @@ pub struct BeyondGears {
 }
 
 impl BeyondGears {
-    /// Between gears of these ratios; `gears` are their places.
-    pub fn new(gearbox: &Gearbox, gears: [usize; 2], ratios: [f64; 2]) -> Self {
-        let single = gearbox.shift(gears[0], gears[1]).and_then(|shift| shift.change.single());
-        let [overruns, catches] = single.map_or([false; 2], |elements| elements.map(|at| gearbox.is_one_way(at)));
+    /// Between the gears of a shift with these ratios.
+    pub fn new(car: &Car, shift: ShiftCommand, ratios: [f64; 2]) -> Self {
+        let single = car.single_shift(shift);
+        let [overruns, catches] = single.map_or([false; 2], |elements| elements.map(|at| car.gearbox.is_one_way(at)));
         Self { ratios, catches, was_before: !overruns }
     }
 
@@ -132,16 +132,14 @@ impl BeyondGears {
     }
 }
 
-/// The place of neutral among the gears: that of no gear.
-pub const NO_GEAR: usize = usize::MAX;
-
 /// A shift is rated until this time after its end, s.
 const RATED_AFTER_S: f64 = 0.5;
 
 /// Rates a shift sample by sample.
 #[derive(Debug, Clone)]
 pub struct CarShiftRating {
-    shift: CarShift,
+    shift: ShiftCommand,
+    request_s: f64,
     beyond: BeyondGears,
     alphas: [f64; 2],
     held: Vec<usize>,
@@ -151,19 +149,21 @@ pub struct CarShiftRating {
 }
 
 impl CarShiftRating {
-    /// Of a shift between these gears that is requested at `request_s`.
-    pub fn new(model: &CarModel, shift: &CarShift) -> Self {
-        let reduced = model.car.gearbox.shift(shift.from, shift.to).and_then(|shift| shift.reduced);
-        let (ratios, alphas) = reduced.map_or(([1.0; 2], [1.0; 2]), |r| {
+    /// Of a shift between these gears that is requested at this time, s.
+    pub fn new(model: &CarModel, shift: ShiftCommand, request_s: f64) -> Self {
+        let gearbox = &model.car.gearbox;
+        let found = shift.from.place().zip(shift.to.place()).and_then(|(from, to)| gearbox.shift(from, to));
+        let (ratios, alphas) = found.and_then(|shift| shift.reduced).map_or(([1.0; 2], [1.0; 2]), |r| {
             ([r.ratio_offgoing(), r.ratio_oncoming()], [r.slip_offgoing[0], r.slip_oncoming[0]])
         });
-        let held = match model.car.gearbox.shift(shift.from, shift.to).map(|shift| &shift.change) {
+        let held = match found.map(|shift| &shift.change) {
             Some(Change::Single { held, .. }) => held.clone(),
             _ => Vec::new(),
         };
         Self {
-            shift: *shift,
-            beyond: BeyondGears::new(&model.car.gearbox, [shift.from, shift.to], ratios),
+            shift,
+            request_s,
+            beyond: BeyondGears::new(&model.car, shift, ratios),
             alphas,
             held,
             quality: CarShiftQuality::default(),
@@ -180,8 +180,8 @@ impl CarShiftRating {
     /// Takes the next sample.
     pub fn push(&mut self, sample: &CarSample) {
         let q = &mut self.quality;
-        let after = sample.time_s >= self.shift.request_s - 1e-9;
-        let since_complete_s = q.complete_s.map_or(0.0, |complete_s| sample.time_s - self.shift.request_s - complete_s);
+        let after = sample.time_s >= self.request_s - 1e-9;
+        let since_complete_s = q.complete_s.map_or(0.0, |complete_s| sample.time_s - self.request_s - complete_s);
         if since_complete_s > RATED_AFTER_S {
             return;
         }
@@ -196,8 +196,8 @@ impl CarShiftRating {
         }
         self.beyond.push(q, [sample.torques.turbine_rad_s, sample.torques.output_rad_s]);
         let Some(shift) = &sample.shift else {
-            if sample.gears() == [Some(self.shift.to).filter(|&to| to != NO_GEAR); 2] {
-                q.complete_s.get_or_insert(sample.time_s - self.shift.request_s);
+            if sample.gears() == (ShiftCommand { from: self.shift.to, ..self.shift }) {
+                q.complete_s.get_or_insert(sample.time_s - self.request_s);
             }
             return;
         };

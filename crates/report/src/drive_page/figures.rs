@@ -1,12 +1,12 @@
 //! Figures of a drive and of its shifts.
 
-use car::Car;
+use car::{Car, Gear};
 use observer::Health;
 use study::gearbox::drive::{DriveState, ScoredDrive, ScoredShift};
 use study::gearbox::{ClutchRow, ShiftScoreRow, TruePhase};
 use trace::units::{km_h, mpa, rpm};
 
-use super::{MAX_DRAWN, clutch_names, name};
+use super::{MAX_DRAWN, clutch_names};
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
 use crate::log_page::{ESTIMATE, health_panel};
 use crate::motion::motion_panels;
@@ -28,10 +28,10 @@ const MIN_MPA: f64 = 0.2;
 const OPEN_LOOP: Stroke = Stroke { colour: "#767676", weight: Weight::Rival, dash: Some("6 3") };
 
 /// The gear as a number for an axis: its name where that is a number, else its place among the forward gears.
-fn gear_number(car: &Car, gear: usize) -> f64 {
-    let place = car.gearbox.forward_gears().iter().position(|&forward| forward == gear);
+fn gear_number(car: &Car, gear: Gear) -> f64 {
+    let place = car.gearbox.forward_gears().iter().position(|&forward| Gear::at(forward) == gear);
     let place = place.map_or(0.0, |place| place as f64 + 1.0);
-    name(car, gear).parse().unwrap_or(place)
+    car.gear_name(gear).parse().unwrap_or(place)
 }
 
 /// The gear over time. A step takes `wide_s`, because a figure draws only one of points that lie closer.
@@ -111,16 +111,16 @@ pub(super) fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) 
         stroke,
         points: states.iter().map(|state| (state.time_s, rpm(value(state)))).collect(),
     };
-    let in_gear = |gear: usize, stroke: Stroke| {
-        let ratio = car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
-        speed(format!("turbine in gear {}", name(car, gear)), stroke, &|state| ratio * state.speeds_rad_s[2])
+    let in_gear = |gear: Gear, stroke: Stroke| {
+        let ratio = car.ratio(gear).unwrap_or(f64::NAN);
+        speed(format!("turbine in gear {}", car.gear_name(gear)), stroke, &|state| ratio * state.speeds_rad_s[2])
     };
     let dotted = |dash| Stroke { weight: Weight::Rival, dash: Some(dash), ..Stroke::SIGNAL };
     let speeds = vec![
         speed("engine".to_owned(), Stroke::THIRD, &|state| state.speeds_rad_s[0]),
         speed("turbine".to_owned(), Stroke::SIGNAL, &|state| state.speeds_rad_s[1]),
-        in_gear(shift.from, dotted("2.5 2")),
-        in_gear(shift.to, dotted("9 2.5 2 2.5")),
+        in_gear(shift.gears.from, dotted("2.5 2")),
+        in_gear(shift.gears.to, dotted("9 2.5 2 2.5")),
     ];
     let mut panels = vec![panel("speed (rpm)", 120.0, speeds)];
     let names = clutch_names(shift, car);

@@ -78,7 +78,7 @@ impl DrivePage<'_> {
         let (kind_titles, kinds) = kind_rows(&Matrix::of_drive(drive, car));
         let (overview, missing) = overview_figure(drive, car);
         let named = worst.iter().take(WORST).map(|shift| {
-            context! { number => shift.number, gears => gears(shift, car), error => number(shift.worst_error_n_m(), 1) }
+            context! { number => shift.number, gears => car.shift_name(shift.gears), error => number(shift.worst_error_n_m(), 1) }
         });
         render(
             "drive.html",
@@ -128,16 +128,8 @@ fn healths(drive: &ScoredDrive) -> Vec<Value> {
     Health::ALL.into_iter().filter(|health| *health != Health::Good).filter(there).map(value).collect()
 }
 
-fn name(car: &Car, gear: usize) -> &str {
-    car.gearbox.gears.get(gear).map_or("N", |gear| gear.name.as_str())
-}
-
-fn gears(shift: &ScoredShift, car: &Car) -> String {
-    format!("{}-{}", name(car, shift.from), name(car, shift.to))
-}
-
 fn title(shift: &ScoredShift, car: &Car) -> String {
-    format!("{}, {}", gears(shift, car), kind_name(shift).unwrap_or("shift without torque"))
+    format!("{}, {}", car.shift_name(shift.gears), kind_name(shift).unwrap_or("shift without torque"))
 }
 
 /// The kind of a shift that has one.

@@ -8,7 +8,7 @@ use study::gearbox::shift_comfort::ShiftComfort;
 use study::gearbox::{SquaredErrors, TruePhase};
 use trace::Cell;
 
-use super::{clutch_names, gears, kind_name, name, phase_s};
+use super::{clutch_names, kind_name, phase_s};
 use crate::matrix_page::{ratio, torques};
 use crate::tables::{coverage, health_meaning, number};
 
@@ -28,7 +28,7 @@ const fn column(title: &'static str, meaning: &'static str, cell: fn(&ScoredShif
 const ERRORS: &str = "RMS errors of filter / open loop";
 const COLUMNS: &[Column] = &[
     column("#", "number of the shift", |s, _| s.number.to_string()),
-    column("shift", "old and new gear", gears),
+    column("shift", "old and new gear", |shift, car| car.shift_name(shift.gears)),
     column("kind", "direction, and who drives: with power the engine, coasting the car", |s, _| {
         kind_name(s).unwrap_or("–").to_owned()
     }),
@@ -223,8 +223,8 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
     let mut cells = vec![
         ("number".to_owned(), Cell::Whole(shift.number as u64)),
         number("time_s", shift.time_s[0]),
-        word("from_gear", name(car, shift.from)),
-        word("to_gear", name(car, shift.to)),
+        word("from_gear", car.gear_name(shift.gears.from)),
+        word("to_gear", car.gear_name(shift.gears.to)),
         word("kind", kind_name(shift).unwrap_or_default()),
         word("offgoing", offgoing),
         word("oncoming", oncoming),

@@ -215,9 +215,10 @@ impl CarCampaign {
         sensed.last(|row| scorer.push(&row.sample, &row.input(known, &tables)));
         let mut sums = vec![Sums::default(); self.groups.len()];
         for shift in scorer.finish().shifts {
-            let Some(kind) = shift.kind else { continue };
+            let gears = shift.gears.from.place().zip(shift.gears.to.place());
+            let Some((kind, (from, to))) = shift.kind.zip(gears) else { continue };
             let errors = errors_by_phase(&shift.rows, kind);
-            self.add(&mut sums, (shift.from, shift.to, kind), &errors, &counts(&shift.rows, &errors));
+            self.add(&mut sums, (from, to, kind), &errors, &counts(&shift.rows, &errors));
         }
         Ok(sums)
     }

@@ -5,13 +5,12 @@
 //! engine speed. True values and measured
 //! pressures are compared where the log has them.
 
-use car::Car;
 use car::columns::{command_age, element_commands, element_pressures, pressure_command_column};
+use car::{Car, Gear};
 use logs::{LOOK_AHEAD_S, LookAhead};
 use observer::Reading;
 use observer::ShiftTables;
 use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
-use plant::car::NO_GEAR;
 use trace::{CsvRows, TraceError, signal};
 
 pub use evaluate::LogStep;
@@ -276,8 +275,8 @@ impl<'c> CarLog<'c> {
             let gears = &self.car.gearbox.gears;
             // A logger may write the gear as a number with decimals.
             let whole = text.parse::<f64>().ok().map(|number| format!("{number}"));
-            let named = |name: &str| gears.iter().position(|gear| gear.name == name);
-            let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(NO_GEAR);
+            let named = |name: &str| gears.iter().position(|gear| gear.name == name).map(Gear::at);
+            let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(Gear::Neutral);
             let found = named(&text).or(neutral).or_else(|| named(&whole?));
             self.gears.take(which, found, || text.escape_debug().to_string());
         }

@@ -3,14 +3,13 @@
 //! Turbine and output speed, gear, target gear and the command of every element's valve are needed, without a converter the engine torque
 //! too. With one the estimate is the open loop where there is no engine speed. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
 
-use car::Car;
 use car::columns::{element_column, element_commands, element_pressures, pressure_command_column};
+use car::{Car, Gear};
 use drivetrain::CommandKind;
 use logs::{ChannelMap, Log, LogError, Mapped, OnChange, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
 use observer::ShiftTables;
-use observer::gearbox::{GearCommand, LONGEST_DELAY_S, MAX_ELEMENTS, ShiftInput};
-use plant::car::NO_GEAR;
+use observer::gearbox::{LONGEST_DELAY_S, MAX_ELEMENTS, ShiftInput};
 
 use super::car_log::LogStep;
 use super::gear_signal::Gears;
@@ -206,8 +205,7 @@ impl<'a> CarChannels<'a> {
             commands,
             gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
         };
-        let GearCommand { from, to } = input.gear;
-        let place = self.tables.tables().shift(from, to).and_then(|row| row.clutches[1].element.place());
+        let place = self.tables.tables().commanded(input.gear).and_then(|row| row.clutches[1].element.place());
         if let Some(pressure) = place.and_then(|place| pressures.get_mut(place)) {
             *pressure = pressure.or(oncoming[0]);
         }
@@ -316,25 +314,26 @@ fn reverse_gears(car: &Car) -> Vec<usize> {
 }
 
 /// The number of a gear, by its place: 1 is the first forward gear, 0 none, -1 reverse, -2 a second reverse gear.
-pub fn gear_number(car: &Car, gear: usize) -> f64 {
-    let place = |gears: Vec<usize>| gears.iter().position(|&known| known == gear).map(|place| place as f64 + 1.0);
+pub fn gear_number(car: &Car, gear: Gear) -> f64 {
+    let place =
+        |gears: Vec<usize>| gears.iter().position(|&known| Gear::at(known) == gear).map(|place| place as f64 + 1.0);
     place(car.gearbox.forward_gears()).or_else(|| place(reverse_gears(car)).map(|place| -place)).unwrap_or(0.0)
 }
 
 /// The place of a gear with this number; none where the gearbox has no such gear. A negative number that no gear has is the first reverse
 /// gear.
-fn gear_of(car: &Car, number: f64) -> Option<usize> {
+fn gear_of(car: &Car, number: f64) -> Option<Gear> {
     let forward = car.gearbox.forward_gears();
     let whole = number.round();
     match whole {
         _ if (number - whole).abs() > 0.01 => None,
-        0.0 => Some(NO_GEAR),
+        0.0 => Some(Gear::Neutral),
         _ if whole < 0.0 => {
             let reverse = reverse_gears(car);
-            let named = reverse.iter().copied().find(|&gear| gear_number(car, gear) == whole);
-            named.or_else(|| reverse.first().copied())
+            let named = reverse.iter().copied().map(Gear::at).find(|&gear| gear_number(car, gear) == whole);
+            named.or_else(|| reverse.first().copied().map(Gear::at))
         }
-        _ => forward.get(whole as usize - 1).copied(),
+        _ => forward.get(whole as usize - 1).copied().map(Gear::at),
     }
 }
 

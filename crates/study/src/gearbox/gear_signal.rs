@@ -1,9 +1,7 @@
 //! The gears that a log names.
 
-use car::Car;
+use car::{Car, Gear, ShiftCommand};
 use observer::Reading;
-use observer::gearbox::GearCommand;
-use plant::car::NO_GEAR;
 
 /// Values that a message names.
 const NAMED: usize = 5;
@@ -29,7 +27,7 @@ impl GearSignal {
     }
 
     /// Takes a sample: the gear if the gearbox has it, and the value as the log has it.
-    fn take(&mut self, found: Option<usize>, value: impl FnOnce() -> String) -> Option<usize> {
+    fn take(&mut self, found: Option<Gear>, value: impl FnOnce() -> String) -> Option<Gear> {
         self.samples += 1;
         if found.is_none() {
             self.unknown += 1;
@@ -67,8 +65,8 @@ impl GearSignal {
 }
 
 /// Whether the turbine is at the first of two gears by its speed and that of the output.
-fn fits(car: &Car, gears: [usize; 2], [turbine, output]: [f64; 2]) -> bool {
-    let [of, other] = gears.map(|gear| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio * output));
+fn fits(car: &Car, gears: [Gear; 2], [turbine, output]: [f64; 2]) -> bool {
+    let [of, other] = gears.map(|gear| car.ratio(gear).map_or(f64::NAN, |ratio| ratio * output));
     output > OUTPUT_RAD_S && (turbine - of).abs() < LEFT_OF_WAY * (of - other).abs()
 }
 
@@ -77,16 +75,16 @@ pub(super) struct Gears {
     /// Of `gear` and `target_gear`.
     signals: [GearSignal; 2],
     /// The newest gear and target gear that the gearbox has.
-    newest: [Option<usize>; 2],
+    newest: [Option<Gear>; 2],
     /// The newest speeds of turbine and output, rad/s.
     speeds_rad_s: [f64; 2],
     /// Of the row before: `gear`, and what the filter was shown.
-    before: Option<(usize, GearCommand)>,
+    before: Option<(Gear, ShiftCommand)>,
     /// The gear that is left while `gear` is still the one before it, and how often this was so.
-    left: Option<usize>,
+    left: Option<Gear>,
     late: u64,
     /// The last gear that was engaged since neutral was asked for; whether it stands for a neutral `gear` now, and how often it did.
-    engaged: Option<usize>,
+    engaged: Option<Gear>,
     is_neutral: bool,
     neutral: u64,
     /// Changes of gear and target gear.
@@ -99,20 +97,20 @@ pub(super) struct Gears {
 #[derive(Default)]
 struct Exchanged {
     /// The shift under way, and whether it began with the speeds of its old or of its new gear.
-    open: Option<([usize; 2], [bool; 2])>,
+    open: Option<([Gear; 2], [bool; 2])>,
     shifts: u64,
     right: u64,
 }
 
 impl Exchanged {
     /// Takes what is shown in a row, and a test of the speeds: whether they are those of a gear and not of another.
-    fn row(&mut self, shown: GearCommand, fits: impl Fn(usize, usize) -> bool) {
+    fn row(&mut self, shown: ShiftCommand, fits: impl Fn(Gear, Gear) -> bool) {
         let gears = [shown.from, shown.to];
         match self.open {
             Some((open, _)) if open == gears => {}
             before => {
                 if let Some(([from, to], [old, new])) = before
-                    && shown.from == shown.to
+                    && shown.is_steady()
                 {
                     self.shifts += u64::from(new && shown.to == from && fits(from, to));
                     self.right += u64::from(old && shown.to == to && fits(to, from));
@@ -142,7 +140,7 @@ impl Gears {
     }
 
     /// Takes a sample of `gear` (0) or `target_gear` (1): the gear if the gearbox has it, and the value as the log has it.
-    pub(super) fn take(&mut self, which: usize, found: Option<usize>, value: impl FnOnce() -> String) {
+    pub(super) fn take(&mut self, which: usize, found: Option<Gear>, value: impl FnOnce() -> String) {
         let newest = self.signals[which].take(found, value).or(self.newest[which]);
         self.changes[which] += u64::from(self.newest[which].is_some_and(|before| newest != Some(before)));
         self.newest[which] = newest;
@@ -157,18 +155,18 @@ impl Gears {
     /// the first target gear it is the gear. Where the target goes on to a third gear before `gear` has changed, and the speeds are those of
     /// the first target, `gear` is late: the first target is the gear that is left. A `gear` that is neutral while the car moves on to
     /// a target gear is the one before: so some controllers say that a shift is under way.
-    pub(super) fn row(&mut self, car: &Car, speeds: [Option<Reading<f64>>; 2]) -> GearCommand {
+    pub(super) fn row(&mut self, car: &Car, speeds: [Option<Reading<f64>>; 2]) -> ShiftCommand {
         for (newest, reading) in self.speeds_rad_s.iter_mut().zip(speeds) {
             *newest = reading.map_or(*newest, |reading| reading.value);
         }
-        let Some(gear) = self.newest[0] else { return GearCommand { from: NO_GEAR, to: NO_GEAR } };
+        let Some(gear) = self.newest[0] else { return ShiftCommand::NEUTRAL };
         let to = self.newest[1].unwrap_or(gear);
         let gear = self.engaged(gear, to);
         let before = self.before.filter(|(before, _)| *before == gear && to != gear).map(|(_, shown)| shown);
         if before.is_none() {
             self.left = None;
         }
-        if let Some(GearCommand { from, to: first }) = before
+        if let Some(ShiftCommand { from, to: first }) = before
             && from != first
             && ![from, first].contains(&to)
             && self.is_done(car, [from, first])
@@ -176,7 +174,7 @@ impl Gears {
             self.left = Some(first);
             self.late += 1;
         }
-        let shown = GearCommand { from: self.left.unwrap_or(gear), to };
+        let shown = ShiftCommand { from: self.left.unwrap_or(gear), to };
         self.before = Some((gear, shown));
         let [turbine, output] = self.speeds_rad_s;
         self.exchanged.row(shown, |gear, other| fits(car, [gear, other], [turbine, output]));
@@ -184,18 +182,19 @@ impl Gears {
     }
 
     /// The gear that is engaged, where `gear` may say neutral during a shift.
-    fn engaged(&mut self, gear: usize, to: usize) -> usize {
-        let held = self.engaged.filter(|_| gear == NO_GEAR && to != NO_GEAR && self.speeds_rad_s[1] > OUTPUT_RAD_S);
+    fn engaged(&mut self, gear: Gear, to: Gear) -> Gear {
+        let held =
+            self.engaged.filter(|_| gear.is_neutral() && !to.is_neutral() && self.speeds_rad_s[1] > OUTPUT_RAD_S);
         self.neutral += u64::from(held.is_some() && !self.is_neutral);
         self.is_neutral = held.is_some();
         if held.is_none() {
-            self.engaged = Some(gear).filter(|gear| *gear != NO_GEAR);
+            self.engaged = Some(gear).filter(|gear| !gear.is_neutral());
         }
         held.unwrap_or(gear)
     }
 
     /// Whether a shift between these gears is done by the speeds.
-    fn is_done(&self, car: &Car, [from, to]: [usize; 2]) -> bool {
+    fn is_done(&self, car: &Car, [from, to]: [Gear; 2]) -> bool {
         fits(car, [to, from], self.speeds_rad_s)
     }
 
@@ -248,16 +247,16 @@ mod tests {
     #[test]
     fn a_third_gear_is_a_late_gear_or_a_change_of_mind_by_the_speeds() {
         let car = eight_speed();
-        let gear = |name: &str| car.gearbox.gear(name).unwrap();
-        let ratio = |name: &str| car.gearbox.gears[gear(name)].ratio;
+        let gear = |name: &str| Gear::at(car.gearbox.gear(name).unwrap());
+        let ratio = |name: &str| car.ratio(gear(name)).unwrap();
         // Names of gear and target gear in rows with this turbine speed at the end of the first shift, the output at 100 rad/s.
         let shown = |rows: &[[&str; 2]], ratio: f64| {
             let mut gears = Gears::new(["gear", "target_gear"]);
             let reading = |value: f64| Some(Reading { value, age_s: 0.0 });
             let mut row = |names: &[&str; 2]| {
                 names.iter().enumerate().for_each(|(which, name)| gears.take(which, Some(gear(name)), String::new));
-                let GearCommand { from, to } = gears.row(&car, [reading(100.0 * ratio), reading(100.0)]);
-                [from, to].map(|gear| car.gearbox.gears[gear].name.as_str())
+                let ShiftCommand { from, to } = gears.row(&car, [reading(100.0 * ratio), reading(100.0)]);
+                [from, to].map(|gear| car.gear_name(gear))
             };
             let shown: Vec<[&str; 2]> = rows.iter().map(&mut row).collect();
             (shown, gears.late, gears.notes("").unwrap().len())
@@ -287,14 +286,14 @@ mod tests {
     /// What is shown of rows of gear, target gear and the gear of the turbine's speed, all as names; the output turns this fast, rad/s.
     fn driven(rows: &[[&str; 3]], output: f64) -> (Vec<[String; 2]>, Result<Vec<String>, String>) {
         let car = eight_speed();
-        let place = |name: &str| if name == "N" { NO_GEAR } else { car.gearbox.gear(name).unwrap() };
+        let place = |name: &str| if name == "N" { Gear::Neutral } else { Gear::at(car.gearbox.gear(name).unwrap()) };
         let mut gears = Gears::new(["gear", "target_gear"]);
         let reading = |value: f64| Some(Reading { value, age_s: 0.0 });
         let mut row = |[gear, target, speeds]: &[&str; 3]| {
             [gear, target].iter().enumerate().for_each(|(at, name)| gears.take(at, Some(place(name)), String::new));
-            let ratio = car.gearbox.gears[place(speeds)].ratio;
-            let GearCommand { from, to } = gears.row(&car, [reading(ratio * output), reading(output)]);
-            [from, to].map(|gear| car.gearbox.gears.get(gear).map_or("N", |gear| gear.name.as_str()).to_owned())
+            let ratio = car.ratio(place(speeds)).unwrap();
+            let ShiftCommand { from, to } = gears.row(&car, [reading(ratio * output), reading(output)]);
+            [from, to].map(|gear| car.gear_name(gear).to_owned())
         };
         let shown = rows.iter().map(&mut row).collect();
         (shown, gears.notes(""))
@@ -337,7 +336,7 @@ mod tests {
     fn unknown_gears_are_counted_with_their_first_values() {
         let mut signal = GearSignal::new("gear");
         for value in [1, 1, 1, 1, 255, 1, 255] {
-            let found = signal.take(Some(0).filter(|_| value == 1), || value.to_string());
+            let found = signal.take(Some(Gear::at(0)).filter(|_| value == 1), || value.to_string());
             assert_eq!(found.is_some(), value == 1);
         }
         let note = signal.note("").unwrap().unwrap();

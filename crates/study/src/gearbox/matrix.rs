@@ -3,8 +3,7 @@
 //! A run is one shift of one such car. Runs are made in parallel and added in their order, so that the result does not
 //! depend on the number of threads.
 
-use car::ErrorBudget;
-use car::{Car, Sensors};
+use car::{Car, ErrorBudget, Sensors, ShiftCommand};
 use drivetrain::ShiftKind;
 use observer::ShiftTables;
 use plant::car::CarShift;
@@ -138,8 +137,9 @@ impl Matrix {
     /// The shifts of a drive as rows of a matrix; those without a kind are left out.
     pub fn of_drive(drive: &ScoredDrive, car: &Car) -> Self {
         let row = |shift: &ScoredShift| {
-            let (from, to, kind) = (shift.from, shift.to, shift.kind?);
-            let [i_off, i_on] = [from, to].map(|gear| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
+            let ShiftCommand { from, to } = shift.gears;
+            let [i_off, i_on] = [car.ratio(from)?, car.ratio(to)?];
+            let (from, to, kind) = (from.place()?, to.place()?, shift.kind?);
             Some(MatrixRow {
                 shift: MatrixShift { from, to, kind, gain: (i_off - i_on).abs().recip() },
                 counts: shift.summary.counts,

@@ -1,10 +1,10 @@
 //! What a real car does to the filter: lost readings, other throttles, other inertias, an element that slips, single
 //! precision, and input without sense.
 
-use car::Car;
 use car::ErrorBudget;
+use car::{Car, Gear, ShiftCommand};
 use drivetrain::ShiftKind;
-use observer::gearbox::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 use observer::{ChannelHealth, Health, Reading};
 use observer::{ShiftTables, gearbox_filter};
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
@@ -459,13 +459,13 @@ fn an_unknown_gear_and_a_lost_command_are_said() {
         estimates.last().unwrap()
     };
     assert_eq!(said(|_| ()).health, Health::Good);
-    let unknown = said(|input| input.gear = GearCommand { from: 77, to: 77 });
+    let unknown = said(|input| input.gear = ShiftCommand::between(63, 63));
     assert_eq!((unknown.health, unknown.gear), (Health::SpeedsRejected, None));
     // From and to neutral there are no equations.
-    let not_modelled = said(|input| input.gear = GearCommand { from: GearCommand::NEUTRAL, to: 3 });
+    let not_modelled = said(|input| input.gear = ShiftCommand { from: Gear::Neutral, to: Gear::at(3) });
     assert_eq!((not_modelled.health, not_modelled.gear), (Health::ShiftNotModelled, None));
     let blind = said(|input| {
-        input.gear = GearCommand { from: GearCommand::NEUTRAL, to: 3 };
+        input.gear = ShiftCommand { from: Gear::Neutral, to: Gear::at(3) };
         input.turbine_rad_s = Some(Reading::now(f64::NAN));
     });
     assert_eq!(blind.health, Health::SpeedsRejected);
@@ -555,7 +555,7 @@ fn input_without_sense_gives_numbers_and_a_word() {
                     7 => input.lock_up_applied = true,
                     _ => {
                         let any = |random: &mut Random| (random.uniform() * 12.0) as usize;
-                        input.gear = GearCommand { from: any(&mut random), to: any(&mut random) };
+                        input.gear = ShiftCommand::between(any(&mut random), any(&mut random));
                     }
                 }
             }

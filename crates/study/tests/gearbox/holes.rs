@@ -38,7 +38,7 @@ fn errors(
     let tables = ShiftTables::of_car(known, &errors).unwrap();
     let filter = gearbox_filter(known, &tables, &errors, Some(&sensors()));
     let mut scorer = DriveScorer::new(known, model, &tables, &filter);
-    let is_shift = |sample: &CarSample| sample.gears()[0] != sample.gears()[1];
+    let is_shift = |sample: &CarSample| !sample.gears().is_steady();
     let mut requested_s = f64::NEG_INFINITY;
     let mut before = false;
     for (sample, mut input) in recording.samples.iter().zip(recording.inputs(known, &tables, &sensors(), 1)) {

@@ -1,9 +1,9 @@
 //! Speeds that are noisier than is stated.
 
-use car::{Car, ErrorBudget};
+use car::{Car, ErrorBudget, ShiftCommand};
 use evaluate::errors::controlling_of;
 use evaluate::score::{SquaredErrors, TruePhase, score_from};
-use observer::gearbox::{GearCommand, ShiftInput};
+use observer::gearbox::ShiftInput;
 use observer::{Reading, ShiftTables, gearbox_filter};
 use plant::car::CarShift;
 use study::gearbox::matrix::neighbouring_shifts;
@@ -67,7 +67,7 @@ fn a_stop_does_not_take_the_noise_that_is_known() {
         score_from(&tables, &filter, &mut state, &samples, &inputs);
         let mut stopped = state;
         let still = Some(Reading { value: 0.0, age_s: 0.0 });
-        let gear = GearCommand { from: shift.from, to: shift.from };
+        let gear = ShiftCommand::between(shift.from, shift.from);
         let at_rest = ShiftInput {
             dt_s: 0.01,
             turbine_rad_s: still,

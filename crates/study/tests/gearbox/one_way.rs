@@ -1,6 +1,6 @@
 //! A gear that a one-way clutch holds: its shifts are estimated, and in coasting the health says that it overruns.
 
-use car::Car;
+use car::{Car, Gear};
 use observer::Health;
 use plant::car::{CarCalibration, CarModel, CarRun, Driver};
 use study::gearbox::TruePhase;
@@ -29,13 +29,13 @@ fn tours(car: &Car) -> Vec<ScoredDrive> {
 #[test]
 fn the_clutch_with_a_pressure_is_estimated_and_the_one_way_clutch_has_the_torque_that_is_left() {
     let car = one_way();
-    let first = gear(&car, "1");
+    let first = Gear::at(gear(&car, "1"));
     let (mut sums, mut held, mut freed) = ([[0.0_f64; 2]; 2], [0.0_f64; 2], 0);
     for drive in tours(&car) {
         assert_eq!(drive.shifts.len(), 12);
-        let of_first = |shift: &&ScoredShift| [shift.from, shift.to].contains(&first);
+        let of_first = |shift: &&ScoredShift| [shift.gears.from, shift.gears.to].contains(&first);
         for shift in drive.shifts.iter().filter(of_first) {
-            let (kind, label) = (shift.kind.unwrap(), format!("{} {}-{}", shift.number, shift.from, shift.to));
+            let (kind, label) = (shift.kind.unwrap(), format!("{} {:?}", shift.number, shift.gears));
             assert!(shift.quality.complete_s.is_some() && shift.inside() == Some(1.0), "{label}");
             let main = controlling_of(&shift.rows, kind);
             assert!(!shift.rows[0].clutches[main].is_one_way && shift.rows[0].clutches[1 - main].is_one_way, "{label}");

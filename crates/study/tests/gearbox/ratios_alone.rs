@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use car::Car;
 use car::ErrorBudget;
+use car::{Car, ShiftCommand};
 use config::{CarFile, DriveFile, Source};
 use observer::Health;
 use observer::gearbox::ShiftPhase;
@@ -44,8 +44,8 @@ fn by_ratios(car: &CarFile, with_masses: bool) -> Car {
 /// Torque of all clutches of a shift at the turbine, N m.
 fn true_sum(car: &Car, sample: &CarSample) -> Option<f64> {
     let under_way = sample.shift.as_ref()?;
-    let [from, to] = sample.gears().map(|gear| gear.unwrap_or(usize::MAX));
-    let reduced = car.gearbox.shift(from, to)?.reduced?;
+    let ShiftCommand { from, to } = sample.gears();
+    let reduced = car.gearbox.shift(from.place()?, to.place()?)?.reduced?;
     Some(
         reduced.slip_offgoing[0] * under_way.offgoing.torque_n_m
             + reduced.slip_oncoming[0] * under_way.oncoming.torque_n_m,
@@ -67,7 +67,7 @@ fn score(truth: &CarFile, with_masses: bool) -> [f64; 4] {
     let inputs: Vec<_> = recording.inputs(truth, &tables, &sensors(), 7).collect();
     for (sample, input) in recording.samples.iter().zip(inputs) {
         let estimate = filter.step(&mut state, &input);
-        assert!(estimate.clutches.is_none() && estimate.gear.is_none_or(|gear| gear.from == gear.to));
+        assert!(estimate.clutches.is_none() && estimate.gear.is_none_or(ShiftCommand::is_steady));
         let (Some(truth), Some(ShiftPhase::BothSlip)) = (true_sum(truth, sample), estimate.phase) else { continue };
         assert!(estimate.health == Health::Good || estimate.health == Health::ReadingRefused, "{:?}", estimate.health);
         let found = estimate.at_turbine.unwrap();
@@ -110,7 +110,7 @@ fn a_shift_past_a_gear_is_not_modelled() {
     let mut healths = Vec::new();
     for (at, input) in inputs(&known, &tables, &samples, &sensors(), 1) {
         let estimate = logged.push(&LogStep::of(samples[at].time_s, input));
-        if input.gear.from != input.gear.to {
+        if !input.gear.is_steady() {
             healths.push(estimate.health);
         }
     }

@@ -40,7 +40,7 @@ fn a_city_drive_of_every_car_on_the_road_is_simulated_and_estimated() {
         let restarts = scored.states.iter().skip(100).filter(|state| state.health == Health::Restarted).count();
         assert_eq!(restarts, 0, "{name}");
         for shift in &scored.shifts {
-            let label = format!("{name} {} {}-{}", shift.number, shift.from, shift.to);
+            let label = format!("{name} {} {:?}", shift.number, shift.gears);
             // A change of mind ends a shift, and so does the end of the drive.
             let ends_s = scored.shifts.iter().map(|next| next.time_s[0]).chain([drive.duration_s()]);
             let is_cut = ends_s.into_iter().any(|next_s| (shift.time_s[1]..shift.time_s[1] + 0.1).contains(&next_s));

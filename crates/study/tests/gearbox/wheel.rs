@@ -243,7 +243,7 @@ fn the_scale_of_the_wheel_speed_is_learnt_and_kept() {
 
 /// Rows from which on a shift is under way.
 fn begun(inputs: &[ShiftInput<f64>]) -> Vec<usize> {
-    let shifts = |at: usize| inputs[at].gear.from != inputs[at].gear.to;
+    let shifts = |at: usize| !inputs[at].gear.is_steady();
     (1..inputs.len()).filter(|&at| shifts(at) && !shifts(at - 1)).collect()
 }
 

@@ -43,8 +43,8 @@ fn harm(known: &Car) -> (usize, usize, [f64; 2]) {
             })
         };
         let clean = errors(&right);
-        let begins = right.iter().position(|(_, input)| input.gear.from != input.gear.to).unwrap();
-        let ends = right.iter().rposition(|(_, input)| input.gear.from != input.gear.to).unwrap();
+        let begins = right.iter().position(|(_, input)| !input.gear.is_steady()).unwrap();
+        let ends = right.iter().rposition(|(_, input)| !input.gear.is_steady()).unwrap();
         for row in (begins + 2..ends).step_by(11) {
             for (n, size) in SIZES_RAD_S.into_iter().enumerate() {
                 let size = if (row + n) % 2 == 0 { size } else { -size };

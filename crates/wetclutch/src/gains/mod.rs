@@ -197,7 +197,7 @@ pub fn design(file: &VehicleFile, shift: Option<&str>, options: &DesignOptions) 
         (VehicleFile::Gearbox(file), Some(shift)) => &file.car.of_shift(file.car.shift_named(shift)?)?,
         (VehicleFile::Gearbox(file), None) => {
             let shifts: Vec<String> =
-                file.car.single_upshifts().into_iter().map(|gears| file.car.shift_name(gears)).collect();
+                file.car.single_upshifts().into_iter().map(|gears| file.car.shift_name(gears.into())).collect();
             let message = format!("shift: a car with a gearbox has many\nhint: give one of {}", shifts.join(", "));
             return Err(Error::Input(message));
         }

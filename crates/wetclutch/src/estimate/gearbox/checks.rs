@@ -2,14 +2,13 @@
 
 use std::path::Path;
 
-use car::Car;
 use car::columns::{element_commands, element_pressures, pressure_command_column};
+use car::{Car, Gear};
 use drivetrain::{ClutchValve, CommandKind};
 use evaluate::checks::Unusable;
 use logs::Role;
 use logs::plausibility::Seen;
 use observer::ShiftTables;
-use observer::gearbox::GearCommand;
 use observer::{Health, Reading};
 use report::tables::health_meaning;
 use study::gearbox::car_log::{CarLog, LogStep};
@@ -135,8 +134,8 @@ impl Columns {
         let input = &step.input;
         let value = |reading: Option<Reading<f64>>| reading.map(|reading| reading.value);
         // Only in a forward gear the sign of these speeds tells whether it is right: in reverse the car goes backwards.
-        let GearCommand { from, to } = input.gear;
-        let is_forward = [from, to].into_iter().all(|gear| self.is_forward.get(gear) == Some(&true));
+        let is_forward = |gear: Gear| gear.place().and_then(|place| self.is_forward.get(place)) == Some(&true);
+        let is_forward = [input.gear.from, input.gear.to].into_iter().all(is_forward);
         let [output, wheel] = [input.output_rad_s, input.wheel_rad_s]
             .map(|reading| value(reading).map(|speed| if is_forward { speed } else { speed.abs() }));
         let others = [value(input.engine_rad_s), value(input.turbine_rad_s), output, wheel, value(input.engine_n_m)];

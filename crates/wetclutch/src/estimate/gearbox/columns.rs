@@ -1,7 +1,7 @@
 //! The columns of an estimate of a car with any gearbox.
 
-use car::Car;
 use car::columns::element_column;
+use car::{Car, Gear, ShiftCommand};
 use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate};
 use observer::{ChannelHealth, Channels};
 use study::gearbox::channels::gear_number;
@@ -15,7 +15,7 @@ use crate::Error;
 pub(crate) struct Row<'a> {
     pub(crate) car: &'a Car,
     pub(crate) places: &'a [(usize, &'a str)],
-    pub(crate) gears: [usize; 2],
+    pub(crate) gears: ShiftCommand,
     pub(crate) estimate: ShiftEstimate<f64>,
     /// Guaranteed ranges of the pressures of the elements, Pa.
     pub(crate) ranges_pa: [Option<[f64; 2]>; MAX_ELEMENTS],
@@ -31,8 +31,14 @@ impl<'a> Row<'a> {
         (*channels, *commands, clutches.map(|clutches| clutches.map(|clutch| clutch.element)))
     }
 
+    /// Its name; empty in neutral.
     fn gear(&self, which: usize) -> Cell<'a> {
-        Cell::Word(self.car.gearbox.gears.get(self.gears[which]).map_or("", |gear| gear.name.as_str()))
+        Cell::Word(if self.of(which).is_neutral() { "" } else { self.car.gear_name(self.of(which)) })
+    }
+
+    /// The gear (0) or the target gear (1).
+    fn of(&self, which: usize) -> Gear {
+        if which == 0 { self.gears.from } else { self.gears.to }
     }
 
     /// What became of the reading of a channel, by its place in [`READINGS`]; of the command of a clutch of the shift nothing where there
@@ -59,8 +65,7 @@ impl<'a> Row<'a> {
     /// The one-way clutch of the shift.
     fn one_way(&self, which: usize) -> &'a str {
         let gearbox = &self.car.gearbox;
-        let [from, to] = self.estimate.gear.map_or(self.gears, |gear| [gear.from, gear.to]);
-        let single = gearbox.shift(from, to).and_then(|shift| shift.change.single());
+        let single = self.car.single_shift(self.estimate.gear.unwrap_or(self.gears));
         let element = single.and_then(|elements| gearbox.elements.get(elements[which]));
         element.map_or("", |element| element.name.as_str())
     }
@@ -142,7 +147,7 @@ impl Value {
             Self::Clutch(which, what) => row.clutch_cell(which, what),
             Self::Valve(place) => Cell::Number(row.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
             Self::Range(place, end) => of(row.ranges_pa[place.min(MAX_ELEMENTS - 1)].map(|range| range[end] + 0.0)),
-            Self::GearNumber(which) => Cell::Number(gear_number(row.car, row.gears[which])),
+            Self::GearNumber(which) => Cell::Number(gear_number(row.car, row.of(which))),
             Self::Reading(at) => row.reading(at),
             Self::Command(place) => Cell::Word(row.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
         }

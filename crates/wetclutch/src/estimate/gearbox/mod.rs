@@ -148,9 +148,8 @@ pub fn estimate(
             checks.push(&step);
         }
         let estimate = drive.push(&step);
-        drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, [shift.from, shift.to]));
-        let gears = [step.input.gear.from, step.input.gear.to];
-        let row = Row { car, places: &places, gears, estimate, ranges_pa: drive.pressure_ranges_pa() };
+        drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, shift.gears));
+        let row = Row { car, places: &places, gears: step.input.gear, estimate, ranges_pa: drive.pressure_ranges_pa() };
         passing.push(step.time_s, row, |time_s, row| {
             let is_same = said.replace(row.said()) == Some(row.said());
             let new = if is_same { &columns[..before_readings] } else { &columns[..] };
@@ -173,7 +172,7 @@ pub fn estimate(
     let learnt = LearntOfDrive::of(car, tables, &drive);
     let mut drive = drive.finish();
     passing.check()?;
-    drive.shifts.retain(|shift| passing.wants(shift.number, car, [shift.from, shift.to]));
+    drive.shifts.retain(|shift| passing.wants(shift.number, car, shift.gears));
     let rows = table.finish()?;
     let without_sensors = options.sensors.is_none() && !car.gearbox.has_ratios_alone();
     Ok(DriveEstimates { rows, drive, origin_s, learnt, without_sensors })

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use car::Car;
+use car::{Car, ShiftCommand};
 
 use super::columns::Row;
 use crate::Error;
@@ -13,7 +13,7 @@ pub(crate) struct Passing<'a> {
     selection: Selection,
     /// Rows that a shift which is wanted would begin with.
     recent: VecDeque<(f64, Row<'a>)>,
-    gears: Option<[usize; 2]>,
+    gears: Option<ShiftCommand>,
     is_wanted: bool,
     /// Rows are written until this time, s.
     until_s: f64,
@@ -31,14 +31,14 @@ impl<'a> Passing<'a> {
         row: Row<'a>,
         mut write: impl FnMut(f64, &Row<'a>) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let gears = (row.gears[0] != row.gears[1]).then_some(row.gears);
+        let gears = Some(row.gears).filter(|gears| !gears.is_steady());
         if gears != self.gears {
             if self.gears.is_some() && self.is_wanted {
                 self.until_s = time_s + AFTER_S;
             }
             self.gears = gears;
             self.is_wanted = match gears {
-                Some(pair) => self.selection.begins(&names(row.car, pair)),
+                Some(pair) => self.selection.begins(&row.car.shift_name(pair)),
                 None => false,
             };
         }
@@ -59,18 +59,12 @@ impl<'a> Passing<'a> {
     }
 
     /// Whether a shift is wanted.
-    pub(crate) fn wants(&self, number: usize, car: &Car, pair: [usize; 2]) -> bool {
-        self.selection.wants(number, &names(car, pair))
+    pub(crate) fn wants(&self, number: usize, car: &Car, gears: ShiftCommand) -> bool {
+        self.selection.wants(number, &car.shift_name(gears))
     }
 
     /// Refuses a selection that no shift is in.
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.selection.check("`gear` and `target_gear` tell a shift")
     }
-}
-
-/// A shift by the names of its gears.
-fn names(car: &Car, pair: [usize; 2]) -> String {
-    let name = |gear: usize| car.gearbox.gears.get(gear).map_or("N", |gear| gear.name.as_str());
-    format!("{}-{}", name(pair[0]), name(pair[1]))
 }
