@@ -31,7 +31,7 @@ def test_a_fitted_car_is_used_at_once(car: wc.Car, measured: wc.Table, fitted: w
     assert table.num_rows > 10 and set(table["unit"].to_pylist()) <= {"1", "s", "Pa", "N m"}
     assert all(low <= at <= high for low, at, high in zip(*(fitted.intervals[name] for name in ("lower", "value", "upper"))))
     assert set(fitted.not_identifiable) < set(fitted.intervals["parameter"])
-    assert list(fitted.channel_map.columns) == ["signal", "key", "unit", "value", "standard_deviation"]
+    assert list(fitted.channel_map) == ["signal", "key", "unit", "value", "standard_deviation"]
     assert fitted.page and "<html" in fitted.page and fitted._repr_html_()
     assert len(repr(fitted)) < 120 and pickle.loads(pickle.dumps(fitted)) == fitted
 
