@@ -54,6 +54,10 @@ pub enum Target {
     Asc,
     /// The same of Vector's objects.
     Blf,
+    /// The same of PCAN traces.
+    Trc,
+    /// The same of tables of frames of SavvyCAN.
+    Savvy,
     /// The reader of channel maps.
     Map,
     /// The reader of the messages and signals of a bus.
@@ -66,7 +70,7 @@ pub enum Target {
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 18] = [
         Self::Vehicle,
         Self::Experiment,
         Self::Study,
@@ -79,6 +83,8 @@ impl Target {
         Self::Candump,
         Self::Asc,
         Self::Blf,
+        Self::Trc,
+        Self::Savvy,
         Self::Map,
         Self::Dbc,
         Self::Gearbox,
@@ -100,6 +106,8 @@ impl Target {
             Self::Candump => "candump",
             Self::Asc => "asc",
             Self::Blf => "blf",
+            Self::Trc => "trc",
+            Self::Savvy => "savvy",
             Self::Map => "map",
             Self::Dbc => "dbc",
             Self::Gearbox => "gearbox",
@@ -116,6 +124,8 @@ impl Target {
             Self::Candump => Format::Can(CanKind::Candump),
             Self::Asc => Format::Can(CanKind::Asc),
             Self::Blf => Format::Can(CanKind::Blf),
+            Self::Trc => Format::Can(CanKind::Trc),
+            Self::Savvy => Format::Can(CanKind::Savvy),
             _ => return None,
         })
     }
@@ -188,7 +198,14 @@ impl Fuzzer {
             Target::Log => files::log(self, input),
             Target::Table => files::table(self, input),
             Target::Step => samples::step_all(&self.vehicle, &self.observers, input),
-            Target::Csv | Target::Parquet | Target::Mdf | Target::Candump | Target::Asc | Target::Blf => {
+            Target::Csv
+            | Target::Parquet
+            | Target::Mdf
+            | Target::Candump
+            | Target::Asc
+            | Target::Blf
+            | Target::Trc
+            | Target::Savvy => {
                 // A file of another format is a case of another target.
                 if target.format() == Some(Format::of(input)) {
                     measured::log(self, input);
@@ -228,7 +245,14 @@ impl Fuzzer {
                 ["settings", "budget", "error_bound"].map(|name| text(&experiments.join(name).with_extension("toml"))),
             ),
             Target::Gearbox => seeds.extend(texts(&[self.folder.join("gearboxes")])),
-            Target::Csv | Target::Parquet | Target::Mdf | Target::Candump | Target::Asc | Target::Blf => {
+            Target::Csv
+            | Target::Parquet
+            | Target::Mdf
+            | Target::Candump
+            | Target::Asc
+            | Target::Blf
+            | Target::Trc
+            | Target::Savvy => {
                 let logs = measured::logs().into_iter().filter(|log| target.format() == Some(Format::of(log)));
                 seeds.extend(logs);
             }

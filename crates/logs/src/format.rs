@@ -40,7 +40,7 @@ const NOT_READ: &[(&[u8], &str)] = &[
     (b"%PDF", "this is a PDF"),
 ];
 const OLD_MDF: &str = "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf";
-const OTHER_FRAMES: &str = "these are frames of a bus in a form that is not read (PCAN trace, or a table of frames)\n\
+const OTHER_FRAMES: &str = "these are frames of a bus in a form that is not read (a table of frames)\n\
                             hint: convert it, for example with python-can: `python -m can.logconvert IN OUT.log`";
 const WITHOUT_STAMPS: &str =
     "these are frames as candump prints them, without time stamps\nhint: log with `candump -L`, or print with `-t a`";
@@ -73,7 +73,14 @@ impl Format {
             return Self::NotRead(WITHOUT_STAMPS);
         }
         let lower = first.to_lowercase();
-        if lower.starts_with(";$fileversion") || lower.starts_with("timestamp,arbitration_id,") {
+        // A trace of version 1.0 does not say its version.
+        if lower.starts_with(";$fileversion") || lower.starts_with(';') && text.to_lowercase().contains("pcan") {
+            return Self::Can(CanKind::Trc);
+        }
+        if lower.starts_with("time stamp,id,extended,") {
+            return Self::Can(CanKind::Savvy);
+        }
+        if lower.starts_with("timestamp,arbitration_id,") {
             return Self::NotRead(OTHER_FRAMES);
         }
         if lower.starts_with("date ") && !first.contains([',', ';', '\t'])

@@ -117,7 +117,7 @@ impl Log {
             Format::Mdf | Format::Parquet | Format::Can(CanKind::Blf) if is_followed => {
                 return Err(LogError::file(
                     path,
-                    "MDF, Parquet and BLF files cannot be followed while they are written\nhint: follow CSV, candump or ASC; read this file when it is complete",
+                    "MDF, Parquet and BLF files cannot be followed while they are written\nhint: follow CSV or a bus log as text; read this file when it is complete",
                 ));
             }
             Format::Mdf if is_file => {
@@ -425,4 +425,8 @@ pub enum CanKind {
     Asc,
     /// Vector's objects in containers.
     Blf,
+    /// PCAN trace.
+    Trc,
+    /// Table of frames of SavvyCAN.
+    Savvy,
 }

@@ -209,6 +209,24 @@ fn frames_behind_padding_of_any_size_and_value_are_read() {
 }
 
 #[test]
+fn frames_of_can_fd_without_their_last_bytes_have_the_others() {
+    let folder = Folder::new("trimmed");
+    let stamp = [2_u32.to_le_bytes().as_slice(), &[0; 4], &10_000_000_i64.to_le_bytes()].concat();
+    let (id, data) = (0x100_u32.to_le_bytes(), [0x40, 0x0c, 0, 0]);
+    // Twelve bytes are announced, and four are there.
+    let plain = [[1, 0, 0, 9].as_slice(), &id, &[0; 6], &[12], &[0; 5], &data].concat();
+    let newest = |more: u8| [[1, 9, 12, 0].as_slice(), &id, &[0; 27], &[more], &[0; 4], &data].concat();
+    let behind = [newest(76), vec![0xff; 8]].concat();
+    for (kind, body) in [(100, plain), (101, newest(0)), (101, behind)] {
+        let bytes = [blf_head(), blf_object(kind, &stamp, &body)].concat();
+        let (log, samples, notes) = read(&folder.write("fd.blf", bytes), &with_dbc()).unwrap();
+        assert_eq!((channel(&log, &samples, "N_Eng").len(), notes), (1, vec![]), "{kind} {body:?}");
+        // A signal of the bytes that are not there is missing.
+        assert_eq!(channel(&log, &samples, "N_Eng")[0].2, Quality::Good);
+    }
+}
+
+#[test]
 fn frames_before_the_start_of_a_recording_have_negative_times() {
     let folder = Folder::new("negative-times");
     let frames: Vec<u8> =

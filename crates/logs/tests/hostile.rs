@@ -137,17 +137,8 @@ fn a_broken_dbc_is_an_error() {
         }
         let _ = logs::can::Database::read(&folder.write("broken.dbc", &broken));
     }
-    for (text, message) in [
-        (
-            "VERSION \"\"\nBO_ 1 M: 8 X\n SG_ S : 0|65@1+ (1,0) [0|0] \"\" X\n",
-            "has 65 bits from bit 0, expected 1 to 64",
-        ),
-        ("VERSION \"\"\nBO_ 1 M: 8 X\n SG_ S : 0|0@1+ (1,0) [0|0] \"\" X\n", "has 0 bits from bit 0"),
-        ("hello", "this is no DBC that can be read"),
-    ] {
-        let error = logs::can::Database::read(&folder.write("wrong.dbc", text)).unwrap_err().to_string();
-        assert!(error.contains(message), "{error}");
-    }
+    let error = logs::can::Database::read(&folder.write("wrong.dbc", "hello")).unwrap_err().to_string();
+    assert!(error.contains("this is no DBC that can be read"), "{error}");
 }
 
 #[test]

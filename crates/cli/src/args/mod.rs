@@ -122,8 +122,8 @@ pub(crate) enum Command {
     /// List what is in a log, suggest a channel map, find the shifts
     ///
     /// Reads a log of any format: CSV (any delimiter, decimal comma, units in names or in a row), Parquet, ASAM MDF 4,
-    /// CAN logs (candump, ASC, BLF) with a DBC. `-` is standard input. Lists channels, units, groups, samples, rates, spans,
-    /// values, gaps, and samples that cannot be used.
+    /// CAN logs (candump, ASC, BLF, PCAN, SavvyCAN) with a DBC, also of J1939. `-` is standard input. Lists channels, units, groups,
+    /// samples, rates, spans, values, gaps, and samples that cannot be used.
     ///
     ///   wetclutch inspect drive.mf4
     ///   wetclutch inspect drive.blf --dbc bus.dbc --suggest > map.toml

@@ -66,6 +66,11 @@ fn begin_of_object(bytes: &[u8]) -> Option<usize> {
     bytes.windows(OBJECT.len()).take(PADDING_MAX + 1).position(|window| window == OBJECT)
 }
 
+/// The data of a frame of CAN FD with so many bytes: a writer may leave out the last ones.
+fn trimmed(data: &[u8], length: u8) -> &[u8] {
+    &data[..data.len().min(usize::from(length))]
+}
+
 /// Little-endian numbers; zero beyond the end.
 fn bytes_at<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     bytes.get(at..at + N).and_then(|bytes| bytes.try_into().ok()).unwrap_or([0; N])
@@ -196,12 +201,14 @@ impl Blf {
                 (u32_at(body, 4), body.get(8..8 + length)?, body.get(2)? & 0x80 != 0)
             }
             CAN_FD_MESSAGE => {
-                let length = usize::from(*body.get(14)?);
-                (u32_at(body, 4), body.get(20..20 + length)?, body.get(2)? & 0x80 != 0)
+                let data = body.get(20..)?;
+                (u32_at(body, 4), trimmed(data, *body.get(14)?), body.get(2)? & 0x80 != 0)
             }
             CAN_FD_MESSAGE_64 => {
-                let length = usize::from(*body.get(2)?);
-                (u32_at(body, 4), body.get(40..40 + length)?, u32_at(body, 12) & 0x10 != 0)
+                // Behind the data may stand more, from a place that counts from the begin of the object.
+                let more = usize::from(*body.get(35)?);
+                let end = if more == 0 { body.len() } else { more.checked_sub(object.header)?.min(body.len()) };
+                (u32_at(body, 4), trimmed(body.get(40..end)?, *body.get(2)?), u32_at(body, 12) & 0x10 != 0)
             }
             _ => return None,
         };

@@ -4,12 +4,14 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use can_dbc::{
-    ByteOrder, Dbc, DbcError, ExtendedMultiplex, MessageId, MultiplexIndicator, NumericValue, SignalExtendedValueType,
-    ValDescription, ValueDescription, ValueType,
+    AttributeValue, ByteOrder, Dbc, DbcError, ExtendedMultiplex, MessageId, MultiplexIndicator, NumericValue,
+    SignalExtendedValueType, ValDescription, ValueDescription, ValueType,
 };
 use trace::text_file::LARGEST_LIST;
 
 use super::Frame;
+use super::bits::{Bits, Number};
+use super::j1939::{self, Protocol};
 use super::names::Named;
 use crate::error::shown;
 use crate::samples::{Quality, Sample};
@@ -23,10 +25,23 @@ pub struct Database {
     channels: Vec<Channel>,
     /// Names of messages whose identifier an earlier one has, behind the name of that one.
     same_identifier: BTreeMap<Key, Vec<String>>,
+    /// The first message of each parameter group of J1939.
+    groups: HashMap<u32, Key>,
+    /// What is wrong with signals that are left out.
+    left_out: Vec<String>,
 }
 
 /// An identifier, and whether it is an extended one.
 type Key = (bool, u32);
+
+/// The message of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Found {
+    /// By its identifier.
+    Message(Key),
+    /// By its parameter group.
+    Group(Key),
+}
 
 #[derive(Debug, Clone)]
 struct Signal {
@@ -39,6 +54,8 @@ struct Signal {
     missing: Vec<u64>,
     /// Whether a value with every bit set is none.
     can_saturate: bool,
+    /// The largest raw value that is one, of a parameter group of J1939.
+    largest_raw: Option<u64>,
     /// In force only while a multiplexor has one of these values.
     multiplexed: Option<Multiplexed>,
 }
@@ -50,63 +67,11 @@ struct Multiplexed {
     values: Vec<(u64, u64)>,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Bits {
-    start: usize,
-    size: usize,
-    big_endian: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Number {
-    Unsigned,
-    Signed,
-    Float,
-    Double,
-}
-
-impl Number {
-    /// The number in so many bits.
-    // A double keeps 53 bits; a float has 32.
-    pub(super) fn of(self, raw: u64, size: usize) -> f64 {
-        match self {
-            Self::Unsigned => raw as f64,
-            Self::Signed => ((raw << (64 - size)).cast_signed() >> (64 - size)) as f64,
-            Self::Float => f64::from(f32::from_bits(raw as u32)),
-            Self::Double => f64::from_bits(raw),
-        }
-    }
-}
-
-impl Bits {
-    /// The raw value; none if the frame ends before.
-    fn of(self, data: &[u8]) -> Option<u64> {
-        let mut raw = 0_u64;
-        let mut at = self.start;
-        for i in 0..self.size {
-            let bit = u64::from(data.get(at / 8)? >> (at % 8) & 1);
-            if self.big_endian {
-                raw = raw << 1 | bit;
-                // To the next lower bit; from the lowest of a byte to the highest of the next byte.
-                at = if at.is_multiple_of(8) { at + 15 } else { at - 1 };
-            } else {
-                raw |= bit << i;
-                at += 1;
-            }
-        }
-        Some(raw)
-    }
-
-    fn all_set(self, raw: u64) -> bool {
-        raw == u64::MAX >> (64 - self.size)
-    }
-}
-
 impl Database {
     /// Reads a DBC. Text that is neither UTF-8 nor UTF-16 is read as Latin-1.
     ///
     /// # Errors
-    /// The file cannot be read, is no DBC, or has a signal of an impossible size.
+    /// The file cannot be read or is no DBC. A signal of an impossible size is left out, with a note.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let bytes = trace::read_small(path, LARGEST_LIST).map_err(LogError::io(path))?;
         Self::parse(path, &trace::text::text_of(&bytes))
@@ -115,21 +80,35 @@ impl Database {
     fn parse(path: &Path, text: &str) -> Result<Self, LogError> {
         let dbc = Dbc::try_from(text).map_err(|error| no_dbc(path, &error))?;
         let entries = Entries::of(&dbc);
-        let mut database = Self { messages: HashMap::new(), channels: Vec::new(), same_identifier: BTreeMap::new() };
+        let mut database = Self {
+            messages: HashMap::new(),
+            channels: Vec::new(),
+            same_identifier: BTreeMap::new(),
+            groups: HashMap::new(),
+            left_out: Vec::new(),
+        };
         let mut first_names: HashMap<Key, &str> = HashMap::new();
         for message in &dbc.messages {
             let key = match message.id {
                 MessageId::Standard(id) => (false, u32::from(id)),
                 MessageId::Extended(id) => (true, id),
             };
-            let multiplexors = Multiplexors::of(&entries, message);
-            let mut signals = Vec::with_capacity(message.signals.len());
-            for signal in &message.signals {
+            let is_group = entries.protocol.is_group(message.id);
+            if let (true, (_, id)) = (is_group, key) {
+                database.groups.entry(j1939::parameter_group(id)).or_insert(key);
+            }
+            let numbers = message.signals.iter().map(|signal| (signal, entries.number(message, signal)));
+            let (sound, faults): (Vec<_>, Vec<_>) = numbers.partition(|(_, number)| number.is_ok());
+            database.left_out.extend(faults.into_iter().filter_map(|(_, number)| number.err()));
+            let sound: Vec<(&can_dbc::Signal, Number)> =
+                sound.into_iter().filter_map(|(signal, number)| Some((signal, number.ok()?))).collect();
+            let multiplexors = Multiplexors::of(&entries, message.id, &sound);
+            let mut signals = Vec::with_capacity(sound.len());
+            for (signal, number) in &sound {
                 let channel = database.channels.len();
-                let read = Signal::of(&multiplexors, message, signal, channel);
-                signals.push(read.map_err(|what| LogError::file(path, what))?);
+                signals.push(Signal::of(&multiplexors, signal, *number, (channel, is_group)));
                 database.channels.push(Channel {
-                    name: signal.name.clone(),
+                    name: entries.name(message.id, signal).to_owned(),
                     unit: signal.unit.clone(),
                     group: message.name.clone(),
                 });
@@ -150,9 +129,10 @@ impl Database {
         &self.channels
     }
 
-    /// The messages that have one identifier, in sentences.
+    /// The messages that have one identifier, and signals that are left out, in sentences.
     pub(super) fn notes(&self) -> impl Iterator<Item = String> {
-        self.same_identifier.iter().map(|(key, names)| {
+        let left_out = self.left_out.iter().map(|what| format!("{what}: it is left out"));
+        let same = self.same_identifier.iter().map(|(key, names)| {
             let names: Vec<String> = names.iter().map(|name| format!("`{}`", error::shown(name))).collect();
             format!(
                 "the messages {} have the same identifier {} in the DBC: each of its frames is read as all of them\n\
@@ -160,13 +140,24 @@ impl Database {
                 error::some(&names),
                 super::shown(*key)
             )
-        })
+        });
+        same.chain(left_out)
     }
 
-    /// Appends the wanted signals of a frame; false if its message is not known.
-    pub(crate) fn decode(&self, frame: &Frame, wanted: &[bool], batch: &mut Vec<Sample>) -> bool {
-        let Some(messages) = self.messages.get(&(frame.extended, frame.id)) else { return false };
-        for signals in messages {
+    /// The message of a frame, by its identifier or else by its parameter group.
+    pub(super) fn find(&self, frame: &Frame) -> Option<Found> {
+        let key = (frame.extended, frame.id);
+        if self.messages.contains_key(&key) {
+            return Some(Found::Message(key));
+        }
+        let group = || self.groups.get(&j1939::parameter_group(frame.id)).copied();
+        frame.extended.then(group)?.map(Found::Group)
+    }
+
+    /// Appends the wanted signals of a frame with this message.
+    pub(super) fn decode(&self, found: Found, frame: &Frame, wanted: &[bool], batch: &mut Vec<Sample>) {
+        let (Found::Message(key) | Found::Group(key)) = found;
+        for signals in self.messages.get(&key).into_iter().flatten() {
             for signal in signals.iter().filter(|signal| wanted.get(signal.channel) == Some(&true)) {
                 if !in_force(signals, signal, frame.data(), 0) {
                     continue;
@@ -178,44 +169,24 @@ impl Database {
                 batch.push(Sample { channel: signal.channel, time_s: frame.time_s, value, quality });
             }
         }
-        true
     }
 }
 
 impl Signal {
-    /// That of a DBC, whose values are those of this channel; the error is what is wrong with it.
+    /// That of a DBC, whose values are those of this channel; whether it is of a parameter group of J1939.
     fn of(
         multiplexors: &Multiplexors<'_>,
-        message: &can_dbc::Message,
         signal: &can_dbc::Signal,
-        channel: usize,
-    ) -> Result<Self, String> {
-        let whole = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
-        let (start, size) = (whole(signal.start_bit), whole(signal.size));
-        if size == 0 || size > 64 || start >= 8 * super::PAYLOAD {
-            return Err(format!(
-                "signal `{}` of message `{}` has {size} bits from bit {start}, expected 1 to 64 within 64 bytes",
-                signal.name, message.name
-            ));
-        }
-        let (entries, place) = (multiplexors.entries, (message.id, signal.name.as_str()));
-        let number = match (entries.floats.get(&place), signal.value_type, size) {
-            (Some(SignalExtendedValueType::IEEEfloat32Bit), _, 32) => Number::Float,
-            (Some(SignalExtendedValueType::IEEEdouble64bit), _, 64) => Number::Double,
-            (Some(SignalExtendedValueType::IEEEfloat32Bit | SignalExtendedValueType::IEEEdouble64bit), ..) => {
-                return Err(format!(
-                    "signal `{}` of message `{}` is a float of {size} bits, expected 32 or 64",
-                    signal.name, message.name
-                ));
-            }
-            (_, ValueType::Signed, _) => Number::Signed,
-            (_, ValueType::Unsigned, _) => Number::Unsigned,
-        };
+        number: Number,
+        (channel, is_of_group): (usize, bool),
+    ) -> Self {
+        let [start, size] = place_of(signal);
+        let (entries, place) = (multiplexors.entries, (multiplexors.message, signal.name.as_str()));
         let (factor, offset) = (signal.factor, signal.offset);
         let range = [bound(signal.min), bound(signal.max)];
         let named = Named { size, number, factor, offset, unit: &signal.unit, range };
         let names = entries.names.get(&place).copied().unwrap_or_default();
-        Ok(Self {
+        Self {
             channel,
             bits: Bits { start, size, big_endian: signal.byte_order == ByteOrder::BigEndian },
             number,
@@ -223,12 +194,13 @@ impl Signal {
             offset,
             missing: named.missing(names),
             can_saturate: number == Number::Unsigned && size >= 8 && !named.ends_at_all_bits(),
+            largest_raw: j1939::largest_raw(size).filter(|_| is_of_group && number == Number::Unsigned),
             multiplexed: multiplexors.multiplexed(signal),
-        })
+        }
     }
 
     fn value(&self, raw: u64) -> (f64, Quality) {
-        if self.missing.binary_search(&raw).is_ok() {
+        if self.missing.binary_search(&raw).is_ok() || self.largest_raw.is_some_and(|largest| raw > largest) {
             return (f64::NAN, Quality::Missing);
         }
         let value = self.number.of(raw, self.bits.size) * self.factor + self.offset;
@@ -270,6 +242,14 @@ struct Entries<'d> {
     floats: HashMap<(MessageId, &'d str), SignalExtendedValueType>,
     ranges: HashMap<(MessageId, &'d str), &'d ExtendedMultiplex>,
     names: HashMap<(MessageId, &'d str), &'d [ValDescription]>,
+    /// Names of signals that are longer than the 32 characters of a DBC.
+    long_names: HashMap<(MessageId, &'d str), &'d str>,
+    protocol: Protocol<'d>,
+}
+
+/// First bit and number of bits.
+fn place_of(signal: &can_dbc::Signal) -> [usize; 2] {
+    [signal.start_bit, signal.size].map(|number| usize::try_from(number).unwrap_or(usize::MAX))
 }
 
 impl<'d> Entries<'d> {
@@ -286,7 +266,36 @@ impl<'d> Entries<'d> {
                 names.entry((*message_id, &**name)).or_insert(&**value_descriptions);
             }
         }
-        Self { floats, ranges, names }
+        let mut long_names = HashMap::new();
+        for given in dbc.attribute_values_signal.iter().filter(|given| given.name == "SystemSignalLongSymbol") {
+            if let AttributeValue::String(name) = &given.value {
+                long_names.entry((given.message_id, &*given.signal_name)).or_insert(&**name);
+            }
+        }
+        Self { floats, ranges, names, long_names, protocol: Protocol::of(dbc) }
+    }
+
+    /// The name of a signal: the long one, where there is one.
+    fn name(&self, message: MessageId, signal: &'d can_dbc::Signal) -> &'d str {
+        self.long_names.get(&(message, &*signal.name)).copied().unwrap_or(&signal.name)
+    }
+
+    /// What the bits of a signal are; the error is what is wrong with it.
+    fn number(&self, message: &can_dbc::Message, signal: &can_dbc::Signal) -> Result<Number, String> {
+        let [start, size] = place_of(signal);
+        let named = format!("signal `{}` of message `{}`", shown(&signal.name), shown(&message.name));
+        if size == 0 || size > 64 || start >= 8 * super::PAYLOAD {
+            return Err(format!("{named} has {size} bits from bit {start}, expected 1 to 64 within 64 bytes"));
+        }
+        match (self.floats.get(&(message.id, &*signal.name)), signal.value_type, size) {
+            (Some(SignalExtendedValueType::IEEEfloat32Bit), _, 32) => Ok(Number::Float),
+            (Some(SignalExtendedValueType::IEEEdouble64bit), _, 64) => Ok(Number::Double),
+            (Some(SignalExtendedValueType::IEEEfloat32Bit | SignalExtendedValueType::IEEEdouble64bit), ..) => {
+                Err(format!("{named} is a float of {size} bits, expected 32 or 64"))
+            }
+            (_, ValueType::Signed, _) => Ok(Number::Signed),
+            (_, ValueType::Unsigned, _) => Ok(Number::Unsigned),
+        }
     }
 }
 
@@ -301,16 +310,16 @@ struct Multiplexors<'d> {
 }
 
 impl<'d> Multiplexors<'d> {
-    fn of(entries: &'d Entries<'d>, message: &'d can_dbc::Message) -> Self {
+    fn of(entries: &'d Entries<'d>, message: MessageId, signals: &[(&'d can_dbc::Signal, Number)]) -> Self {
         let mut places = HashMap::new();
-        for (place, signal) in message.signals.iter().enumerate() {
+        for (place, (signal, _)) in signals.iter().enumerate() {
             places.entry(&*signal.name).or_insert(place);
         }
-        let main = message.signals.iter().position(|signal| {
+        let main = signals.iter().position(|(signal, _)| {
             signal.multiplexer_indicator == MultiplexIndicator::Multiplexor
-                && !entries.ranges.contains_key(&(message.id, &*signal.name))
+                && !entries.ranges.contains_key(&(message, &*signal.name))
         });
-        Self { message: message.id, entries, places, main }
+        Self { message, entries, places, main }
     }
 
     /// When a signal is in force; none if always.

@@ -1,15 +1,22 @@
-//! CAN logs: frames from candump, ASC or BLF files, and the signals that a DBC finds in them.
+//! CAN logs: frames from candump, ASC, BLF, PCAN and SavvyCAN files, and the signals that a DBC finds in them.
 
+mod bits;
 mod blf;
 mod database;
+mod j1939;
+mod line;
 mod names;
+mod savvy;
 mod text;
+mod trc;
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 
 pub use database::Database;
+
+use self::database::Found;
 
 use crate::LogError;
 use crate::columns::{Batch, Stream};
@@ -89,6 +96,8 @@ impl CanLog {
             CanKind::Candump => "CAN log (candump)",
             CanKind::Asc => "CAN log (ASC)",
             CanKind::Blf => "CAN log (BLF)",
+            CanKind::Trc => "CAN log (PCAN trace)",
+            CanKind::Savvy => "CAN log (SavvyCAN)",
         }
     }
 
@@ -106,7 +115,9 @@ impl CanLog {
 
 fn frames(path: &Path, kind: CanKind, input: Box<dyn Read>) -> Result<Box<dyn Frames>, LogError> {
     Ok(match kind {
-        CanKind::Candump | CanKind::Asc => Box::new(text::Lines::new(path, kind, input)),
+        CanKind::Candump | CanKind::Asc | CanKind::Trc | CanKind::Savvy => {
+            Box::new(text::Lines::new(path, kind, input))
+        }
         CanKind::Blf => Box::new(blf::Blf::open(path, input)?),
     })
 }
@@ -145,6 +156,9 @@ pub(crate) struct Decoder<'a> {
     /// The bus of the first frame of each message, and the message that came on another one too.
     buses: HashMap<(bool, u32), u32>,
     on_two_buses: Option<(bool, u32)>,
+    /// The control unit that sends each parameter group first, and the first group that another one sends too.
+    sources: HashMap<u32, u32>,
+    other_source: Option<(u32, [u32; 2])>,
 }
 
 impl<'a> Decoder<'a> {
@@ -157,24 +171,43 @@ impl<'a> Decoder<'a> {
             unknown_frames: 0,
             buses: HashMap::new(),
             on_two_buses: None,
+            sources: HashMap::new(),
+            other_source: None,
         }
     }
 
     pub(crate) fn decode(&mut self, frame: &Frame, batch: &mut Vec<Sample>) {
         const MAXIMUM: usize = 4096;
         self.frames += 1;
-        if !self.database.decode(frame, &self.wanted, batch) {
+        let key = (frame.extended, frame.id);
+        let Some(found) = self.database.find(frame) else {
             self.unknown_frames += 1;
             let known = self.unknown.len();
-            if let Some(count) = self.unknown.get_mut(&(frame.extended, frame.id)) {
+            if let Some(count) = self.unknown.get_mut(&key) {
                 *count += 1;
             } else if known < MAXIMUM {
-                self.unknown.insert((frame.extended, frame.id), 1);
+                self.unknown.insert(key, 1);
             }
-        } else if self.on_two_buses.is_none() {
-            let key = (frame.extended, frame.id);
+            return;
+        };
+        if !self.is_first_source(found, frame) {
+            return;
+        }
+        self.database.decode(found, frame, &self.wanted, batch);
+        if self.on_two_buses.is_none() {
             self.on_two_buses = Some(key).filter(|_| *self.buses.entry(key).or_insert(frame.bus) != frame.bus);
         }
+    }
+
+    /// Whether a frame is of the control unit that sends its parameter group first, where it is known by that.
+    fn is_first_source(&mut self, found: Found, frame: &Frame) -> bool {
+        let Found::Group(_) = found else { return true };
+        let (group, source) = (j1939::parameter_group(frame.id), j1939::source(frame.id));
+        let first = *self.sources.entry(group).or_insert(source);
+        if first != source && self.other_source.is_none() {
+            self.other_source = Some((group, [first, source]));
+        }
+        first == source
     }
 
     pub(crate) fn notes(&self) -> Vec<String> {
@@ -185,7 +218,14 @@ impl<'a> Decoder<'a> {
                 shown(key)
             )
         };
+        let of_others = |(group, [first, other]): (u32, [u32; 2])| {
+            format!(
+                "parameter group {group} comes from several control units: that of the first one, 0x{first:02X}, is read, and not that of 0x{other:02X}\n\
+                 hint: for another one give the message the identifier of its frames in the DBC"
+            )
+        };
         let mut notes: Vec<String> = self.database.notes().chain(self.on_two_buses.map(mixed)).collect();
+        notes.extend(self.other_source.map(of_others));
         if self.unknown_frames == 0 {
             return notes;
         }

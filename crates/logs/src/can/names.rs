@@ -12,7 +12,7 @@
 use can_dbc::ValDescription;
 use trace::Unit;
 
-use super::database::Number;
+use super::bits::Number;
 
 /// Words that deny a value, in any signal. Umlauts are written out before.
 const NO_VALUE: &[&str] = &[

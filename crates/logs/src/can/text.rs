@@ -1,8 +1,11 @@
-//! CAN logs as text: candump and ASC.
+//! CAN logs as text: candump and ASC; lines of [PCAN traces](super::trc) and [SavvyCAN](super::savvy) have files of their own.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use super::line::{Line, classic_length};
+use super::savvy::Savvy;
+use super::trc::Trc;
 use super::{Frame, Frames, PAYLOAD};
 use crate::log::CanKind;
 use crate::stamp::StampForm;
@@ -36,14 +39,9 @@ pub(crate) struct Lines {
     falling: u64,
     /// Names of the interfaces (candump).
     interfaces: Vec<String>,
-}
-
-/// What a line is.
-enum Line {
-    Frame(Frame),
-    /// A header, a comment, an error or remote frame.
-    Remark,
-    Unread,
+    /// Columns of a PCAN trace, and of SavvyCAN.
+    trc: Trc,
+    savvy: Savvy,
 }
 
 impl Lines {
@@ -65,6 +63,8 @@ impl Lines {
             rising: 0,
             falling: 0,
             interfaces: Vec::new(),
+            trc: Trc::new(),
+            savvy: Savvy::default(),
         }
     }
 
@@ -230,17 +230,14 @@ impl Lines {
     }
 }
 
-/// Bytes of a classic frame by its length code, a digit of base 16: codes above eight are eight bytes too.
-fn classic_length(code: &str) -> Option<usize> {
-    usize::from_str_radix(code, 16).ok().filter(|code| *code <= 0xf).map(|code| code.min(8))
-}
-
 impl Frames for Lines {
     fn next_frame(&mut self) -> Result<Option<Frame>, LogError> {
         while self.read()? {
             let text = String::from_utf8_lossy(&self.line).into_owned();
             let line = match self.kind {
                 CanKind::Asc => self.asc(&text),
+                CanKind::Trc => self.trc.line(&text),
+                CanKind::Savvy => self.savvy.line(&text),
                 _ => self.candump(&text),
             };
             // Of a last line without an end digits or bytes may be missing.

@@ -1,0 +1,4 @@
+//! Measured logs, from tables of frames of SavvyCAN.
+#![no_main]
+
+fuzz_targets::program!(Savvy);
