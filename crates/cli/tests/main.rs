@@ -22,6 +22,7 @@ mod fit;
 mod fit_gearbox;
 mod garage;
 mod hostile_files;
+mod json;
 mod late_commands;
 mod layshaft;
 mod learnt;

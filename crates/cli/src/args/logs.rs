@@ -218,6 +218,9 @@ pub(crate) struct Init {
     /// The vehicle file
     #[arg(short, long, value_name = "CAR.toml")]
     pub(crate) output: PathBuf,
+    /// Print the files as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// What connects the engine with the gearbox.

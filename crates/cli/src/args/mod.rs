@@ -354,6 +354,9 @@ pub(crate) struct Demo {
     /// Open the page in the browser
     #[arg(long)]
     pub(crate) open: bool,
+    /// Print files and errors as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -369,6 +372,9 @@ pub(crate) struct Simulate {
     /// Folder for the signals
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
+    /// Print files and drive as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -418,6 +424,9 @@ pub(crate) struct Export {
     /// Folder for the files
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
+    /// Print the files as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// A page of what a command prints.

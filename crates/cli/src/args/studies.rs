@@ -118,6 +118,9 @@ pub(crate) struct StudyOptions {
     /// Make only this run again, and write all its signals and its figure
     #[arg(long, value_name = "RUN", allow_negative_numbers = true, conflicts_with_all = ["resume", "shard"])]
     pub(crate) run: Option<u64>,
+    /// Print files and errors as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -197,6 +200,9 @@ pub(crate) struct WorstCaseOptions {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) threads: Threads,
+    /// Print the worst cases as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// One of equal parts of a study.
@@ -245,4 +251,7 @@ pub(crate) struct Merge {
     /// Folder for the merged study
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
+    /// Print files and errors as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }

@@ -1,13 +1,14 @@
 //! `wetclutch demo`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use car::Vehicle;
 use config::{ExperimentFile, VehicleFile};
 use report::Page;
 use report::page::findings;
 use report::tables::phase_name;
-use study::{AnyObserver, Comparison, RunColumns, compare, estimates_trace};
+use serde_json::{Value, json};
+use study::{AnyObserver, Comparison, ObserverRun, PhaseScore, RunColumns, compare, estimates_trace};
 use trace::{ShownPath as _, Trace, signal, units};
 use wetclutch::estimate::one_shift::observer::best;
 
@@ -43,7 +44,13 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     write_trace(&measured_only, &measured)?;
     write_trace(&estimate, &default_estimate(&vehicle, &measured)?)?;
 
-    print(&comparison, &report)?;
+    if options.json {
+        let figures = page.figures.iter().map(|(name, _)| folder.join(name));
+        let files = [report.clone(), trace, measured_only, estimate].into_iter().chain(figures);
+        output::json(&json!({ "files": shown(files), "runs": errors(&comparison) }))?;
+    } else {
+        print(&comparison, &report)?;
+    }
     if options.open {
         browser::open(&report);
     }
@@ -56,6 +63,21 @@ fn default_estimate(vehicle: &Vehicle, measured: &Trace) -> Result<Trace, Failur
     let observer = AnyObserver::designed(vehicle, kind, method, measured.median_step_s(), None)?;
     let estimates = observer.run(vehicle, &RunColumns::of(measured, vehicle)?);
     Ok(estimates_trace(&measured.time_s, &estimates))
+}
+
+/// The names of files in JSON.
+pub(super) fn shown(files: impl IntoIterator<Item = PathBuf>) -> Vec<String> {
+    files.into_iter().map(|file| file.shown().to_string()).collect()
+}
+
+/// Errors of the pressure of each observer by phase, Pa.
+fn errors(comparison: &Comparison) -> Vec<Value> {
+    let phase = |score: &PhaseScore| {
+        let name = phase_name(score.phase);
+        json!({ "phase": name, "peak_pa": score.peak, "rms_pa": score.rms, "mean_pa": score.mean })
+    };
+    let run = |run: &ObserverRun| json!({ "observer": run.entry.name, "phases": run.pressure.iter().map(phase).collect::<Vec<_>>() });
+    comparison.runs.iter().map(run).collect()
 }
 
 fn print(comparison: &Comparison, report: &Path) -> Result<(), Failure> {

@@ -1,6 +1,6 @@
 //! `wetclutch demo --vehicle`: a drive through all gears of any car, with the estimate of every shift.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use car::ErrorBudget;
 use car::{Car, Drive};
@@ -8,6 +8,7 @@ use config::{DriveFile, Source};
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
 use report::matrix_page::{kind_rows, not_driven};
+use serde_json::json;
 use study::gearbox::drive::{ScoredDrive, score_drive};
 use study::gearbox::matrix::{Matrix, Random};
 use study::gearbox::measured::MeasuredRow;
@@ -17,10 +18,11 @@ use study::gearbox::{RECORD_S, ShiftDraw};
 use trace::{Cell, ShownPath as _};
 use wetclutch::studies::bench_sensors;
 
+use super::demo::shown;
 use super::simulate_drive::{DriveTables, keeps_inputs};
 use crate::args::Demo;
 use crate::browser;
-use crate::commands::{read_car, writable, write_cells, write_text};
+use crate::commands::{JsonObject, read_car, writable, write_cells, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -60,14 +62,20 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     };
     output::note("running the filter and the open loop");
     let scored = score_drive(&car, &model, &recording, &bench_sensors()?, options.seed)?;
-    write_signals(folder, &car, &recording)?;
+    let signals = write_signals(folder, &car, &recording)?;
     let cells: Vec<Vec<(String, Cell<'_>)>> = scored.shifts.iter().map(|shift| shift_cells(shift, &car)).collect();
     write_cells(&folder.join(SHIFTS), &cells)?;
     let sources: Vec<&Source> = std::iter::once(&car.source).chain(drive.iter().map(|drive| &drive.source)).collect();
     let page =
         DrivePage { name: &name, car: &car, draw: Some((&draw, options.seed)), drive: &scored, sources: &sources };
     write_text(&folder.join(PAGE), &page.html()?)?;
-    print(&scored, &car, &folder.join(PAGE))?;
+    if options.json {
+        let files = signals.into_iter().chain([PAGE, SHIFTS].map(|name| folder.join(name)));
+        let shifts: Vec<_> = cells.into_iter().map(JsonObject::of).collect();
+        output::json(&json!({ "files": shown(files), "shifts": shifts }))?;
+    } else {
+        print(&scored, &car, &folder.join(PAGE))?;
+    }
     if options.open {
         browser::open(&folder.join(PAGE));
     }
@@ -109,10 +117,10 @@ fn say_left_out(left_out: &[LeftOut], car: &Car) {
 }
 
 /// The signals of the drive, as `simulate` writes them.
-fn write_signals(folder: &Path, car: &Car, recording: &Recording) -> Result<(), Failure> {
+fn write_signals(folder: &Path, car: &Car, recording: &Recording) -> Result<[PathBuf; 2], Failure> {
     let mut tables = DriveTables::create(folder, NAME, car, None)?;
     recording.samples.iter().try_for_each(|sample| tables.write(car, &MeasuredRow::exact(sample)))?;
-    tables.finish(folder).map(drop)
+    tables.finish(folder)
 }
 
 fn print(drive: &ScoredDrive, car: &Car, page: &Path) -> Result<(), Failure> {

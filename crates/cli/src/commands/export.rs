@@ -3,6 +3,7 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use serde_json::json;
 use trace::{ShownPath as _, WholeFile};
 use wetclutch::{ExportOptions, ExportedFile, VehicleFile, read_sensors};
 
@@ -24,6 +25,10 @@ pub(crate) fn export(options: &Export) -> Result<(), Failure> {
         not_an_input(Some(&options.output.join(&file.name)), [&options.vehicle])?;
     }
     write_all(&options.output, &files)?;
+    if options.json {
+        let object = |file: &ExportedFile| json!({ "path": options.output.join(&file.name).shown().to_string(), "bytes": file.bytes.len() });
+        return output::json(&json!({ "files": files.iter().map(object).collect::<Vec<_>>() }));
+    }
     for file in &files {
         output::line(&format!("{:>9} bytes  {}", file.bytes.len(), options.output.join(&file.name).shown()))?;
     }

@@ -1,10 +1,11 @@
 //! `wetclutch init`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use config::Source;
 use config::gearbox::SHIPPED;
 use config::vehicle::short::{CarFacts, Facts, complete_file, short_car_file, short_file, sized_gearbox};
+use serde_json::json;
 use trace::ShownPath as _;
 
 use crate::args::{Init, LaunchChoice};
@@ -21,10 +22,16 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
             format!("{}: the file is there already\nhint: choose another name after -o", options.output.shown());
         return Err(Failure::Input(message));
     }
-    match &options.gearbox {
-        Some(gearbox) => car(options, gearbox),
-        None => one_shift(options),
+    let gearbox = match &options.gearbox {
+        Some(gearbox) => car(options, gearbox)?,
+        None => one_shift(options).map(|()| None)?,
+    };
+    if options.json {
+        let gearbox = gearbox.map(|path| path.shown().to_string());
+        output::json(&json!({ "vehicle": options.output.shown().to_string(), "gearbox": gearbox }))?;
     }
+    say_what_is_next(options);
+    Ok(())
 }
 
 /// A vehicle file of one upshift.
@@ -44,13 +51,11 @@ fn one_shift(options: &Init) -> Result<(), Failure> {
         valve: options.valve.into(),
     };
     let text = if options.complete { complete_file } else { short_file }(&facts, options.stroke)?;
-    write_text(&options.output, &text)?;
-    say_what_is_next(options);
-    Ok(())
+    write_text(&options.output, &text)
 }
 
-/// A vehicle file with a gearbox, and the gearbox file beside it if it is one of the program's.
-fn car(options: &Init, gearbox: &str) -> Result<(), Failure> {
+/// A vehicle file with a gearbox, and the gearbox file beside it if it is one of the program's, which is returned.
+fn car(options: &Init, gearbox: &str) -> Result<Option<PathBuf>, Failure> {
     let torque_n_m = options.engine_torque_n_m;
     let shipped = SHIPPED.iter().find(|(name, _)| *name == gearbox);
     let (source, named, beside) = match shipped {
@@ -84,8 +89,7 @@ fn car(options: &Init, gearbox: &str) -> Result<(), Failure> {
         output::note(&format!("gearbox file: {}", path.shown()));
     }
     write_text(&options.output, &text)?;
-    say_what_is_next(options);
-    Ok(())
+    Ok(beside)
 }
 
 /// The gearbox file of a car, and what may be given where there is none.

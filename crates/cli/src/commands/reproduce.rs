@@ -8,7 +8,7 @@ use study::statements::Case;
 use trace::ShownPath as _;
 
 use crate::args::Reproduce;
-use crate::commands::{progress, writable, write_text};
+use crate::commands::{progress, warn_without_effect, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -17,13 +17,17 @@ pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
     writable(&options.output, &FILES)?;
     let (vehicle, study) = (VehicleFile::built_in()?, Study::plausible()?);
     let settings = options.settings.map_or(study.runs, |settings| u64::from(settings).min(study.runs));
+    if options.settings.is_some_and(|wanted| u64::from(wanted) > study.runs) {
+        warn_without_effect("--settings", &format!("there are {} settings, and all are run", study.runs));
+    }
     output::note(&format!("running experiments E1 to E4, and again in {settings} settings"));
     let bar = progress(settings, 0);
     let experiments = ExperimentFile::built_in()?;
     let chapter = study::reproduce(&vehicle, &experiments, &study, settings, options.threads.count(), || bar.inc(1))?;
     bar.finish_and_clear();
     let reproduction = Reproduction::of(&chapter, &vehicle, &experiments, &study)?;
-    let json = format!("{:#}\n", numbers(&chapter));
+    let numbers = numbers(&chapter);
+    let json = format!("{numbers:#}\n");
     let texts = [&reproduction.html, &reproduction.markdown, &json];
     for (name, text) in FILES.iter().zip(texts) {
         write_text(&options.output.join(name), text)?;
@@ -32,8 +36,7 @@ pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
         write_text(&options.output.join(name), svg)?;
     }
     if options.json {
-        output::line(json.trim_end())?;
-        return Ok(());
+        return output::json(&numbers);
     }
     for row in &chapter.statements {
         let verdict = row.agrees.map_or("", |agrees| if agrees { "agrees" } else { "differs" });

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use car::{Experiment, Sensors, Vehicle};
 use config::{ExperimentFile, Kind, Source};
+use serde_json::{Value, json};
 use study::drive::{DriveColumns, DriveRow, Recording};
 use study::sampling::through_sensors;
-use study::{ShiftRating, ShiftSample};
+use study::{ShiftQuality, ShiftRating, ShiftSample};
 use trace::{CsvWriter, ShownPath as _, Trace, WholeFile, signal};
 
 use super::simulate_drive::simulate_drive;
@@ -49,7 +50,8 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     written?;
     let ((whole_file, whole), (measured_file, measured)) = (whole.complete()?, measured.complete()?);
     WholeFile::finish_all([whole_file, measured_file]).map_err(|error| Failure::writing(&options.output, &error))?;
-    match rating.finish() {
+    let rated = rating.finish();
+    match &rated {
         Some(quality) => output::note(&format!(
             "shift: torque phase {:.3} to {:.3} s, inertia phase to {:.3} s, flare {:.1} rad/s, jerk {:.1} m/s^3",
             quality.torque_phase_start_s,
@@ -60,9 +62,30 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
         )),
         None => output::note("the shift was not completed within the simulated time"),
     }
-    output::line(&whole.shown().to_string())?;
-    output::line(&measured.shown().to_string())?;
-    Ok(())
+    print(options, &[whole, measured], &json!({ "shift": rated.as_ref().map(of_shift) }))
+}
+
+/// The shift in SI.
+fn of_shift(quality: &ShiftQuality) -> Value {
+    json!({
+        "torque_phase_start_s": quality.torque_phase_start_s,
+        "inertia_phase_start_s": quality.inertia_phase_start_s,
+        "lock_up_s": quality.lock_up_s,
+        "flare_rad_s": quality.flare_rad_s,
+        "least_shaft_torque_n_m": quality.least_shaft_torque_n_m,
+        "jerk_peak_m_s3": quality.jerk_peak_m_s3,
+        "vibration_dose_m_s175": quality.vibration_dose_m_s175,
+        "friction_work_j": quality.friction_work_j,
+    })
+}
+
+/// Prints the files, or with what is known of the drive as JSON.
+pub(super) fn print(options: &Simulate, files: &[PathBuf], about: &Value) -> Result<(), Failure> {
+    let mut files = files.iter().map(|path| path.shown().to_string());
+    if options.json {
+        return output::json(&json!({ "files": files.collect::<Vec<_>>(), "drive": about }));
+    }
+    Ok(files.try_for_each(|file| output::line(&file))?)
 }
 
 /// The signals that a car measures: exact ones as they come, or what its sensors read of the whole drive.

@@ -6,13 +6,14 @@ use car::{Car, Sensors};
 use config::DriveFile;
 use evaluate::measured::MeasuredRow;
 use plant::car::OverSpeed;
+use serde_json::json;
 use trace::units::{km_h, rpm};
 use trace::{CsvWriter, ShownPath as _, WholeFile};
 use wetclutch::simulate::{DriveColumn, drive_columns, measured_columns, sensors_of, simulate_rows};
 
 use super::car::{describe_car, read_car, warn_of_slipping};
 use super::not_an_input;
-use super::simulate::size_note;
+use super::simulate::{print, size_note};
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::output;
@@ -59,10 +60,18 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     if let Some(over) = &summary.over_speed {
         output::note(&over_speed(over, &car));
     }
-    for path in paths {
-        output::line(&path.shown().to_string())?;
-    }
-    Ok(())
+    let speed_error = summary.speed_error.map(|error| {
+        json!({ "rms_m_s": error.rms_m_s, "largest_m_s": error.largest_m_s, "fraction_of_time_beyond": error.beyond })
+    });
+    let about = json!({
+        "duration_s": summary.duration_s,
+        "distance_m": summary.distance_m,
+        "backwards_m": summary.backwards_m,
+        "shifts": summary.shifts,
+        "fastest_m_s": summary.fastest_m_s,
+        "speed_error": speed_error,
+    });
+    print(options, &paths, &about)
 }
 
 /// What of a distance was driven backwards, in words; nothing where it is too short to be shown.

@@ -1,12 +1,14 @@
 //! `wetclutch worst-case`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use config::Study;
 use report::shift_figure::observers_of;
 use report::tables::phase_name;
+use serde_json::{Value, json};
 use study::campaign::{Metric, PHASES};
-use study::{Campaign, Row, Target, worst_case as search};
+use study::{Campaign, Row, Target, WorstCase, worst_case as search};
 use trace::ShownPath as _;
 use trace::units::mpa;
 
@@ -37,10 +39,10 @@ pub(crate) fn worst_case(options: &WorstCaseOptions) -> Result<(), Failure> {
         places(options, phase).iter().try_for_each(|place| not_an_input(Some(place), inputs))?;
     }
     let campaign = Campaign::new(study)?;
-    for phase in phases {
-        one(&campaign, &experiment, Target { observer, phase, metric: Metric::PressureRms }, options)?;
-    }
-    Ok(())
+    let target = |phase| Target { observer, phase, metric: Metric::PressureRms };
+    let found = phases.into_iter().map(|phase| one(&campaign, &experiment, target(phase), options));
+    let found: Vec<Value> = found.collect::<Result<_, _>>()?;
+    if options.json { output::json(&json!({ "worst_cases": found })) } else { Ok(()) }
 }
 
 /// The absolute path of the study's experiment, for a study file in any folder.
@@ -53,7 +55,8 @@ fn experiment_path(study: &Study) -> Result<String, Failure> {
     })
 }
 
-fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCaseOptions) -> Result<(), Failure> {
+/// Searches the worst case of a phase, and writes and prints it; the result as JSON.
+fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCaseOptions) -> Result<Value, Failure> {
     let bar = progress(campaign.study.runs + u64::from(options.starts), 0);
     let starts = usize::from(options.starts);
     let found = search(campaign, target, starts, options.iterations, options.threads.count(), || bar.inc(1))?;
@@ -61,6 +64,34 @@ fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCas
     let Some(found) = found else {
         return Err(Failure::Work("no run of the study has a complete shift to start from".to_owned()));
     };
+    let places = places(options, target.phase);
+    let [study, figure] = &places;
+    write_text(study, &found.study_file(campaign, experiment))?;
+    let run = Campaign::new(Study::read(study)?)?.run_in_full(0)?;
+    write_text(figure, &observers_of(&run.observers, &run.trace, run.quality.as_ref()).svg())?;
+    if !options.json {
+        print(campaign, target, &found)?;
+        print_places(study, figure)?;
+    }
+    Ok(json_of(campaign, target, &found, &places))
+}
+
+/// The worst case in SI.
+fn json_of(campaign: &Campaign, target: Target, found: &WorstCase, places: &[PathBuf; 2]) -> Value {
+    let score = |row: &Row| row.numbers[campaign.layout.score(target.observer, target.phase, target.metric)];
+    let factors: BTreeMap<_, _> = campaign.layout.factors.iter().zip(&found.row.numbers).collect();
+    json!({
+        "observer": campaign.layout.observers[target.observer],
+        "phase": phase_name(PHASES[target.phase]),
+        "rms_pa": score(&found.row),
+        "study_rms_pa": score(&found.study_worst),
+        "more_runs": found.evaluations,
+        "factors": factors,
+        "files": places.iter().map(|path| path.shown().to_string()).collect::<Vec<_>>(),
+    })
+}
+
+fn print(campaign: &Campaign, target: Target, found: &WorstCase) -> Result<(), Failure> {
     let (name, phase) = (&campaign.layout.observers[target.observer], PHASES[target.phase]);
     output::line(&format!(
         "{name}, {}: RMS error {}; {} in the worst of the {} runs of the study ({} more runs from {} starts)",
@@ -78,11 +109,7 @@ fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCas
     for (factor, value) in campaign.layout.factors.iter().zip(&found.row.numbers) {
         output::line(&format!("  {factor} = {value:.5}"))?;
     }
-    let [study, figure] = places(options, target.phase);
-    write_text(&study, &found.study_file(campaign, experiment))?;
-    let run = Campaign::new(Study::read(&study)?)?.run_in_full(0)?;
-    write_text(&figure, &observers_of(&run.observers, &run.trace, run.quality.as_ref()).svg())?;
-    print_places(&study, &figure)
+    Ok(())
 }
 
 /// The study file and the figure of the worst case of a phase.

@@ -5,8 +5,9 @@ use std::path::Path;
 use car::ElementErrors;
 use config::{CarStudy, CarStudyRuns, significant};
 use report::matrix_page::{kind_rows, not_driven};
+use serde_json::json;
 use study::gearbox::campaign::{CarCampaign, CarSummary};
-use study::gearbox::matrix::Pooled;
+use study::gearbox::matrix::{MatrixCounts, Pooled};
 use study::gearbox::tour;
 use trace::ShownPath as _;
 use wetclutch::studies::bench_sensors;
@@ -33,14 +34,14 @@ pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
     let part = Part { campaign: &campaign, folder: &options.output, shard: options.shard };
     let mut summary = campaign.summary();
     part.make(options, |row| campaign.push(&mut summary, row))?;
-    finish(&part, &summary)
+    finish(&part, &summary, options.json)
 }
 
 pub(super) fn merge(options: &Merge) -> Result<(), Failure> {
     let campaign = CarCampaign::new(CarStudy::read(&options.study)?, &bench_sensors()?)?;
     let mut summary = campaign.summary();
     let (whole, _lock) = merged(&campaign, options, |row| campaign.push(&mut summary, row))?;
-    finish(&whole, &summary)
+    finish(&whole, &summary, options.json)
 }
 
 /// Warns of sampled cars beyond the error bounds of the file.
@@ -55,9 +56,13 @@ fn warn_of_exceeded(campaign: &CarCampaign) {
     }
 }
 
-fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary) -> Result<(), Failure> {
+fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary, json: bool) -> Result<(), Failure> {
     part.write_parquet()?;
     let matrix = part.campaign.matrix(summary);
+    let counts = Pooled::of(&matrix.rows, |_| true).counts;
+    if json {
+        return print_json(part, summary, &counts);
+    }
     output::line(&format!("{} cars, {} shifts, {} cars failed\n", summary.runs, summary.shifts(), summary.failed))?;
     if let Some(failure) = &summary.failure {
         output::note(&format!("warning: the first car that failed: {failure}"));
@@ -69,7 +74,6 @@ fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary) -> Result<(), Fail
     let (titles, rows) = kind_rows(&matrix);
     let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
     output::table(2, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
-    let counts = Pooled::of(&matrix.rows, |_| true).counts;
     output::line(&format!(
         "\nabove the open loop by more than 1 N m: {} of {} shifts; by phases {} of {}\n\
          outside their guaranteed ranges: {} of {} pressures and torques of both clutches",
@@ -82,6 +86,21 @@ fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary) -> Result<(), Fail
     ))?;
     output::line(&format!("\ntable: {}", part.table().shown()))?;
     Ok(())
+}
+
+/// Prints cars, shifts and the table as JSON.
+fn print_json(part: &Part<'_, CarCampaign>, summary: &CarSummary, counts: &MatrixCounts) -> Result<(), Failure> {
+    output::json(&json!({
+        "table": part.table().shown().to_string(),
+        "cars": summary.runs,
+        "cars_failed": summary.failed,
+        "first_failure": summary.failure,
+        "shifts": summary.shifts(),
+        "shifts_compared": counts.compared_runs,
+        "shifts_above_open_loop": counts.runs_above,
+        "values": counts.values,
+        "values_outside_range": counts.outside,
+    }))
 }
 
 /// Prints what a study file of a car describes.

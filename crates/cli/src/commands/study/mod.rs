@@ -5,12 +5,14 @@ mod manifest;
 mod one_run;
 mod part;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use config::{Kind, Source, Study};
 use report::StudyPage;
 use report::study_page::diverged;
 use report::tables::{COMPARED_NAMES, number, phase_name};
+use serde_json::json;
 use study::campaign::PHASES;
 use study::{Campaign, Summary};
 use trace::{ShownPath as _, units};
@@ -42,7 +44,7 @@ pub(crate) fn study(options: &StudyOptions) -> Result<(), Failure> {
     let part = Part { campaign: &campaign, folder: &options.output, shard: options.shard };
     let mut summary = Summary::new(&campaign.study);
     part.make(options, |row| summary.push(row))?;
-    finish(&part, &summary, &options.study)
+    finish(&part, &summary, (&options.study, options.json))
 }
 
 pub(crate) fn merge(options: &Merge) -> Result<(), Failure> {
@@ -52,16 +54,16 @@ pub(crate) fn merge(options: &Merge) -> Result<(), Failure> {
     let campaign = Campaign::new(Study::read(&options.study)?)?;
     let mut summary = Summary::new(&campaign.study);
     let (whole, _lock) = merged(&campaign, options, |row| summary.push(row))?;
-    finish(&whole, &summary, &options.study)
+    finish(&whole, &summary, (&options.study, options.json))
 }
 
-/// Writes everything that is computed from the rows.
-fn finish(part: &Part<'_, Campaign>, summary: &Summary, file: &Path) -> Result<(), Failure> {
+/// Writes everything that is computed from the rows, and prints it, or as JSON.
+fn finish(part: &Part<'_, Campaign>, summary: &Summary, (file, json): (&Path, bool)) -> Result<(), Failure> {
     let campaign = part.campaign;
     part.write_parquet()?;
     if summary.runs() == 0 {
         output::note("this shard has no runs: the table is empty, and no page is written");
-        return Ok(());
+        return if json { print_json(part, summary, None) } else { Ok(()) };
     }
     let worst = summary.worst.iter().map(|row| campaign.run_in_full(row.run)).collect::<Result<Vec<_>, _>>()?;
     let command = format!("wetclutch study {}", shell_quoted(file));
@@ -71,7 +73,32 @@ fn finish(part: &Part<'_, Campaign>, summary: &Summary, file: &Path) -> Result<(
     for (name, svg) in &page.figures {
         write_text(&part.folder.join("figures").join(name), svg)?;
     }
-    print(summary, &html)
+    if json { print_json(part, summary, Some(&html)) } else { print(summary, &html) }
+}
+
+/// Prints runs, files and errors as JSON.
+fn print_json(part: &Part<'_, Campaign>, summary: &Summary, page: Option<&Path>) -> Result<(), Failure> {
+    let statuses: BTreeMap<_, _> = summary.statuses.iter().map(|(status, count)| (status.name(), count)).collect();
+    let error = |observer: usize, phase: usize| {
+        let rms = summary.rms(observer, phase);
+        let over_open_loop = summary.relative(0, observer, phase).map(
+            |relative| json!({ "median": relative.median, "quantile_95": relative.high, "maximum": relative.largest }),
+        );
+        json!({
+            "observer": summary.layout.observers[observer],
+            "phase": phase_name(PHASES[phase]),
+            "rms_pa": { "median": rms.quantile(0.5), "quantile_95": rms.quantile(0.95), "maximum": rms.largest() },
+            "over_open_loop": over_open_loop,
+        })
+    };
+    let of_observer = |observer| (0..PHASES.len()).map(move |phase| error(observer, phase));
+    output::json(&json!({
+        "table": part.table().shown().to_string(),
+        "page": page.map(|page| page.shown().to_string()),
+        "runs": summary.runs(),
+        "statuses": statuses,
+        "errors": (0..summary.layout.observers.len()).flat_map(of_observer).collect::<Vec<_>>(),
+    }))
 }
 
 fn print(summary: &Summary, page: &Path) -> Result<(), Failure> {

@@ -1,17 +1,19 @@
 //! `wetclutch study --run`: one run again, with every signal.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use config::toml_number;
 use report::shift_figure::observers_of;
 use report::tables::{coverage, number, phase_name, quality_rows};
+use serde_json::json;
 use study::campaign::{Layout, Metric, PHASES, Run};
 use study::{Campaign, Row, estimates_trace};
 use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::args::StudyOptions;
-use crate::commands::{write_text, write_trace};
+use crate::commands::{warn_without_effect, write_text, write_trace};
 use crate::failure::Failure;
 use crate::output;
 
@@ -23,8 +25,14 @@ pub(super) fn one_run(campaign: &Campaign, number: u64, options: &StudyOptions) 
             campaign.study.runs - 1
         )));
     }
+    if options.threads.is_given() {
+        warn_without_effect("--threads", "one run is made");
+    }
     let (run, row) = (campaign.run_in_full(number)?, campaign.row(number)?);
     let files = write(campaign, &run, &row, options)?;
+    if options.json {
+        return print_json(campaign, &row, &files);
+    }
     output::line(&format!(
         "run {number} of 0 to {} of study {} \"{}\": {}, seed {}",
         campaign.study.runs - 1,
@@ -45,6 +53,20 @@ pub(super) fn one_run(campaign: &Campaign, number: u64, options: &StudyOptions) 
     output::line("\nfiles\n")?;
     let files = files.into_iter().map(|(path, what)| vec![path.shown().to_string(), what]);
     Ok(output::table(2, &files.collect::<Vec<_>>())?)
+}
+
+/// Prints the run as JSON: its factors, scores as in its row, and files.
+fn print_json(campaign: &Campaign, row: &Row, files: &[(PathBuf, String)]) -> Result<(), Failure> {
+    let is_number = |name: &String| !["run", "seed", "status"].contains(&name.as_str());
+    let names = campaign.layout.header().into_iter().filter(is_number);
+    let values: BTreeMap<_, _> = names.zip(&row.numbers).collect();
+    output::json(&json!({
+        "run": row.run,
+        "seed": row.seed,
+        "status": row.status.name(),
+        "values": values,
+        "files": files.iter().map(|(path, _)| path.shown().to_string()).collect::<Vec<_>>(),
+    }))
 }
 
 /// The values that the study gave to this run.
