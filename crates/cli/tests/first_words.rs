@@ -1,6 +1,6 @@
 //! The first words of the program: all errors of files, options without effect, and where the table of shifts goes.
 
-use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, stderr, stdout, wetclutch};
+use crate::support::{BENCH, EXPERIMENT, Folder, ROOT, VEHICLE, stderr, stdout, wetclutch};
 
 fn read(path: &str) -> String {
     std::fs::read_to_string(path).unwrap()
@@ -45,11 +45,19 @@ fn an_option_without_effect_is_said() {
     let log = folder.path("e1_measured.csv");
     let dbc = folder.write("bus.dbc", "VERSION \"\"\nNS_ :\nBS_:\nBU_:\n");
     let estimate = folder.path("out.csv");
+    let without_shift = read(&log).lines().take(1500).map(|line| format!("{line}\n")).collect::<String>();
+    let without_shift = folder.write("short_log.csv", without_shift);
+    let study = "name = \"s\"\ntitle = \"S\"\nplan = \"latin-hypercube\"\nruns = 1\nseed = 1\nobservers = [\"open loop\"]\n[[factor]]\nkey = \"car.vehicle.mass_kg\"\nrange = [1300, 2000]\n";
+    let study = folder.write("study.toml", format!("experiment = '{BENCH}'\n{study}"));
     for arguments in [
         &["check", &gearbox(), "--all"][..],
         &["inspect", &log, "--dbc", &dbc],
         &["inspect", &log, "--dbc", &dbc, "--suggest"],
         &["estimate", &log, "--vehicle", VEHICLE, "--dbc", &dbc, "-o", &estimate],
+        &["estimate", &log, "--vehicle", VEHICLE, "--format", "csv", "-o", &estimate],
+        &["estimate", &without_shift, "--vehicle", VEHICLE, "-o", &folder.path("short.csv"), "--open"],
+        &["convert", &log, "--format", "csv", "-o", &folder.path("converted.csv")],
+        &["study", &study, "--run", "0", "--threads", "2", "-o", &folder.path("run")],
     ] {
         let output = wetclutch(arguments);
         let said = stderr(&output);

@@ -10,7 +10,7 @@ use trace::{Cell, ColumnKind, ShownPath as _, TableFormat, TableWriter};
 
 use crate::args::{Convert, FormatChoice, available_threads};
 use crate::commands::written::{head, holds_something, replaces_only};
-use crate::commands::{channel_map, check_output, not_an_input, writable, write_text};
+use crate::commands::{channel_map, check_output, not_an_input, warn_without_effect, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -82,6 +82,9 @@ fn convert_log(path: &Path, output: &Path, map: &ChannelMap) -> Result<Value, Fa
 fn outputs(options: &Convert) -> Result<Vec<PathBuf>, Failure> {
     if let ([_], false) = (options.logs.as_slice(), options.output.is_dir()) {
         check_ending(options)?;
+        if options.format.is_some() {
+            warn_without_effect("--format", "it is for files in a folder; the ending of a file says its format");
+        }
         return Ok(vec![options.output.clone()]);
     }
     writable(&options.output, &[])?;

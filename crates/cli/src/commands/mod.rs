@@ -76,7 +76,12 @@ fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
 
 /// Warns of an option that changes nothing here, and says why.
 fn warn_without_effect(option: &str, why: &str) {
-    output::note(&format!("warning: {option} has no effect: {why}\nhint: leave it out"));
+    output::note(&without_effect(option, why));
+}
+
+/// The warning of an option that changes nothing here.
+fn without_effect(option: &str, why: &str) -> String {
+    format!("warning: {option} has no effect: {why}\nhint: leave it out")
 }
 
 /// `--sensors` where nothing is read by sensors.

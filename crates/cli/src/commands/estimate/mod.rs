@@ -23,7 +23,7 @@ use self::earlier::replaces_only_estimates;
 use self::outputs::{beside, remove_old};
 use crate::args::{Estimate, FormatChoice};
 use crate::browser;
-use crate::commands::{JsonObject, channel_map_of_car, check_output, not_an_input, write_text};
+use crate::commands::{JsonObject, channel_map_of_car, check_output, not_an_input, without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
 use crate::signals::stop_then_end;
@@ -100,6 +100,9 @@ fn finish(
     };
     say.note(&format!("estimate: {}", output.shown()));
     let Some([csv, json, html]) = places else {
+        if opens {
+            say.note(&without_effect("--open", "there is no page without a shift"));
+        }
         return beside(output).map_or(Ok(()), |old| remove_old(&old, |note| say.note(note)));
     };
     write_text(html, &page()?.unwrap_or_default())?;
@@ -172,6 +175,7 @@ impl Messages {
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     not_an_input(options.output.as_ref(), options.logs.iter().chain(inputs(options)))?;
     outputs::check_name(options)?;
+    outputs::warn_of_format(options);
     if let Some(toml) = options.logs.iter().find(|log| log.extension().is_some_and(|ending| ending == "toml")) {
         let message =
             format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.shown());

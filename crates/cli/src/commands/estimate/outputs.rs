@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use trace::{ShownPath as _, TableFormat};
 
 use crate::args::{self, FormatChoice};
+use crate::commands::warn_without_effect;
 use crate::failure::Failure;
 
 /// Endings of names whose files are CSV.
@@ -47,6 +48,14 @@ pub(super) fn check_name(options: &args::Estimate) -> Result<(), Failure> {
             format.ending()
         ))),
         _ => Ok(()),
+    }
+}
+
+/// Warns of a format that says what the name of the one output, or standard output, says already.
+pub(super) fn warn_of_format(options: &args::Estimate) {
+    let is_folder = options.output.as_ref().is_some_and(|output| options.logs.len() > 1 || output.is_dir());
+    if options.format.is_some() && !is_folder {
+        warn_without_effect("--format", "it is for files in a folder; the ending of a file says its format");
     }
 }
 
