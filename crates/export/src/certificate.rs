@@ -66,7 +66,8 @@ pub(crate) fn certificate(filter: &ExportedFilter) -> String {
     text
 }
 
-/// A number to read, and its digits in single precision.
+/// A number in single precision, to read and by its bits.
 fn number(value: f64) -> String {
-    format!("{value} (`{}`)", hex_float(value as f32))
+    let single = value as f32;
+    format!("{single} (`{}`)", hex_float(single))
 }
