@@ -29,6 +29,9 @@ fn main() -> ExitCode {
             if arguments.quiet {
                 output::be_quiet();
             }
+            if arguments.verbose {
+                output::be_verbose();
+            }
             arguments.command
         }
         // The message repeats what was typed, and a shell may have completed the name of a file.
@@ -40,6 +43,7 @@ fn main() -> ExitCode {
         Err(error) => error.exit(),
     };
     let result = signals::end_cleanly(&command).and_then(|()| run(command));
+    output::detail(|| "end".to_owned());
     for left in trace::left_by_killed() {
         output::note(&format!(
             "{}: an unfinished file of a run that was killed\nhint: remove it if no other run still writes it",

@@ -4,13 +4,17 @@
 //! terminal: see [`printable_lines`]. JSON and TOML have escapes of their own.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Instant;
 
 use indicatif::ProgressDrawTarget;
 use serde::Serialize;
-use trace::{is_unprintable, printable};
+use trace::{FileUse, ShownPath as _, is_unprintable, printable};
 
 use crate::failure::Failure;
 pub(crate) use crate::message::{error, say};
@@ -21,6 +25,32 @@ static IS_QUIET: AtomicBool = AtomicBool::new(false);
 /// Shows errors and warnings alone from now on.
 pub(crate) fn be_quiet() {
     IS_QUIET.store(true, Ordering::Relaxed);
+}
+
+/// When the program began, if it says what it does.
+static SINCE: OnceLock<Instant> = OnceLock::new();
+/// The files that it has named.
+static NAMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Says from now on what is done and assumed, each with the time since the start.
+pub(crate) fn be_verbose() {
+    SINCE.get_or_init(Instant::now);
+    trace::watch_files(|how, path| match how {
+        // A file may be read more than once: for its kind, and for its values.
+        FileUse::Read => {
+            if NAMED.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned()) {
+                detail(|| format!("read {}", path.shown()));
+            }
+        }
+        FileUse::Written => detail(|| format!("wrote {}", path.shown())),
+    });
+}
+
+/// A message about what is done or assumed, for those who ask for it.
+pub(crate) fn detail(message: impl FnOnce() -> String) {
+    if let Some(since) = SINCE.get() {
+        say(&format!("{:.3} s: {}", since.elapsed().as_secs_f64(), message()));
+    }
 }
 
 /// Whether a message is shown: each, or only a warning.

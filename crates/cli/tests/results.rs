@@ -127,6 +127,38 @@ fn a_quiet_command_says_warnings_and_errors_alone() {
 }
 
 #[test]
+fn a_verbose_command_says_files_assumptions_and_times() {
+    let folder = Folder::new("verbose");
+    let [log, map] = log(&folder);
+    let out = folder.path("out.csv");
+    let arguments = ["estimate", &log, "--vehicle", VEHICLE, "--map", &map, "-o", &out];
+    let usual = said(&wetclutch(&arguments));
+    let verbose = said(&wetclutch(&[&arguments[..], &["-v"]].concat()));
+    let details: Vec<&str> = verbose.lines().filter_map(|line| line.split_once(" s: ").map(|(_, what)| what)).collect();
+    let once = |what: &str| details.iter().filter(|detail| detail.starts_with(what)).count() == 1;
+    for what in [
+        &format!("read {VEHICLE}"),
+        &format!("read {map}"),
+        &format!("read {log}"),
+        "engine_speed: engine_speed_rad_s",
+        "end",
+    ] {
+        assert!(once(what), "{what}: {verbose}");
+    }
+    assert!(once(&format!("wrote {out}")), "{verbose}");
+    // All other messages stay.
+    assert!(usual.lines().all(|line| verbose.contains(line)), "{usual}\n{verbose}");
+    refused(&wetclutch(&["-q", "-v", "check", VEHICLE]));
+    // A short file: its defaults.
+    let own = ["--mass-kg", "1500", "--wheel-radius-m", "0.3", "--final-ratio", "3", "--engine-torque-n-m", "190"];
+    let short = folder.path("short.toml");
+    said(&wetclutch(&[&["init", "--ratios", "2.8,1.55"], &own[..], &["-o", &short]].concat()));
+    // Whether the log is of this car is another matter.
+    let assumed = stderr(&wetclutch(&["estimate", &log, "--vehicle", &short, "--map", &map, "-o", &out, "-v"]));
+    assert!(assumed.contains("assumed: defaults of the vehicle file for "), "{assumed}");
+}
+
+#[test]
 fn a_package_finds_version_completions_and_manual_pages() {
     let folder = Folder::new("package");
     assert!(printed(&wetclutch(&["--version"])).starts_with(concat!("wetclutch ", env!("CARGO_PKG_VERSION"))));

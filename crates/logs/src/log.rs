@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use trace::csv_file::LONGEST_ROW;
 use trace::text::{BYTE_ORDER_MARK, Utf16, is_utf16};
-use trace::{Following, ShownPath as _};
+use trace::{FileUse, Following, ShownPath as _};
 
 use crate::ahead::Crew;
 use crate::arrays::Arrays;
@@ -88,6 +88,7 @@ impl Log {
             Some("-") => Box::new(io::stdin()),
             _ => Box::new(File::open(path).map_err(LogError::io(path))?),
         };
+        trace::file_used(FileUse::Read, path);
         Self::of(path, options, reader, false)
     }
 

@@ -15,6 +15,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::ShownPath as _;
 use crate::early_sync::EarlySync;
+use crate::watch::{FileUse, file_used};
 
 /// A file under construction. If it is dropped before [`Self::finish`], the file at its path is unchanged.
 #[derive(Debug)]
@@ -117,6 +118,7 @@ impl WholeFile {
             if let Some(Replacement { partial, target }) = &file.replaces {
                 fs::rename(partial, target)?;
                 unfinished().retain(|other| other != partial);
+                file_used(FileUse::Written, target);
                 file.replaces = None;
             }
         }

@@ -28,6 +28,7 @@ pub mod table;
 pub mod text;
 pub mod text_file;
 pub mod units;
+pub mod watch;
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -47,6 +48,7 @@ pub use shown::{ShownPath, is_unprintable, printable, toml_number, toml_string};
 pub use table::{ColumnKind, TableFormat, TableWriter};
 pub use text_file::{read_small, read_text};
 pub use units::{Quantity, Unit};
+pub use watch::{FileUse, file_used, watch_files};
 
 /// A word of a column; the program's own cost nothing to copy.
 pub type Word = Cow<'static, str>;

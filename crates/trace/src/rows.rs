@@ -11,6 +11,7 @@ use crate::TraceError;
 use crate::atomic::create_folder;
 use crate::csv_file::LONGEST_ROW;
 use crate::text_file::open_regular;
+use crate::watch::{FileUse, file_used};
 
 /// The file that is locked.
 const LOCK: &str = "wetclutch.lock";
@@ -167,7 +168,9 @@ impl GrowingTable {
     pub fn finish(mut self) -> io::Result<()> {
         self.writer.flush()?;
         self.writer.get_ref().sync_all()?;
-        fs::rename(&self.partial, &self.path)
+        fs::rename(&self.partial, &self.path)?;
+        file_used(FileUse::Written, &self.path);
+        Ok(())
     }
 }
 

@@ -8,6 +8,7 @@ use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 use crate::text::unicode_of;
+use crate::watch::{FileUse, file_used};
 
 /// Largest text in TOML or JSON, bytes \[chosen\]: a hundred times the longest file that a person writes.
 pub const LARGEST_TEXT: u64 = 4 << 20;
@@ -53,7 +54,9 @@ pub fn read_small(path: &Path, largest_bytes: u64) -> io::Result<Vec<u8>> {
 pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
     // Before the file is opened: to open a pipe waits for its writer.
     check_kind(&fs::metadata(path)?)?;
-    File::open(path)
+    let file = File::open(path)?;
+    file_used(FileUse::Read, path);
+    Ok(file)
 }
 
 fn check_kind(there: &Metadata) -> io::Result<()> {

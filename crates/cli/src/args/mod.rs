@@ -50,6 +50,9 @@ pub(crate) struct Arguments {
     /// Messages are errors and warnings alone; results are printed as without it
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
+    /// Also say which files are read and written, what is assumed, and the stages of the work, each with the time since the start
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    pub(crate) verbose: bool,
     /// When messages have colours; results have none
     #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t)]
     pub(crate) color: Colors,

@@ -10,6 +10,7 @@ use wetclutch::fitted::{MapChange, ReportRow};
 use wetclutch::{FitOptions, FitProgress, Fitted, LogInput, VehicleFile, fit as fitted, read_sensors};
 
 use crate::args::Fit;
+use crate::commands::assumed::{detail_of_map, detail_of_vehicle};
 use crate::commands::page::{check_page, write_html};
 use crate::commands::written::{head, replaces_only};
 use crate::commands::{channel_map_of_car, check_output, not_an_input, write_text};
@@ -38,8 +39,20 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     };
     let map = channel_map_of_car(&options.mapping, vehicle.wheel_radius_m())?;
     let logs: Vec<LogInput<'_>> = options.logs.iter().map(|path| LogInput { path, memory: None, map: &map }).collect();
+    detail_of_vehicle(&vehicle);
+    detail_of_map(&map);
     let bar = progress();
-    let found = fitted(&vehicle, &logs, &how, &mut |at| show(&bar, at), &mut |note| {
+    let mut before = String::new();
+    let mut show = |at: FitProgress<'_>| {
+        let stage = stage(at);
+        if stage != before {
+            output::detail(|| stage.clone());
+            before = stage;
+        }
+        bar.set_message(at.to_string());
+        bar.tick();
+    };
+    let found = fitted(&vehicle, &logs, &how, &mut show, &mut |note| {
         bar.suspend(|| output::note(note));
     });
     bar.finish_and_clear();
@@ -95,9 +108,13 @@ fn report_map(options: &Fit, found: &Fitted, left_out: &[String]) {
     left_out.iter().for_each(|reason| output::note(&format!("warning: {}: {reason}", new.shown())));
 }
 
-fn show(bar: &ProgressBar, at: FitProgress<'_>) {
-    bar.set_message(at.to_string());
-    bar.tick();
+/// The stage of the work, without how far it is.
+fn stage(at: FitProgress<'_>) -> String {
+    match at {
+        FitProgress::Reading { log, .. } => format!("reading {}", log.shown()),
+        FitProgress::Fitting { shifts, .. } => format!("fitting {shifts} shifts"),
+        FitProgress::Validating => at.to_string(),
+    }
 }
 
 /// Prints what was found in JSON: numbers in SI units.

@@ -1,5 +1,6 @@
 //! One file for each subcommand.
 
+mod assumed;
 mod bench;
 mod car;
 mod check;

@@ -23,6 +23,7 @@ use self::earlier::replaces_only_estimates;
 use self::outputs::{beside, remove_old};
 use crate::args::{Estimate, FormatChoice};
 use crate::browser;
+use crate::commands::assumed::{detail_of_map, detail_of_vehicle};
 use crate::commands::{JsonObject, channel_map_of_car, check_output, not_an_input, without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -69,6 +70,7 @@ impl Setup<'_> {
 
 /// Estimates a log, and says what was found and where it is.
 fn estimate_log(setup: &Setup<'_>, path: &Path, output: Option<&Path>, say: &mut Messages) -> Result<(), Failure> {
+    output::detail(|| format!("estimating {}", path.shown()));
     match &setup.vehicle {
         VehicleFile::Gearbox(file) => gearbox::estimate(setup, file, path, output, say),
         VehicleFile::OneShift(file) => one_shift::estimate(setup, file, path, output, say),
@@ -246,6 +248,8 @@ fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
         VehicleFile::OneShift(file) => drop(wetclutch::estimate::one_shift::Setup::new(file, &options)?),
     }
     let map = channel_map_of_car(&arguments.mapping, vehicle.wheel_radius_m())?;
+    detail_of_vehicle(&vehicle);
+    detail_of_map(&map);
     Ok(Setup { arguments, vehicle, map, options })
 }
 
