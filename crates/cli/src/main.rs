@@ -29,6 +29,9 @@ fn main() -> ExitCode {
             if arguments.quiet {
                 output::be_quiet();
             }
+            if arguments.force {
+                commands::replace_any();
+            }
             if arguments.verbose {
                 output::be_verbose();
             }

@@ -39,6 +39,7 @@ mod other_cars;
 mod own_car;
 mod pages;
 mod pressure_commands;
+mod replaced;
 mod results;
 mod same_bits;
 mod studies;

@@ -53,6 +53,9 @@ pub(crate) struct Arguments {
     /// Also say which files are read and written, what is assumed, and the stages of the work, each with the time since the start
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     pub(crate) verbose: bool,
+    /// Replace files at the places of outputs also where this program did not write them
+    #[arg(long, global = true)]
+    pub(crate) force: bool,
     /// When messages have colours; results have none
     #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t)]
     pub(crate) color: Colors,

@@ -8,7 +8,7 @@ use study::bench::{BenchConsistency, BenchRow, open_loop};
 use trace::{ShownPath as _, units};
 
 use crate::args;
-use crate::commands::{progress, warn_without_effect, writable, write_text};
+use crate::commands::{progress, replaceable, warn_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -31,7 +31,7 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
     }
     experiment.check_size()?;
     open_loop(&experiment)?;
-    options.output.as_deref().map(|folder| writable(folder, &["bench.html"])).transpose()?;
+    options.output.as_deref().map(|folder| replaceable(folder, &["bench.html"])).transpose()?;
     let all = experiment.scenarios.len();
     output::note(&format!("running {} observers on {all} scenarios", experiment.observers.len()));
     let bar = progress(all as u64, 0);

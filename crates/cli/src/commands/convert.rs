@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use trace::{Cell, ColumnKind, ShownPath as _, TableFormat, TableWriter};
 
 use crate::args::{Convert, FormatChoice, available_threads};
-use crate::commands::written::{head, holds_something, replaces_only};
+use crate::commands::written::{head, holds_something, is_forced, replaces_only};
 use crate::commands::{channel_map, check_output, not_an_input, warn_without_effect, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -132,10 +132,11 @@ fn check_ending(options: &Convert) -> Result<(), Failure> {
 
 /// Refuses to replace any table: it may be a measurement.
 fn replaces_nothing(output: &Path) -> Result<(), Failure> {
-    if !holds_something(output) {
+    if is_forced() || !holds_something(output) {
         return Ok(());
     }
-    let message = "exists, and a log is never replaced\nhint: choose another name after -o, or remove it";
+    let message =
+        "exists, and a log is never replaced\nhint: choose another name after -o, or remove it; --force replaces it";
     Err(Failure::Input(format!("{}: {message}", output.shown())))
 }
 

@@ -14,12 +14,47 @@ use wetclutch::estimate::one_shift::observer::best;
 
 use crate::args::Demo;
 use crate::browser;
+use crate::commands::written::replaces_only_ours;
 use crate::commands::{writable, write_text, write_trace};
 use crate::failure::Failure;
 use crate::output;
 
 /// The names of the files, but for the figures.
 const FILES: [&str; 4] = ["report.html", "trace.csv", "measured.csv", "estimate.csv"];
+/// The names of all files that a demo of any car writes.
+const OF_ANY: [&str; 9] = [
+    "report.html",
+    "trace.csv",
+    "measured.csv",
+    "estimate.csv",
+    "shift.svg",
+    "drive.svg",
+    "shifts.csv",
+    "drive.csv",
+    "drive_measured.csv",
+];
+
+/// What an earlier demo left in a folder.
+pub(super) struct EarlierDemo(Vec<PathBuf>);
+
+impl EarlierDemo {
+    /// Refuses to replace what no demo wrote.
+    pub(super) fn in_folder(folder: &Path) -> Result<Self, Failure> {
+        replaces_only_ours(folder, &OF_ANY)?;
+        Ok(Self(OF_ANY.map(|name| folder.join(name)).into_iter().filter(|path| path.is_file()).collect()))
+    }
+
+    /// Removes the files that this demo has not written again: they are of another car.
+    pub(super) fn remove_all_but<'n>(self, names: impl Iterator<Item = &'n str>) -> Result<(), Failure> {
+        let written: Vec<&str> = names.collect();
+        let is_old = |path: &&PathBuf| path.file_name().is_some_and(|name| !written.iter().any(|other| name == *other));
+        for old in self.0.iter().filter(is_old) {
+            std::fs::remove_file(old).map_err(|error| Failure::writing(old, &error))?;
+            output::note(&format!("removed: {}, of an earlier demo", old.shown()));
+        }
+        Ok(())
+    }
+}
 
 pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     if let Some(vehicle) = &options.vehicle {
@@ -27,6 +62,7 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     }
     let folder = &options.output;
     writable(folder, &FILES)?;
+    let earlier = EarlierDemo::in_folder(folder)?;
     let [report, trace, measured_only, estimate] = FILES.map(|name| folder.join(name));
     let (vehicle, mut experiment) = (VehicleFile::built_in()?, ExperimentFile::e1()?);
     // The gains that E1 gives are the chapter's; the demo designs its own.
@@ -44,6 +80,7 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     write_trace(&measured_only, &measured)?;
     write_trace(&estimate, &default_estimate(&vehicle, &measured)?)?;
 
+    earlier.remove_all_but(FILES.iter().copied().chain(page.figures.iter().map(|(name, _)| name.as_str())))?;
     if options.json {
         let figures = page.figures.iter().map(|(name, _)| folder.join(name));
         let files = [report.clone(), trace, measured_only, estimate].into_iter().chain(figures);

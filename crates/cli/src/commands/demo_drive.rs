@@ -18,7 +18,7 @@ use study::gearbox::{RECORD_S, ShiftDraw};
 use trace::{Cell, ShownPath as _};
 use wetclutch::studies::bench_sensors;
 
-use super::demo::shown;
+use super::demo::{EarlierDemo, shown};
 use super::simulate_drive::{DriveTables, keeps_inputs};
 use crate::args::Demo;
 use crate::browser;
@@ -38,6 +38,7 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     let folder = &options.output;
     writable(folder, &[PAGE, SHIFTS])?;
     keeps_inputs(folder, NAME, drive.iter().filter_map(|drive| drive.speeds.as_ref()))?;
+    let earlier = EarlierDemo::in_folder(folder)?;
     let mut random = Random(options.seed);
     let draw = ShiftDraw::within(&car, &ErrorBudget::of_car(&car), || random.uniform());
     let model = CarModel::new(draw.car(&car)).map_err(|error| Failure::Input(error.to_string()))?;
@@ -69,6 +70,8 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     let page =
         DrivePage { name: &name, car: &car, draw: Some((&draw, options.seed)), drive: &scored, sources: &sources };
     write_text(&folder.join(PAGE), &page.html()?)?;
+    let written = [PAGE, SHIFTS].into_iter().chain(signals.iter().filter_map(|path| path.file_name()?.to_str()));
+    earlier.remove_all_but(written)?;
     if options.json {
         let files = signals.into_iter().chain([PAGE, SHIFTS].map(|name| folder.join(name)));
         let shifts: Vec<_> = cells.into_iter().map(JsonObject::of).collect();

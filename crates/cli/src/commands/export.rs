@@ -7,7 +7,7 @@ use serde_json::json;
 use trace::{ShownPath as _, WholeFile};
 use wetclutch::{ExportOptions, ExportedFile, VehicleFile, read_sensors};
 
-use super::{not_an_input, writable};
+use super::{not_an_input, replaceable};
 use crate::args::Export;
 use crate::failure::Failure;
 use crate::output;
@@ -20,7 +20,8 @@ pub(crate) fn export(options: &Export) -> Result<(), Failure> {
     let (fmu_libraries, car_fmu_libraries) = (libraries(&options.fmu)?, libraries(&options.car_fmu)?);
     let exported = ExportOptions { shift: options.shift.clone(), sensors, program, fmu_libraries, car_fmu_libraries };
     let files = wetclutch::export(&vehicle, &exported).map_err(|error| named(&options.vehicle, error))?;
-    writable(&options.output, &[])?;
+    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+    replaceable(&options.output, &names)?;
     for file in &files {
         not_an_input(Some(&options.output.join(&file.name)), [&options.vehicle])?;
     }

@@ -252,7 +252,7 @@ pub(super) fn draw(gearbox: &Gearbox, folder: &Path) -> Result<(), Failure> {
         figures.push((name, figure));
     }
     let names: Vec<&str> = figures.iter().map(|figure| figure.0.as_str()).collect();
-    super::writable(folder, &names)?;
+    super::replaceable(folder, &names)?;
     for (name, svg) in &figures {
         super::write_text(&folder.join(name), svg)?;
     }

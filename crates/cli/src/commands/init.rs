@@ -9,6 +9,7 @@ use serde_json::json;
 use trace::ShownPath as _;
 
 use crate::args::{Init, LaunchChoice};
+use crate::commands::written::is_forced;
 use crate::commands::{check_output, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -17,9 +18,11 @@ use wetclutch::shell_quoted;
 pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
     // A file that somebody has filled in is not to be lost by a second call.
-    if options.output.exists() {
-        let message =
-            format!("{}: the file is there already\nhint: choose another name after -o", options.output.shown());
+    if options.output.exists() && !is_forced() {
+        let message = format!(
+            "{}: the file is there already\nhint: choose another name after -o; --force replaces it",
+            options.output.shown()
+        );
         return Err(Failure::Input(message));
     }
     let gearbox = match &options.gearbox {
@@ -117,7 +120,7 @@ fn from_folder_of(output: &Path, named: &str) -> Result<String, Failure> {
 fn refuse_existing(path: &Path, text: &str) -> Result<(), Failure> {
     match trace::read_text(path) {
         Ok(there) if there == text => Ok(()),
-        _ if !path.exists() => Ok(()),
+        _ if !path.exists() || is_forced() => Ok(()),
         _ => Err(Failure::Input(format!(
             "{0}: the file is there already, and is another gearbox\nhint: use it by `--gearbox {1}`, or write into another folder",
             path.shown(),

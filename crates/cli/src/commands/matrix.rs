@@ -11,7 +11,7 @@ use wetclutch::studies::bench_sensors;
 
 use super::car::no_shift;
 use crate::args::Bench;
-use crate::commands::{JsonObject, progress, read_car, writable, write_cells, write_text};
+use crate::commands::{JsonObject, progress, read_car, replaceable, write_cells, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -22,7 +22,7 @@ const TABLE: &str = "bench.csv";
 pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
     let car = read_car(vehicle)?;
     let sensors = sensors_or_bench(options.sensors.as_deref())?;
-    options.output.as_deref().map(|folder| writable(folder, &[PAGE, TABLE])).transpose()?;
+    options.output.as_deref().map(|folder| replaceable(folder, &[PAGE, TABLE])).transpose()?;
     let (draws, seed) = (u64::from(options.draws), options.seed);
     let all = runs(&car, draws)?;
     if all == 0 {

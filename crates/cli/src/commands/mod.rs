@@ -51,6 +51,7 @@ pub(crate) use shell::{completions, man};
 pub(crate) use simulate::simulate;
 pub(crate) use study::{merge, study};
 pub(crate) use worst_case::worst_case;
+pub(crate) use written::replace_any;
 
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -158,6 +159,12 @@ fn writable(folder: &Path, names: &[&str]) -> Result<(), Failure> {
         Failure::writing(folder, &error)
     })?;
     names.iter().try_for_each(|name| check_output(Some(&folder.join(name))))
+}
+
+/// The same, and that files which are there were written by this program.
+fn replaceable(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+    writable(folder, names)?;
+    written::replaces_only_ours(folder, names)
 }
 
 /// Refuses to write an output over one of the files that it is made from.

@@ -8,13 +8,13 @@ use study::statements::Case;
 use trace::ShownPath as _;
 
 use crate::args::Reproduce;
-use crate::commands::{progress, warn_without_effect, writable, write_text};
+use crate::commands::{progress, replaceable, warn_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
     const FILES: [&str; 3] = ["reproduction.html", "reproduction.md", "reproduction.json"];
-    writable(&options.output, &FILES)?;
+    replaceable(&options.output, &FILES)?;
     let (vehicle, study) = (VehicleFile::built_in()?, Study::plausible()?);
     let settings = options.settings.map_or(study.runs, |settings| u64::from(settings).min(study.runs));
     if options.settings.is_some_and(|wanted| u64::from(wanted) > study.runs) {

@@ -15,12 +15,13 @@ use trace::ShownPath as _;
 use super::car::no_shift;
 use super::matrix::sensors_or_bench;
 use crate::args::SensitivityOptions;
-use crate::commands::{read_car, sensors_without_effect, write_text};
+use crate::commands::{read_car, replaceable, sensors_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
 use wetclutch::shell_quoted;
 
 pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
+    options.output.as_deref().map(|folder| replaceable(folder, &["sensitivity.html"])).transpose()?;
     let vehicle = match &options.vehicle {
         Some(path) if Source::read(path)?.kind()? == Kind::Car => return of_car(options, path),
         _ if options.sensors.is_some() => return Err(sensors_without_effect()),

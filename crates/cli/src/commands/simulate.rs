@@ -13,6 +13,7 @@ use trace::{CsvWriter, ShownPath as _, Trace, WholeFile, signal};
 use super::simulate_drive::simulate_drive;
 use crate::args::Simulate;
 use crate::commands::not_an_input;
+use crate::commands::written::{head, replaces_only};
 use crate::failure::Failure;
 use crate::output;
 
@@ -31,6 +32,7 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     for name in [format!("{name}.csv"), format!("{name}_measured.csv")] {
         not_an_input(Some(&options.output.join(name)), [&options.experiment, &vehicle.source.path])?;
     }
+    replaces_only_simulated(&[".csv", "_measured.csv"].map(|ending| options.output.join(format!("{name}{ending}"))))?;
     let mut whole = Table::create(options.output.join(format!("{name}.csv")), &vehicle, |_| true)?;
     let path = options.output.join(format!("{name}_measured.csv"));
     let mut measured = Measured::create(path, &vehicle, &experiment)?;
@@ -63,6 +65,14 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
         None => output::note("the shift was not completed within the simulated time"),
     }
     print(options, &[whole, measured], &json!({ "shift": rated.as_ref().map(of_shift) }))
+}
+
+/// Refuses to replace tables that no simulation wrote: the one with all signals has the true phase or stage, and the measured one stands beside it.
+pub(super) fn replaces_only_simulated(paths: &[PathBuf; 2]) -> Result<(), Failure> {
+    const TRUTH: [&str; 2] = ["true_phase", "shift_stage"];
+    let is_simulated =
+        head(&paths[0]).lines().next().is_some_and(|names| names.split(',').any(|name| TRUTH.contains(&name)));
+    paths.iter().try_for_each(|path| replaces_only("table of this simulation", path, |_| is_simulated))
 }
 
 /// The shift in SI.

@@ -13,7 +13,7 @@ use wetclutch::simulate::{DriveColumn, drive_columns, measured_columns, sensors_
 
 use super::car::{describe_car, read_car, warn_of_slipping};
 use super::not_an_input;
-use super::simulate::{print, size_note};
+use super::simulate::{print, replaces_only_simulated, size_note};
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::output;
@@ -38,6 +38,7 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     let name = drive.name.to_lowercase();
     let inputs = std::iter::once(&options.experiment).chain(&options.vehicle);
     keeps_inputs(&options.output, &name, inputs.chain(&file.speeds))?;
+    replaces_only_simulated(&paths(&options.output, &name))?;
     let mut tables = DriveTables::create(&options.output, &name, &car, sensors_of(drive))?;
     let summary = simulate_rows(&car, drive, |row| tables.write(&car, row))?;
     let paths = tables.finish(&options.output)?;

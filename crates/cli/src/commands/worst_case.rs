@@ -13,6 +13,7 @@ use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::args::{PhaseChoice, WorstCaseOptions};
+use crate::commands::written::{head, replaces_only};
 use crate::commands::{not_an_input, progress, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -36,7 +37,10 @@ pub(crate) fn worst_case(options: &WorstCaseOptions) -> Result<(), Failure> {
     writable(&options.output, &[])?;
     let inputs = [&options.study, &study.experiment.source.path, &study.vehicle.source.path];
     for &phase in &phases {
-        places(options, phase).iter().try_for_each(|place| not_an_input(Some(place), inputs))?;
+        let [study, figure] = places(options, phase);
+        not_an_input(Some(&study), inputs)?;
+        not_an_input(Some(&figure), inputs)?;
+        replaces_only("study file of a worst case", &study, |path| head(path).contains("`wetclutch worst-case`"))?;
     }
     let campaign = Campaign::new(study)?;
     let target = |phase| Target { observer, phase, metric: Metric::PressureRms };

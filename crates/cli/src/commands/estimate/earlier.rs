@@ -8,17 +8,17 @@ use trace::{ShownPath as _, signal};
 use wetclutch::estimate::gearbox::is_car_column;
 
 use super::outputs::beside;
-use crate::commands::written::{head, holds_something, replaces_only};
+use crate::commands::written::{head, holds_something, is_forced, replaces_only};
 use crate::failure::Failure;
 
 /// Refuses an output that would replace what no estimate wrote, itself or with the files beside it.
 pub(super) fn replaces_only_estimates(output: &Path) -> Result<(), Failure> {
     replaces_only("estimate of this program", output, is_estimate)?;
-    let foreign = |place: &std::path::PathBuf| holds_something(place) && !is_beside_an_estimate(place);
+    let foreign = |place: &std::path::PathBuf| !is_forced() && holds_something(place) && !is_beside_an_estimate(place);
     match beside(output).into_iter().flatten().find(foreign) {
         None => Ok(()),
         Some(foreign) => Err(Failure::Input(format!(
-            "{}: no estimate wrote this file, and one into {} would replace it\nhint: choose another name after -o, or move the file",
+            "{}: no estimate wrote this file, and one into {} would replace it\nhint: choose another name after -o, or move the file; --force replaces it",
             foreign.shown(),
             output.shown()
         ))),
