@@ -63,7 +63,7 @@ pub(crate) struct Convert {
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) mapping: Mapping,
-    /// The table, by its ending .csv, .parquet or .mf4, or a folder, which gets a table of each log. No table is replaced
+    /// The table, by its ending .csv, .parquet or .mf4, or a folder, which gets a table of each log. No table is replaced without --force
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     /// Format of files in a folder [default: csv]
@@ -114,7 +114,7 @@ pub(crate) struct Estimate {
     /// Only shifts between these gears, called as in the table of shifts, such as 1-2,2-3
     #[arg(long, value_name = "FROM-TO,...", value_delimiter = ',')]
     pub(crate) shifts: Vec<GearPair>,
-    /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV, candump or ASC, a file or `-`
+    /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV or a bus log as text, a file or `-`
     #[arg(long)]
     pub(crate) follow: bool,
     /// Format of files in a folder [default: csv]; the ending of a file after -o says its format

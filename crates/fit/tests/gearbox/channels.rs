@@ -5,7 +5,7 @@ use std::ops::ControlFlow::Continue;
 use car::{Car, ShiftCommand};
 use config::CarFile;
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, fit};
-use fit::{Known, ReadingAges, Verdict};
+use fit::{Known, MapChange, MapKey, ReadingAges, Verdict};
 use observer::Reading;
 use observer::gearbox::ShiftInput;
 
@@ -49,6 +49,16 @@ fn scale_and_delay_of_the_wheel_speed_and_the_stiffness_lie_in_their_intervals()
     assert!(output.scale.value.abs() < 1e-3 && fit.channels.engine.as_ref().is_some_and(Result::is_err), "{output:?}");
     let engine = fit.engine_late_s().unwrap();
     assert!(holds(&engine, channels.late_s[0]) && engine.verdict() == Verdict::Measured, "{engine:?} {channels:?}");
+    // The same as changes of the channel map: the wheel speed is late against the turbine speed by both delays.
+    let changes = fit.map_changes();
+    let change = |signal: &str, key: MapKey| {
+        let is_it = |change: &&MapChange| change.channel.name() == signal && change.key == key;
+        changes.iter().find(is_it).map_or(0.0, |change| change.value)
+    };
+    let delay = |signal: &str| change(signal, MapKey::Delay) + change(signal, MapKey::Late);
+    assert_eq!([delay("output_speed"), delay("engine_speed")], [output.late_s.value, engine.value], "{changes:?}");
+    assert!((delay("wheel_speed") - output.late_s.value - found.late_s.value).abs() < 1e-9, "{changes:?}");
+    assert_eq!(change("wheel_speed", MapKey::Scale), 1.0 + found.scale.value);
     let file = written(&drawn, &fit);
     assert!((stiffness(&file) / stiffness(&drawn.file) / found.stiffness.value.exp() - 1.0).abs() < 1e-3);
     let fraction = file.error_bounds.shaft_stiffness_share.unwrap();
