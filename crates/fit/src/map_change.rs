@@ -258,6 +258,19 @@ mod tests {
     }
 
     #[test]
+    fn the_path_of_a_dbc_is_that_from_the_new_folder() {
+        let folder = std::env::temp_dir().join(format!("wetclutch-map-change-{}", std::process::id()));
+        std::fs::create_dir_all(folder.join("new")).unwrap();
+        std::fs::write(folder.join("bus.dbc"), "").unwrap();
+        let map = "dbc = \"bus.dbc\" # of the bus\n[channel.engine_speed]\nname = \"N\"\n";
+        let [given, beside, far] = ["map.toml", "other.toml", "new/map.toml"].map(|name| folder.join(name));
+        let text = |to: &Path| changed_map(&given, map, to, &[]).unwrap().text;
+        assert_eq!(text(&beside), map);
+        assert!(text(&far).contains("\ndbc = \"../bus.dbc\" # of the bus\n"), "{}", text(&far));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
     fn what_is_written_is_what_the_instruction_says() {
         let delay = |value| MapChange::of_delay("engine_speed", &Known { value, sd: 1e-4, before: 0.01 });
         assert_eq!(delay(0.012).instruction(), "add 0.0120 to `delay_s` of its channel in the channel map");

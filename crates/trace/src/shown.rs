@@ -69,12 +69,16 @@ pub fn toml_number(value: f64) -> String {
     let exponent = scientific.rsplit_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
     if (-3..6).contains(&exponent) {
         let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);
-        let text = format!("{value:.decimals$}");
-        let trimmed = text.trim_end_matches('0');
-        if trimmed.ends_with('.') { format!("{trimmed}0") } else { trimmed.to_owned() }
-    } else {
-        format!("{value:.4e}")
+        return without_zeros(&format!("{value:.decimals$}"));
     }
+    let text = format!("{value:.4e}");
+    text.split_once('e').map_or_else(|| text.clone(), |(digits, power)| format!("{}e{power}", without_zeros(digits)))
+}
+
+/// A decimal number without the zeros at its end, but for one behind the point.
+fn without_zeros(digits: &str) -> String {
+    let trimmed = digits.trim_end_matches('0');
+    if trimmed.ends_with('.') { format!("{trimmed}0") } else { trimmed.to_owned() }
 }
 
 #[cfg(test)]
@@ -84,7 +88,7 @@ mod tests {
     #[test]
     fn numbers_keep_five_digits() {
         let cases =
-            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
+            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0e6"), (2.5e-4, "2.5e-4"), (0.0, "0.0")];
         for (value, text) in cases {
             assert_eq!(toml_number(value), text);
             assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
