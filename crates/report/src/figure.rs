@@ -19,6 +19,7 @@ use crate::axis::{Scale, decimals, nice_step};
 use crate::legend::{Entry, Key, LABEL_SIZE, LINE, broken, placed, width};
 pub use crate::palette::{Stroke, Weight};
 use crate::simplified::{simplified, simplified_range};
+use crate::svg_text::numbered;
 
 const WIDTH: f64 = 900.0;
 const TOP: f64 = 8.0;
@@ -130,6 +131,11 @@ struct Margins {
 impl Figure {
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
+        numbered(&self.drawing())
+    }
+
+    /// The same with clip paths that no other figure of this process has: a part of a page, which numbers them ([`numbered`]).
+    pub(crate) fn drawing(&self) -> String {
         let panels: Vec<Placed<'_>> = self.panels.iter().map(|panel| self.place(panel)).collect();
         let margins = Margins {
             left: panels.iter().map(Placed::left).fold(0.0, f64::max),

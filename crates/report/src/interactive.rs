@@ -123,7 +123,7 @@ impl Figure {
         // A name may hold the end of a script.
         let data = self.json().replace('<', "\\u003c");
         let drawing = if drawn {
-            compact(&self.svg())
+            compact(&self.drawing())
         } else {
             "<p>This figure needs a browser that runs scripts.</p>".to_owned()
         };

@@ -1,6 +1,7 @@
 //! The text of a drawing, made short for a page.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 /// The same figure with its curves to a tenth of a pixel, which is half of their text.
 pub(crate) fn compact(svg: &str) -> String {
@@ -27,6 +28,25 @@ pub(crate) fn compact(svg: &str) -> String {
         compact.push_str(rest);
     }
     compact
+}
+
+/// What the names of clip paths begin with.
+const CLIP: &str = "kuva-clip-";
+
+/// The same text with its clip paths numbered in their order. kuva counts them over all figures of a process, so that the same page would be other
+/// bytes each time.
+pub(crate) fn numbered(text: &str) -> String {
+    let mut parts = text.split(CLIP);
+    let mut numbered = parts.next().unwrap_or_default().to_owned();
+    let mut known: HashMap<&str, usize> = HashMap::new();
+    for part in parts {
+        let digits = part.len() - part.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+        let (name, rest) = part.split_at(digits);
+        let next = known.len();
+        let number = known.entry(name).or_insert(next);
+        numbered.extend([CLIP, &number.to_string(), rest]);
+    }
+    numbered
 }
 
 /// A number to a tenth: what stands before the point, and the digit after it. None for what is no number.
@@ -65,6 +85,16 @@ mod tests {
         let expected = r#"<svg><path d="M74.8 36.2L83 -35Z" fill="none"/><text x="1.25">0.25</text></svg>"#;
         assert_eq!(compact(svg), expected);
         assert_eq!(compact("<svg></svg>"), "<svg></svg>");
+    }
+
+    #[test]
+    fn clip_paths_are_numbered_in_their_order() {
+        let text =
+            r#"<i id="kuva-clip-907"/><i id="kuva-clip-12"/><i c="url(#kuva-clip-907)"/><i c="url(#kuva-clip-12)"/>"#;
+        let expected =
+            r#"<i id="kuva-clip-0"/><i id="kuva-clip-1"/><i c="url(#kuva-clip-0)"/><i c="url(#kuva-clip-1)"/>"#;
+        assert_eq!(numbered(text), expected);
+        assert_eq!(numbered("<svg></svg>"), "<svg></svg>");
     }
 
     #[test]
