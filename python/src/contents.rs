@@ -32,11 +32,11 @@ pub(crate) fn shifts_of_log(py: Python<'_>, log: Given, ratios: Vec<f64>) -> PyR
     Ok(of_log(py, log, ratios, |log| log_shifts(log, &mut |_| ()))?.into())
 }
 
-fn of_log<T: Send>(
+fn of_log<T: Send + 'static>(
     py: Python<'_>,
     (path, table, mapping): Given,
     ratios: Vec<f64>,
-    find: impl FnOnce(LogInput<'_>) -> Result<T, Error> + Send,
+    find: impl FnOnce(LogInput<'_>) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
     let table = table.map(|table| Arc::clone(&table.get().table));
     work::done(py, None, move |_| {

@@ -83,6 +83,7 @@ type Estimated = (Table, Table, Vec<String>, Option<String>, Option<String>);
 
 /// Estimates a log.
 #[pyfunction]
+#[pyo3(signature = (car, path, table, mapping, given, progress))]
 pub(crate) fn estimate(
     py: Python<'_>,
     car: (String, String, Option<String>),
@@ -90,14 +91,16 @@ pub(crate) fn estimate(
     table: Option<&Bound<'_, Table>>,
     mapping: Mapping,
     given: &Bound<'_, PyAny>,
+    progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Estimated> {
     let (name, text, gearbox) = car;
     let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
     let given: Given = given.extract()?;
     let table = table.map(|table| Arc::clone(&table.get().table));
-    let (vehicle, found) = work::done(py, None, move |work| {
+    let (vehicle, found) = work::done(py, progress.as_ref(), move |work| {
         let map = mapping.read(Some(&vehicle))?;
-        let options = EstimateOptions { interrupt: Some(work.stop()), ..given.options(&vehicle)? };
+        let options =
+            EstimateOptions { interrupt: Some(work.stop()), rows_done: Some(work.rows()), ..given.options(&vehicle)? };
         let path: &Path = &path;
         let memory = table.as_ref().map(InMemory::Table);
         let found = wetclutch::estimate(&vehicle, LogInput { path, memory, map: &map }, &options)?;

@@ -1,42 +1,53 @@
 //! The gearbox filter step by step.
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use wetclutch::{
-    ClutchEstimate, ElementId, Error, Estimator, Gear, GearId, Reading, ShiftCommand, ShiftElement, ShiftEstimate,
-    ShiftId, Step, VehicleFile,
-};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
+use wetclutch::{ElementId, Error, Estimator, Gear, GearId, Reading, ShiftCommand, ShiftId, Source, Step, VehicleFile};
 
 use crate::car::parsed;
 use crate::error::exception;
+use crate::step::{NEUTRAL, Names, StepEstimate};
 
-/// A reading: its value, or value and age, s.
-#[derive(FromPyObject)]
-enum Given {
-    Now(f64),
-    Aged(f64, f64),
+/// A reading: its value, or a pair of value and age, s.
+struct Given(Reading);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Given {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        // To try one and then the other takes longer than the step of the filter: the error of the first is an exception.
+        let reading = match given.cast::<PyTuple>() {
+            Ok(pair) => {
+                let (value, age_s) = pair.extract::<(f64, f64)>()?;
+                Reading { value, age_s }
+            }
+            Err(_) => Reading::now(given.extract::<f64>()?),
+        };
+        Ok(Self(reading))
+    }
 }
 
 impl From<Given> for Reading {
     fn from(given: Given) -> Self {
-        match given {
-            Given::Now(value) => Self::now(value),
-            Given::Aged(value, age_s) => Self { value, age_s },
-        }
+        given.0
     }
 }
 
-/// Names of a gearbox by place.
-struct Names {
-    gears: Vec<String>,
-    elements: HashMap<String, ElementId>,
-    /// Of the places in the filter's tables.
-    places: Vec<(usize, String)>,
+/// What an observer was made with, beside its car.
+struct MadeWith {
+    shift: Option<String>,
+    /// File with the table of sensors, and its text.
+    sensors: Option<Source>,
 }
+
+/// The same as Python has it in a pickle: name, text and gearbox of the car, shift, name and text of the file with the sensors.
+type Texts = (String, String, Option<String>, Option<String>, Option<(String, String)>);
+
+/// What makes an observer, its texts, and its memory.
+type Pickled<'py> = (Bound<'py, PyAny>, (Texts, Bound<'py, PyBytes>));
 
 /// The gearbox filter of a car step by step, for a loop, a test bench or a controller in hardware.
 ///
@@ -55,6 +66,8 @@ pub(crate) struct Observer {
     /// Commanded where a step has no gear.
     shift: Option<ShiftCommand>,
     vehicle: Arc<VehicleFile>,
+    made_with: Arc<MadeWith>,
+    elements: Arc<[(String, ElementId)]>,
     names: Arc<Names>,
 }
 
@@ -71,27 +84,9 @@ impl Observer {
         let py = car.py();
         let (name, text, gearbox): (String, String, Option<String>) = car.getattr("_native")?.extract()?;
         let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
-        let made = || -> Result<_, Error> {
-            let Some(car) = vehicle.car() else {
-                let message =
-                    "car: an observer step by step needs a car with a gearbox, and this is one of a single shift";
-                return Err(Error::Input(message.to_owned()));
-            };
-            let sensors = sensors.as_deref().map(wetclutch::read_sensors).transpose()?;
-            let learnt = learnt.map(|text| vehicle.learnt_of(text)).transpose()?;
-            let estimator = Estimator::new(car, sensors.as_ref(), learnt.as_ref())?;
-            let named = |name: &String| Some((name.clone(), estimator.element(name)?));
-            let elements = car.gearbox.elements.iter().filter_map(|element| named(&element.name)).collect();
-            let places = (0..car.gearbox.elements.len())
-                .filter_map(|place| Some((place, estimator.name_of(ShiftElement::at(place))?.to_owned())))
-                .collect();
-            let gears = car.gearbox.gears.iter().map(|gear| gear.name.clone()).collect();
-            let shift = shift.map(|name| car.shift_named(name)).transpose()?;
-            let shift = shift.and_then(|[from, to]| Some(ShiftId { from: GearId::new(from)?, to: GearId::new(to)? }));
-            Ok((estimator, shift.map(ShiftCommand::from), Names { gears, elements, places }))
-        };
-        let (estimator, shift, names) = made().map_err(|error| exception(py, &error))?;
-        Ok(Self { estimator, shift, vehicle: Arc::new(vehicle), names: Arc::new(names) })
+        let sensors = sensors.as_deref().map(Source::read).transpose().map_err(|error| exception(py, &error.into()))?;
+        let made_with = MadeWith { shift: shift.map(str::to_owned), sensors };
+        Self::made(vehicle, made_with, learnt).map_err(|error| exception(py, &error))
     }
 
     /// Takes what came since the step before and returns the estimate. What did not come is left out, or None.
@@ -149,7 +144,7 @@ impl Observer {
         if let Some(degc) = oil_temperature_degc {
             self.estimator.take_oil_temperature(degc);
         }
-        Ok(StepEstimate { estimate: self.estimator.step(&step), names: Arc::clone(&self.names) })
+        Ok(StepEstimate::new(self.estimator.step(&step), &self.names))
     }
 
     /// Guaranteed range of the pressure of an element after the last step, Pa; None where there is none.
@@ -162,6 +157,17 @@ impl Observer {
     #[getter]
     fn learnt(&self, py: Python<'_>) -> PyResult<String> {
         self.vehicle.text_of_learnt(self.estimator.learnt()).map_err(|error| exception(py, &error))
+    }
+
+    /// Pickled as the text of its car, what it was made with, and its memory: it goes on to the last bit.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickled<'py>> {
+        let made = py.import("wetclutch._wetclutch")?.getattr("restored_observer")?;
+        Ok((made, (self.texts(), PyBytes::new(py, &self.memory(py)?))))
+    }
+
+    /// Whether both have the same car and sensors and will give the same estimates.
+    fn __eq__(&self, py: Python<'_>, other: &Self) -> PyResult<bool> {
+        Ok(self.texts() == other.texts() && self.memory(py)? == other.memory(py)?)
     }
 
     fn __copy__(&self) -> Self {
@@ -178,10 +184,46 @@ impl Observer {
 }
 
 impl Observer {
+    fn made(vehicle: VehicleFile, made_with: MadeWith, learnt: Option<&str>) -> Result<Self, Error> {
+        let Some(car) = vehicle.car() else {
+            let message = "car: an observer step by step needs a car with a gearbox, and this is one of a single shift";
+            return Err(Error::Input(message.to_owned()));
+        };
+        let sensors = made_with.sensors.as_ref().map(wetclutch::sensors_of).transpose()?;
+        let learnt = learnt.map(|text| vehicle.learnt_of(text)).transpose()?;
+        let estimator = Estimator::new(car, sensors.as_ref(), learnt.as_ref())?;
+        let named = |name: &String| Some((name.clone(), estimator.element(name)?));
+        let elements = car.gearbox.elements.iter().filter_map(|element| named(&element.name)).collect();
+        let names = Names::of(car, &estimator);
+        let shift = made_with.shift.as_deref().map(|name| car.shift_named(name)).transpose()?;
+        let shift = shift.and_then(|[from, to]| Some(ShiftId { from: GearId::new(from)?, to: GearId::new(to)? }));
+        Ok(Self {
+            estimator,
+            shift: shift.map(ShiftCommand::from),
+            vehicle: Arc::new(vehicle),
+            made_with: Arc::new(made_with),
+            elements,
+            names: Arc::new(names),
+        })
+    }
+
+    fn texts(&self) -> Texts {
+        let MadeWith { shift, sensors } = &*self.made_with;
+        let sensors = sensors.as_ref().map(|file| (file.path.to_string_lossy().into_owned(), file.text.clone()));
+        let vehicle = &self.vehicle;
+        let gearbox = vehicle.gearbox_text().map(str::to_owned);
+        (vehicle.name().to_owned(), vehicle.text().to_owned(), gearbox, shift.clone(), sensors)
+    }
+
+    fn memory(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        self.estimator.memory().map_err(|error| exception(py, &error.into()))
+    }
+
     fn element(&self, name: &str) -> Result<ElementId, Error> {
-        self.names.elements.get(name).copied().ok_or_else(|| {
-            let mut known: Vec<&str> = self.names.elements.keys().map(String::as_str).collect();
-            known.sort_unstable();
+        // There are few of them.
+        let found = self.elements.iter().find(|(element, _)| element == name);
+        found.map(|(_, element)| *element).ok_or_else(|| {
+            let known: Vec<&str> = self.elements.iter().map(|(element, _)| element.as_str()).collect();
             unknown("element", name, &known)
         })
     }
@@ -202,182 +244,22 @@ impl Observer {
     }
 }
 
-/// The gear in which no gear is engaged.
-const NEUTRAL: &str = "N";
+/// The observer of a pickle.
+#[pyfunction]
+pub(crate) fn restored_observer(py: Python<'_>, texts: Texts, memory: &[u8]) -> PyResult<Observer> {
+    let made = || -> Result<_, Error> {
+        // First, since another version may have other keys.
+        Estimator::check_version(memory)?;
+        let (name, text, gearbox, shift, sensors) = texts;
+        let vehicle = VehicleFile::from_texts(&name, &text, gearbox.as_deref())?;
+        let sensors = sensors.map(|(name, text)| Source::built_in(&name, &text));
+        let mut observer = Observer::made(vehicle, MadeWith { shift, sensors }, None)?;
+        observer.estimator.go_on_from(memory)?;
+        Ok(observer)
+    };
+    made().map_err(|error| exception(py, &error))
+}
 
 fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
     Error::Input(format!("{what}: there is no `{}`\nhint: expected one of {}", name.escape_debug(), known.join(", ")))
-}
-
-/// The estimate for one step of an :class:`Observer`.
-#[pyclass(module = "wetclutch", frozen)]
-pub(crate) struct StepEstimate {
-    estimate: ShiftEstimate<f64>,
-    names: Arc<Names>,
-}
-
-#[pymethods]
-impl StepEstimate {
-    /// The gear that the filter is in, before a shift; None while it has only the valve models.
-    #[getter]
-    fn gear(&self) -> Option<&str> {
-        self.gear_named(self.estimate.gear?.from)
-    }
-
-    /// The gear after the shift; that of `gear` while there is no shift.
-    #[getter]
-    fn target_gear(&self) -> Option<&str> {
-        self.gear_named(self.estimate.gear?.to)
-    }
-
-    /// Which clutches hold, in words; None where that is not known.
-    #[getter]
-    fn phase(&self) -> Option<&'static str> {
-        self.estimate.phase.map(|phase| phase.name())
-    }
-
-    /// Whether the readings could be used, and whether the estimate can be believed: `"good"` if so.
-    #[getter]
-    fn health(&self) -> &'static str {
-        self.estimate.health.name()
-    }
-
-    /// The clutch that opens in the shift; None in a gear.
-    #[getter]
-    fn offgoing(&self) -> Option<ClutchStep> {
-        self.clutch(0)
-    }
-
-    /// The clutch that closes in the shift; None in a gear.
-    #[getter]
-    fn oncoming(&self) -> Option<ClutchStep> {
-        self.clutch(1)
-    }
-
-    /// Torque at the gearbox input, N m.
-    #[getter]
-    fn turbine_torque_n_m(&self) -> Option<f64> {
-        self.estimate.turbine_n_m
-    }
-
-    /// Torque of the drive shafts, N m.
-    #[getter]
-    fn shaft_torque_n_m(&self) -> Option<f64> {
-        self.estimate.shaft_n_m
-    }
-
-    /// Slip of the offgoing clutch away from the new gear, at the turbine, rad/s: a flare.
-    #[getter]
-    fn flare_rad_s(&self) -> f64 {
-        self.estimate.flare_rad_s
-    }
-
-    /// Pressures of all elements by the models of their valves and pistons, Pa.
-    #[getter]
-    fn valve_model_pressures_pa(&self) -> HashMap<&str, f64> {
-        let pressure = |place: usize| self.estimate.valve_pa.get(place).copied().unwrap_or(f64::NAN);
-        self.names.places.iter().map(|(place, name)| (name.as_str(), pressure(*place))).collect()
-    }
-
-    fn __eq__(&self, other: &Self) -> bool {
-        // Bit by bit, so that an estimate equals itself where a number is missing.
-        format!("{:?}", self.estimate) == format!("{:?}", other.estimate)
-    }
-
-    fn __repr__(&self) -> String {
-        let gear = match (self.gear(), self.target_gear()) {
-            (Some(from), Some(to)) if from != to => format!("{from}-{to}"),
-            (Some(gear), _) => gear.to_owned(),
-            _ => "no gear".to_owned(),
-        };
-        let phase = self.phase().map(|phase| format!(", {phase}")).unwrap_or_default();
-        format!("StepEstimate({gear}{phase}, {})", self.health())
-    }
-}
-
-impl StepEstimate {
-    fn gear_named(&self, gear: Gear) -> Option<&str> {
-        Some(gear.place().and_then(|place| self.names.gears.get(place)).map_or(NEUTRAL, String::as_str))
-    }
-
-    fn clutch(&self, which: usize) -> Option<ClutchStep> {
-        let clutch = *self.estimate.clutches?.get(which)?;
-        let named = self.names.places.iter().find(|(place, _)| clutch.element.place() == Some(*place));
-        Some(ClutchStep { clutch, element: named.map(|(_, name)| name.clone()) })
-    }
-}
-
-/// The estimate of one clutch of a shift.
-#[pyclass(module = "wetclutch", frozen)]
-pub(crate) struct ClutchStep {
-    clutch: ClutchEstimate<f64>,
-    element: Option<String>,
-}
-
-#[pymethods]
-impl ClutchStep {
-    /// Its name; None of a one-way clutch, which has a torque alone.
-    #[getter]
-    fn element(&self) -> Option<&str> {
-        self.element.as_deref()
-    }
-
-    /// Cylinder pressure, Pa.
-    #[getter]
-    fn pressure_pa(&self) -> f64 {
-        self.clutch.pressure_pa
-    }
-
-    /// Lowest and highest pressure, Pa, for errors within the budget.
-    #[getter]
-    fn pressure_range_pa(&self) -> Option<(f64, f64)> {
-        self.clutch.pressure_range_pa.map(|[low, high]| (low, high))
-    }
-
-    /// Torque, N m, positive when it drives its output side.
-    #[getter]
-    fn torque_n_m(&self) -> f64 {
-        self.clutch.torque_n_m
-    }
-
-    /// Lowest and highest torque, N m, for errors within the budget.
-    #[getter]
-    fn torque_range_n_m(&self) -> Option<(f64, f64)> {
-        self.clutch.torque_range_n_m.map(|[low, high]| (low, high))
-    }
-
-    /// Standard deviation of the torque, N m.
-    #[getter]
-    fn torque_deviation_n_m(&self) -> f64 {
-        self.clutch.std_dev_n_m
-    }
-
-    /// Pressure by the models of valve and piston alone, Pa.
-    #[getter]
-    fn valve_model_pressure_pa(&self) -> f64 {
-        self.clutch.valve_pa
-    }
-
-    /// Torque by these models and friction alone, N m.
-    #[getter]
-    fn valve_model_torque_n_m(&self) -> f64 {
-        self.clutch.open_loop_n_m
-    }
-
-    /// Whether it holds.
-    #[getter]
-    fn holds(&self) -> bool {
-        self.clutch.holds
-    }
-
-    /// Whether the torque is unobservable: the estimate is that of the valve model.
-    #[getter]
-    fn hidden(&self) -> bool {
-        self.clutch.hidden
-    }
-
-    fn __repr__(&self) -> String {
-        let element = self.element.as_deref().unwrap_or("one-way clutch");
-        format!("ClutchStep({element}, {:.0} Pa, {:.1} N m)", self.clutch.pressure_pa, self.clutch.torque_n_m)
-    }
 }

@@ -51,11 +51,11 @@ pub(crate) fn study_table(
     lines: &[u8],
     shown: Option<PathBuf>,
 ) -> PyResult<(Table, Option<String>)> {
-    let lines = std::str::from_utf8(lines).map_err(|error| exception(py, &Error::Input(error.to_string())))?;
+    let lines = str::from_utf8(lines).map_err(|error| exception(py, &Error::Input(error.to_string())))?.to_owned();
     let (table, page) = work::done(py, None, move |_| {
         let study = ready(&path)?;
-        let table = study.table(lines)?;
-        let page = shown.map(|shown| study.page(lines, &shown)).transpose()?;
+        let table = study.table(&lines)?;
+        let page = shown.map(|shown| study.page(&lines, &shown)).transpose()?;
         Ok((table, page.flatten()))
     })?;
     Ok((table.into(), page))

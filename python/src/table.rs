@@ -6,7 +6,7 @@ use std::sync::Arc;
 use pyo3::exceptions::{PyBufferError, PyKeyError, PyTypeError, PyValueError};
 use pyo3::ffi;
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict, PyList};
+use pyo3::types::{PyCapsule, PyDict, PyList, PyTuple};
 use wetclutch::{Column, Values, Words};
 
 use crate::arrow;
@@ -118,7 +118,8 @@ fn values_of(name: &str, values: &Bound<'_, PyAny>) -> PyResult<Values> {
     }
     let items: Vec<Bound<'_, PyAny>> = values.try_iter()?.collect::<PyResult<_>>()?;
     let is_word = |item: &Bound<'_, PyAny>| item.extract::<&str>().is_ok() || item.extract::<String>().is_ok();
-    if items.iter().any(is_word) {
+    // A tuple is one of words, of which there may be none.
+    if values.is_instance_of::<PyTuple>() || items.iter().any(is_word) {
         let words = items.iter().map(|item| match (item.is_none(), item.extract::<String>()) {
             (true, _) => Ok(String::new()),
             (false, Ok(word)) => Ok(word),

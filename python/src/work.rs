@@ -1,13 +1,14 @@
 //! Long work: on a thread of its own, without Python's lock, with progress, ended by Ctrl-C.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::Builder;
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
-use wetclutch::Error;
+use wetclutch::{Error, grouped};
 
 use crate::error::{defect, exception};
 
@@ -28,6 +29,7 @@ pub(crate) struct Report {
 #[derive(Default)]
 pub(crate) struct Work {
     stop: Arc<AtomicBool>,
+    rows: Arc<AtomicU64>,
     newest: Mutex<Option<Report>>,
 }
 
@@ -42,6 +44,11 @@ impl Work {
         self.stop.load(Ordering::Relaxed)
     }
 
+    /// Counts rows of a log that are done.
+    pub(crate) fn rows(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.rows)
+    }
+
     /// Says how far the work is; Python gets the newest report.
     pub(crate) fn report(&self, report: Report) {
         *lock(&self.newest) = Some(report);
@@ -52,63 +59,53 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Does the work; it has to end soon after [`Work::stop`] is set. `progress` is called with words and a fraction or `None`, by this thread. A panic
-/// becomes an exception.
-pub(crate) fn done<T: Send>(
+/// Does the work. `progress` is called with words and a fraction or `None`, by this thread. A panic becomes an exception.
+///
+/// After Ctrl-C, or an exception of `progress`, the call ends at once, and the work soon after [`Work::stop`] is set: its result is dropped.
+pub(crate) fn done<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
-    work: impl FnOnce(&Work) -> Result<T, Error> + Send,
+    work: impl FnOnce(&Work) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
-    let shared = Work::default();
+    let shared = Arc::new(Work::default());
     let (sender, receiver) = channel();
     // For the lock of Python to be released around it; nobody else asks for it.
     let receiver = Mutex::new(receiver);
-    std::thread::scope(|scope| {
-        let of_work = &shared;
-        scope.spawn(move || {
-            // Nothing of what it leaves half done is looked at afterwards.
-            let result = catch_unwind(AssertUnwindSafe(|| work(of_work)));
-            // The receiver waits until this comes.
-            let _ = sender.send(result);
-        });
-        let mut ended_by = None;
-        let mut reported = Instant::now();
-        loop {
-            let received = py.detach(|| lock(&receiver).recv_timeout(LOOK));
-            match received {
-                Ok(result) => {
-                    if let Some(signal) = ended_by {
-                        return Err(signal);
-                    }
-                    return match result {
-                        Ok(Ok(value)) => Ok(value),
-                        Ok(Err(error)) => Err(exception(py, &error)),
-                        Err(_) => Err(defect("it panicked; the message is on standard error")),
-                    };
-                }
-                Err(RecvTimeoutError::Disconnected) => return Err(defect("the work ended without a result")),
-                Err(RecvTimeoutError::Timeout) if ended_by.is_some() => {}
-                Err(RecvTimeoutError::Timeout) => {
-                    let is_due = reported.elapsed() >= REPORT;
-                    let looked = py.check_signals().and_then(|()| match progress {
-                        Some(progress) if is_due => {
-                            reported = Instant::now();
-                            pass(progress, &shared)
-                        }
-                        _ => Ok(()),
-                    });
-                    if let Err(error) = looked {
-                        shared.stop.store(true, Ordering::Relaxed);
-                        ended_by = Some(error);
-                    }
-                }
-            }
+    let of_work = Arc::clone(&shared);
+    Builder::new().spawn(move || {
+        // Nothing of what it leaves half done is looked at afterwards.
+        let result = catch_unwind(AssertUnwindSafe(|| work(&of_work)));
+        // Nobody waits for it after Ctrl-C.
+        let _ = sender.send(result);
+    })?;
+    let mut reported = Instant::now();
+    loop {
+        match py.detach(|| lock(&receiver).recv_timeout(LOOK)) {
+            Ok(Ok(result)) => return result.map_err(|error| exception(py, &error)),
+            Ok(Err(_)) => return Err(defect("it panicked; the message is on standard error")),
+            Err(RecvTimeoutError::Disconnected) => return Err(defect("the work ended without a result")),
+            Err(RecvTimeoutError::Timeout) => {}
         }
-    })
+        let looked = py.check_signals().and_then(|()| match progress {
+            Some(progress) if reported.elapsed() >= REPORT => {
+                reported = Instant::now();
+                pass(progress, &shared)
+            }
+            _ => Ok(()),
+        });
+        if looked.is_err() {
+            shared.stop.store(true, Ordering::Relaxed);
+            looked?;
+        }
+    }
 }
 
-/// Passes the newest report to Python, if there is one.
+/// Passes the newest report to Python, or how many rows are done, if there is one.
 fn pass(progress: &Bound<'_, PyAny>, work: &Work) -> PyResult<()> {
-    let newest = lock(&work.newest).take();
-    newest.map_or(Ok(()), |report| progress.call1((report.words, report.fraction)).map(drop))
+    let newest = lock(&work.newest).take().map(|report| (report.words, report.fraction));
+    let counted = || match work.rows.load(Ordering::Relaxed) {
+        0 => None,
+        rows => Some((format!("{} rows", grouped(rows)), None)),
+    };
+    newest.or_else(counted).map_or(Ok(()), |report| progress.call1(report).map(drop))
 }

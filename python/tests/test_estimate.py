@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import concurrent.futures
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -165,15 +164,27 @@ def test_other_threads_of_python_run_meanwhile(car: wc.Car, drive_file: str) -> 
     assert ticks > 10
 
 
-def test_ctrl_c_ends_an_estimate(car: wc.Car, measured: wc.Table) -> None:
-    rows = {name: list(measured[name]) * 40 for name in measured if name != "time_s"}
-    rows["time_s"] = [0.01 * at for at in range(40 * measured.rows)]
-    log = wc.read({"time_s": rows.pop("time_s"), **rows})
-    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
-    begin = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        wc.estimate(car, log)
-    assert time.monotonic() - begin < 30.0
+def test_progress_comes_at_most_ten_times_a_second(car: wc.Car, measured: wc.Table, drive_file: str) -> None:
+    rows = {name: list(measured[name]) * 10 for name in measured if name != "time_s"}
+    log = wc.read({"time_s": [0.01 * at for at in range(10 * measured.rows)], **rows})
+    for call in (lambda progress: wc.estimate(car, log, progress=progress), lambda progress: wc.simulate(car, drive_file, progress=progress)):
+        times: list[float] = []
+        reports: list[tuple[str, float | None]] = []
+
+        def progress(words: str, fraction: float | None) -> None:
+            times.append(time.monotonic())
+            reports.append((words, fraction))
+
+        call(progress)
+        assert reports and all(later - before > 0.09 for before, later in zip(times, times[1:]))
+        assert all(fraction is None or 0.0 <= fraction <= 1.0 for _, fraction in reports)
+        assert all(words.endswith(("rows", "s")) for words, _ in reports)
+
+        def failing(words: str, fraction: float | None) -> None:
+            raise LookupError(words)
+
+        with pytest.raises(LookupError):
+            call(failing)
 
 
 def test_only_the_initialiser_is_exported() -> None:
@@ -191,3 +202,14 @@ def test_importing_loads_no_other_package() -> None:
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     others = {name.split(".")[0] for name in loaded} - set(sys.stdlib_module_names) - {"wetclutch"}
     assert "wetclutch" in {name.split(".")[0] for name in loaded} and not others
+
+
+def test_a_drive_is_drawn(car: wc.Car, measured: wc.Table) -> None:
+    pytest.importorskip("matplotlib").use("Agg")
+    found = wc.estimate(car, measured)
+    axes = found.plot(shift=None)
+    assert [axis.get_ylabel() for axis in axes] == ["gear", "turbine torque, N m", "pressure, MPa"]
+    # Shading, one for each shift, and curves.
+    assert len(axes[0].patches) == found.shifts.rows and len(axes[2].lines) == 5
+    with pytest.raises(KeyError, match="a plot of the drive needs"):
+        wc.estimate(car, measured, columns=["health"]).plot(shift=None)

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import copy
 import math
+import pickle
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -48,6 +50,62 @@ def test_a_copy_goes_on_by_itself(car: wc.Car, measured: wc.Table) -> None:
     assert first == [other.step(**step) for step in rows[2000:]]
     assert observer.learnt == other.learnt
     assert wc.Observer(car, learnt=observer.learnt).learnt != wc.Observer(car).learnt
+
+
+def test_a_pickled_observer_goes_on_to_the_last_bit(car: wc.Car, measured: wc.Table, tmp_path: Path) -> None:
+    sensors = tmp_path / "bench.toml"
+    sensors.write_text((ROOT / "experiments" / "bench.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    observer = wc.Observer(car, shift="1-2", sensors=sensors, learnt=wc.estimate(car, measured).learnt)
+    sensors.unlink()
+    rows = steps(measured, 3000)
+    phases = set()
+    for at, step in enumerate(rows):
+        estimate = observer.step(**step)
+        if at % 500 == 0 or estimate.phase not in phases:
+            phases.add(estimate.phase)
+            other = pickle.loads(pickle.dumps(observer))
+            assert other == observer and repr(other) == repr(observer)
+            ahead = [copy.copy(observer), other]
+            first, second = ([one.step(**step) for step in rows[at + 1 : at + 200]] for one in ahead)
+            assert first == second and ahead[0] == ahead[1] and ahead[0].learnt == ahead[1].learnt
+    assert {"in_gear", "both_slip"} <= phases
+
+
+def test_observers_are_equal_if_they_go_on_equally(car: wc.Car, measured: wc.Table) -> None:
+    observer, other = wc.Observer(car), wc.Observer(car)
+    assert observer == other and observer != wc.Observer(car, shift="1-2") and observer != 3
+    for step in steps(measured, 50):
+        observer.step(**step)
+        assert observer != other
+        other.step(**step)
+        assert observer == other
+    with pytest.raises(TypeError):
+        hash(observer)
+
+
+def test_a_pickle_of_another_version_is_refused(car: wc.Car) -> None:
+    pickled = pickle.dumps(wc.Observer(car))
+    version = wc.__version__.encode()
+    assert pickled.count(version) >= 1
+    with pytest.raises(wc.InputError, match=f"is of version 9.*this is {wc.__version__}") as raised:
+        pickle.loads(pickled.replace(version, b"9" + version[1:]))
+    assert raised.value.hint
+
+
+def test_estimates_of_steps_pickle_and_copy(car: wc.Car, measured: wc.Table) -> None:
+    observer = wc.Observer(car)
+    for step in steps(measured, 3000):
+        estimate = observer.step(**step)
+    for other in (pickle.loads(pickle.dumps(estimate)), copy.deepcopy(estimate)):
+        assert other == estimate and other.valve_model_pressures_pa == estimate.valve_model_pressures_pa
+        assert repr(other) == repr(estimate) and other.gear == estimate.gear
+    clutches = [clutch for clutch in map(lambda step: observer.step(**step).oncoming, steps(measured, 3000)) if clutch is not None]
+    assert clutches
+    for clutch in clutches[::10]:
+        assert pickle.loads(pickle.dumps(clutch)) == clutch and clutch.pressure_deviation_pa >= 0.0
+    assert clutches[0] != clutches[-1]
+    with pytest.raises(wc.InputError, match="damaged"):
+        wc._wetclutch.restored_step(b"")  # type: ignore[attr-defined]
 
 
 def test_the_shift_of_the_observer_is_commanded_where_a_step_has_no_gear(car: wc.Car, measured: wc.Table) -> None:

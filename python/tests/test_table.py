@@ -51,6 +51,8 @@ def test_tables_leave_with_units_to_every_library() -> None:
     assert wc.Table(pl.DataFrame(table)) == table == wc.Table(arrow) == wc.Table(table.to_pandas())
     assert wc.Table(table.to_numpy()) == table
     assert pickle.loads(pickle.dumps(table)) == table
+    empty = wc.Table(pl.DataFrame({"time_s": pl.Series([], dtype=pl.Float64), "gear": pl.Series([], dtype=pl.String)}))
+    assert pickle.loads(pickle.dumps(empty)) == empty and empty["gear"] == []
 
 
 def test_columns_are_seen_without_a_copy_and_cannot_be_written() -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from ._car import Car, gearboxes
 from ._check import check
 from ._design import Certificate, ErrorSystem, Gains, PhaseCertificate, design
-from ._errors import InputError, WetclutchError, WorkError
+from ._errors import InputError, InputErrors, WetclutchError, WorkError
 from ._estimate import Estimates, Log, estimate, read
 from ._fit import Fit, fit
 from ._simulate import Simulation, simulate
@@ -30,6 +30,7 @@ __all__ = [
     "Fit",
     "Gains",
     "InputError",
+    "InputErrors",
     "Log",
     "Observer",
     "PhaseCertificate",

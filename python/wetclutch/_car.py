@@ -6,7 +6,7 @@ import os
 from typing import Any, Self
 
 from . import _wetclutch as native
-from ._errors import InputError
+from ._errors import InputError, of_files
 
 
 def gearboxes() -> tuple[str, ...]:
@@ -63,8 +63,10 @@ class Car:
 
         Raises:
             InputError: A file cannot be read, or something in it is wrong; the error has file, line and key.
+            InputErrors: Several things in it are wrong.
         """
-        return cls._of(native.read_car(os.fspath(path)))
+        with of_files(path):
+            return cls._of(native.read_car(os.fspath(path)))
 
     @classmethod
     def template(

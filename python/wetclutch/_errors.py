@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Self
 
 
 class WetclutchError(Exception):
@@ -46,6 +49,32 @@ class InputError(WetclutchError, ValueError):
     """A file, a table or an argument is wrong."""
 
 
+class InputErrors(ExceptionGroup[InputError], InputError):
+    """All errors of a file and of those that it names: a group for ``except*``, whose parts are those of the first error."""
+
+    hint: str | None
+    file: str | None
+    line: int | None
+    key: str | None
+
+    def __new__(cls, message: str, errors: Sequence[InputError]) -> Self:
+        return super().__new__(cls, message, errors)
+
+    def __init__(self, message: str, errors: Sequence[InputError]) -> None:
+        first = errors[0]
+        self.hint, self.file, self.line, self.key = first.hint, first.file, first.line, first.key
+
+    def derive(self, errors: Sequence[InputError]) -> InputErrors:  # type: ignore[override]
+        """A group of some of them."""
+        return InputErrors(self.message, errors)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return InputErrors, (self.message, list(self.exceptions))
+
+    def __str__(self) -> str:
+        return "\n".join([self.message, *(str(error) for error in self.exceptions)])
+
+
 class WorkError(WetclutchError, RuntimeError):
     """The work itself failed: a simulation diverged, a design has no solution, or it was interrupted."""
 
@@ -54,3 +83,33 @@ def _made(
     kind: type[WetclutchError], message: str, hint: str | None, file: str | None, line: int | None, key: str | None
 ) -> WetclutchError:
     return kind(message, hint=hint, file=file, line=line, key=key)
+
+
+@contextmanager
+def of_files(*paths: str | os.PathLike[str] | None) -> Iterator[None]:
+    """Raises all errors of these files where one of them has several, in place of the first."""
+    try:
+        yield
+    except InputErrors:
+        raise
+    except InputError as error:
+        for path in (os.fspath(path) for path in paths if path is not None):
+            group = grouped(path)
+            if group is not None and len(group.exceptions) > 1 and any(error.file == one.file for one in group.exceptions):
+                raise group from None
+        raise
+
+
+def grouped(path: str) -> InputErrors | None:
+    """All errors of a file; None if there is none.
+
+    Raises:
+        InputError: The file cannot be read at all.
+    """
+    from . import _wetclutch as native
+
+    errors = native.errors_of_file(path)
+    if not errors:
+        return None
+    count = "an error" if len(errors) == 1 else f"{len(errors)} errors"
+    return InputErrors(f"{path}: {count}", errors)

@@ -5,10 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import Any, TypedDict, Unpack, overload
 
 from . import _wetclutch as native
 from ._car import Car
+from ._errors import of_files
+from ._executor import each
+from ._progress import Progress, Report, reported
 from ._table import Table
 
 
@@ -117,21 +121,21 @@ class Estimates:
     def __repr__(self) -> str:
         return f"Estimates({self.rows.rows} rows, {self.shifts.rows} shifts)"
 
-    def plot(self, shift: int = 1) -> Any:
-        """Draws pressures and torques of a shift with their guaranteed ranges; needs matplotlib.
+    def plot(self, shift: int | None = 1) -> Any:
+        """Draws pressures and torques of a shift with their guaranteed ranges, or the whole drive; needs matplotlib.
 
         Args:
-            shift: Number of the shift, from 1.
+            shift: Number of the shift, from 1; None for the drive of a car with a gearbox.
 
         Returns:
-            The axes of the figure: pressures above, torques below.
+            The axes of the figure: pressures above, torques below; of a drive gear, torque at the gearbox input, pressures of the elements.
 
         Raises:
             IndexError: There is no such shift.
         """
-        from ._plot import plot_shift
+        from ._plot import plot_drive, plot_shift
 
-        return plot_shift(self, shift)
+        return plot_drive(self) if shift is None else plot_shift(self, shift)
 
 
 def framed(page: str | None) -> str | None:
@@ -143,6 +147,33 @@ def framed(page: str | None) -> str | None:
     return f'<iframe srcdoc="{escape(page)}" style="width:100%;height:640px;border:0"></iframe>'
 
 
+class _Options(TypedDict, total=False):
+    """How a log is estimated."""
+
+    observer: str | None
+    method: str | None
+    sensors: str | os.PathLike[str] | None
+    columns: Sequence[str]
+    shift: int | None
+    shifts: Sequence[str]
+    learnt: str | None
+    threads: int
+    page: bool
+
+
+@overload
+def estimate(
+    car: Car,
+    log: list[Any] | tuple[Any, ...],
+    *,
+    progress: Progress = False,
+    executor: Any = None,
+    **options: Unpack[_Options],
+) -> tuple[Estimates, ...]: ...
+@overload
+def estimate(
+    car: Car, log: Any, *, progress: Progress = False, executor: None = None, **options: Unpack[_Options]
+) -> Estimates: ...
 def estimate(
     car: Car,
     log: Any,
@@ -156,14 +187,16 @@ def estimate(
     learnt: str | None = None,
     threads: int = 1,
     page: bool = False,
-) -> Estimates:
-    """Estimates pressures and torques of the clutches from a log. The results are those of ``wetclutch estimate``.
+    progress: Progress = False,
+    executor: Any = None,
+) -> Estimates | tuple[Estimates, ...]:
+    """Estimates pressures and torques of the clutches from a log, or from each of many. The results are those of ``wetclutch estimate``.
 
     Ends within some milliseconds of Ctrl-C; other threads of Python run meanwhile.
 
     Args:
         car: The car.
-        log: A :class:`Log`, or what :func:`read` makes one of.
+        log: A :class:`Log`, or what :func:`read` makes one of; or a list or tuple of them, each estimated alone.
         observer: Observer of a car of one shift, such as ``"kalman"``; the best for the log if none is given.
         method: Design method of its gains, such as ``"peak-to-peak"``, of the observers rigid and compliant.
         sensors: File whose table ``sensors`` describes the sensors of the log.
@@ -171,14 +204,19 @@ def estimate(
         shift: The shift with this number alone, from 1.
         shifts: Shifts between these gears alone, such as ``["1-2", "2-3"]``.
         learnt: What was learnt of the car in an earlier log: ``Estimates.learnt``.
-        threads: Threads that read the log.
+        threads: Threads that read a log.
         page: Whether to make the page of the drive.
+        progress: True for a bar, or a function that takes words and the done fraction or None, at most ten times a second.
+        executor: Where many logs are estimated: any ``concurrent.futures.Executor``, or a ``dask.distributed.Client``; in this process if
+            it is None. Files are read by the workers.
+
+    Returns:
+        The estimates of the log; of many logs a tuple in their order.
 
     Raises:
-        InputError: The log cannot be read or is not of this car, or an argument does not fit it.
+        InputError: A log cannot be read or is not of this car, or an argument does not fit it.
+        WorkError: Workers died again and again at the same log.
     """
-    if not isinstance(log, Log):
-        log = read(log)
     if not 1 <= threads <= 1024:
         raise ValueError(f"threads is {threads}, expected 1 to 1024")
     options = {
@@ -192,6 +230,17 @@ def estimate(
         "threads": threads,
         "with_page": page,
     }
+    if isinstance(log, (list, tuple)):
+        logs = [one if isinstance(one, Log) else read(one) for one in log]
+        return each(executor, partial(_estimated, car, options), logs, progress, "logs")
+    if executor is not None:
+        raise ValueError("executor is for many logs: give a list of them")
+    with reported(progress) as report:
+        return _estimated(car, options, log if isinstance(log, Log) else read(log), report)
+
+
+def _estimated(car: Car, options: dict[str, Any], log: Log, report: Report | None = None) -> Estimates:
     name, table, mapping = log._native
-    rows, found, findings, learnt_now, html = native.estimate(car._native, name, table, mapping, options)
-    return Estimates(Table(rows), Table(found), tuple(findings), learnt_now, html)
+    with of_files(log.map, options["sensors"]):
+        rows, found, findings, learnt, html = native.estimate(car._native, name, table, mapping, options, report)
+    return Estimates(Table(rows), Table(found), tuple(findings), learnt, html)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, overload
 
 from . import _wetclutch as native
 from ._car import Car
+from ._errors import of_files
 from ._estimate import Log, framed, read
-from ._progress import Progress, reported
+from ._executor import each
+from ._progress import Progress, Report, reported
 from ._table import Table
 
 
@@ -61,6 +65,7 @@ class Fit:
         return f"Fit({self.shifts} shifts, {identified} of {self.intervals.rows} quantities identifiable{kept})"
 
 
+@overload
 def fit(
     car: Car,
     logs: Any,
@@ -68,27 +73,69 @@ def fit(
     sensors: str | os.PathLike[str] | None = None,
     page: bool = False,
     progress: Progress = False,
-) -> Fit:
-    """Fits the values of a car to logs. The results are those of ``wetclutch fit``.
+    executor: None = None,
+) -> Fit: ...
+@overload
+def fit(
+    car: Sequence[Car],
+    logs: Sequence[Any],
+    *,
+    sensors: str | os.PathLike[str] | None = None,
+    page: bool = False,
+    progress: Progress = False,
+    executor: Any = None,
+) -> tuple[Fit, ...]: ...
+def fit(
+    car: Car | Sequence[Car],
+    logs: Any,
+    *,
+    sensors: str | os.PathLike[str] | None = None,
+    page: bool = False,
+    progress: Progress = False,
+    executor: Any = None,
+) -> Fit | tuple[Fit, ...]:
+    """Fits the values of a car to logs, or those of each of many cars to its logs. The results are those of ``wetclutch fit``.
 
-    Ends soon after Ctrl-C; other threads of Python run meanwhile.
+    Ends within some milliseconds of Ctrl-C; other threads of Python run meanwhile.
 
     Args:
-        car: The car to start from; its error budget says how far off its values may be.
-        logs: A log, or a list or tuple of logs: each a :class:`Log`, or what :func:`read` makes one of.
+        car: The car to start from; its error budget says how far off its values may be. Or many cars.
+        logs: A log, or a list or tuple of logs: each a :class:`Log`, or what :func:`read` makes one of. Of many cars, these of each.
         sensors: File whose table ``sensors`` describes the sensors of the logs.
         page: Whether to make the page of the fit.
         progress: True for a bar, or a function that takes words and the done fraction or None, at most ten times a second.
+        executor: Where many cars are fitted: any ``concurrent.futures.Executor``, or a ``dask.distributed.Client``; in this process if it
+            is None. Files are read by the workers.
+
+    Returns:
+        The fit of the car; of many cars a tuple in their order.
 
     Raises:
         InputError: A log cannot be read or is not of this car, or no shift can be fitted.
-        WorkError: The fit found no minimum.
+        WorkError: A fit found no minimum, or workers died again and again at the same car.
     """
-    many = list(logs) if isinstance(logs, (list, tuple)) else [logs]
-    given = [(log if isinstance(log, Log) else read(log))._native for log in many]
+    path = None if sensors is None else os.fspath(sensors)
+    if not isinstance(car, Car):
+        if len(car) != len(logs):
+            raise ValueError(f"there are {len(car)} cars and logs of {len(logs)}, expected logs for each car")
+        pairs = [(one, _logs(of)) for one, of in zip(car, logs, strict=True)]
+        return each(executor, partial(_fitted, path, page), pairs, progress, "cars")
+    if executor is not None:
+        raise ValueError("executor is for many cars: give a list of them, and one of the logs of each")
     with reported(progress) as report:
+        return _fitted(path, page, (car, _logs(logs)), report)
+
+
+def _logs(logs: Any) -> list[Log]:
+    many = logs if isinstance(logs, (list, tuple)) else [logs]
+    return [log if isinstance(log, Log) else read(log) for log in many]
+
+
+def _fitted(sensors: str | None, page: bool, of: tuple[Car, list[Log]], report: Report | None = None) -> Fit:
+    car, logs = of
+    with of_files(sensors, *(log.map for log in logs)):
         fitted, (intervals, channel_map), not_identifiable, statements, findings, shifts, kept, html = native.fit(
-            car._native, given, None if sensors is None else os.fspath(sensors), page, report
+            car._native, [log._native for log in logs], sensors, page, report
         )
     return Fit(
         car=Car._of(fitted),

@@ -52,6 +52,40 @@ def plot_shift(estimates: Estimates, number: int) -> Any:
     return axes
 
 
+def plot_drive(estimates: Estimates) -> Any:
+    """Gear, torque at the gearbox input and pressures of the elements by their valve models over the whole log; its shifts are shaded."""
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    rows, shifts = estimates.rows, estimates.shifts
+    pressures = [name for name in rows if name.startswith("element_") and name.endswith("_valve_model_pressure_pa")]
+    panels = [
+        ("gear", 1.0, ["gear_number"]),
+        ("turbine torque, N m", 1.0, ["turbine_torque_estimate_n_m"]),
+        ("pressure, MPa", 1e-6, pressures),
+    ]
+    panels = [(label, scale, names) for label, scale, names in panels if names and all(name in rows for name in names)]
+    if not panels:
+        raise KeyError("a plot of the drive needs gears, turbine torque or pressures of a car with a gearbox")
+    time_s = np.asarray(rows["time_s"])
+    figure, axes = plt.subplots(len(panels), 1, sharex=True, squeeze=False, figsize=(9, 2.2 * len(panels)), layout="constrained")
+    for axis, (label, scale, names) in zip(axes[:, 0], panels, strict=True):
+        for name in names:
+            element = name.removeprefix("element_").removesuffix("_valve_model_pressure_pa").upper()
+            axis.plot(time_s, scale * np.asarray(rows[name]), linewidth=0.8, drawstyle="steps-post" if label == "gear" else None, label=element)
+        for begin_s, length_s in zip(shifts["time_s"], shifts["complete_s"], strict=True):
+            if np.isfinite(length_s):
+                axis.axvspan(begin_s, begin_s + length_s, color="#d9d9d9", linewidth=0)
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+    if len(panels[-1][2]) > 1:
+        axes[-1, 0].legend(loc="upper right", ncols=len(pressures), fontsize="small")
+    axes[0, 0].set_title(f"{shifts.rows} shifts")
+    axes[-1, 0].set_xlabel("time, s")
+    del figure
+    return axes[:, 0]
+
+
 def plot_fit(fit: Fit) -> Any:
     """The intervals of a fit on those before it, in halves of these: the given car is at zero."""
     import matplotlib.pyplot as plt

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from . import _wetclutch as native
 from ._car import Car
+from ._errors import of_files
+from ._progress import Progress, reported
 from ._table import Table
 
 
@@ -29,17 +31,24 @@ class Simulation:
     speed_max_m_s: float
 
 
-def simulate(car: Car, drive: str | os.PathLike[str], *, seed: int | None = None) -> Simulation:
+def simulate(
+    car: Car, drive: str | os.PathLike[str], *, seed: int | None = None, progress: Progress = False
+) -> Simulation:
     """Drives a car through a drive file. The same car, file and seed give the same tables.
+
+    Ends within some milliseconds of Ctrl-C; other threads of Python run meanwhile.
 
     Args:
         car: A car with a gearbox.
         drive: A drive file, such as ``drives/city.toml``.
         seed: Seed of the noise of its sensors, in place of that of the file.
+        progress: True for a bar, or a function that takes words and the done fraction, at most ten times a second.
 
     Raises:
         InputError: The file is wrong, or the car is one of a single shift.
         WorkError: The simulation failed.
     """
-    truth, measured, (distance_m, shifts, speed_max_m_s) = native.simulate(car._native, os.fspath(drive), seed)
+    with of_files(drive), reported(progress) as report:
+        truth, measured, summary = native.simulate(car._native, os.fspath(drive), seed, report)
+    distance_m, shifts, speed_max_m_s = summary
     return Simulation(Table(truth), Table(measured), distance_m, shifts, speed_max_m_s)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import itertools
 import os
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from . import _wetclutch as native
-from ._errors import InputError, WorkError
+from ._errors import InputError, of_files
 from ._estimate import framed
-from ._progress import Progress, Report, reported
+from ._executor import counted, in_executor
+from ._progress import Progress, reported
 from ._table import Table
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
     from tempfile import TemporaryDirectory
 
 #: Runs of a task of which each takes about a millisecond, and largest size of what a task returns, bytes.
@@ -25,8 +24,6 @@ _RUNS, _BYTES = 1000, 900_000
 _CELL_BYTES = 22
 #: First run of a task, and the one after its last.
 _Runs: TypeAlias = tuple[int, int]
-#: Tasks that are given to each worker at a time: a scheduler need not know the others.
-_WINDOW = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,18 +137,18 @@ def study(
     """
     if not 1 <= threads <= 1024:
         raise ValueError(f"threads is {threads}, expected 1 to 1024")
-    plan, name, at_once = _planned(study)
+    with of_files(None if _is_text(study) else study):
+        plan, name, at_once = _planned(study)
     tasks = list(_tasks(plan, shards, at_once))
     shared = None if folder is None else _prepared(folder)
     where = _Where(plan, shared, threads)
     made: dict[_Runs, bytes | None] = {runs: None for runs in tasks if where.has(runs)}
     missing = [runs for runs in tasks if runs not in made]
     with reported(progress) as report:
-        tell = _counted(report, plan.runs)
+        tell = counted(report, plan.runs, "runs")
         for first, end in made:
             tell(end - first)
-        results = ((runs, _made(where, runs)) for runs in missing) if executor is None else _in_executor(executor, where, missing)
-        for (first, end), lines in results:
+        for (first, end), lines in in_executor(executor, partial(_made, where), missing, partial(_words, folder=shared)):
             made[first, end] = lines
             tell(end - first)
     lines = b"".join(where.read(runs) if made[runs] is None else made[runs] or b"" for runs in tasks)
@@ -184,70 +181,10 @@ def _tasks(plan: _Plan, shards: int | None, at_once: int) -> Iterator[_Runs]:
         yield plan.runs * task // shards, plan.runs * (task + 1) // shards
 
 
-def _counted(report: Report | None, runs: int) -> Callable[[int], None]:
-    """Counts finished runs and reports them, at most ten times a second."""
-    done, next_s = 0, 0.0
-
-    def tell(more: int) -> None:
-        nonlocal done, next_s
-        done += more
-        now_s = time.monotonic()
-        if report is not None and (now_s >= next_s or done == runs):
-            next_s = now_s + 0.1
-            report(f"{done} of {runs} runs", done / runs)
-
-    return tell
-
-
-def _in_executor(executor: Any, where: _Where, missing: list[_Runs]) -> Iterator[tuple[_Runs, bytes | None]]:
-    from concurrent.futures import FIRST_COMPLETED, wait
-
-    pool, workers = _pool(executor)
-    waiting = iter(missing)
-    running: dict[Future[bytes | None], _Runs] = {}
-
-    def submit(tasks: int) -> None:
-        for runs in itertools.islice(waiting, tasks):
-            running[pool.submit(_made, where, runs)] = runs
-
-    try:
-        submit(_WINDOW * workers)
-        while running:
-            finished, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in finished:
-                runs = running.pop(future)
-                try:
-                    lines = future.result()
-                except Exception as error:
-                    raise _failed(error, runs, where.folder) from error
-                submit(1)
-                yield runs, lines
-    finally:
-        for future in running:
-            future.cancel()
-
-
-def _pool(executor: Any) -> tuple[Executor, int]:
-    """The executor, and how many workers it has."""
-    if hasattr(executor, "get_executor"):
-        return executor.get_executor(), max(1, sum(executor.nthreads().values()))
-    if not hasattr(executor, "submit"):
-        kind = type(executor).__name__
-        raise TypeError(f"a {kind} is no executor: give a concurrent.futures.Executor or a dask.distributed.Client")
-    return executor, max(1, getattr(executor, "_max_workers", None) or os.cpu_count() or 1)
-
-
-def _failed(error: Exception, runs: _Runs, folder: str | None) -> Exception:
-    """The error of a task: that of its worker if that died."""
-    from concurrent.futures import BrokenExecutor
-
-    if not isinstance(error, BrokenExecutor) and type(error).__name__ != "KilledWorker":
-        return error
+def _words(runs: _Runs, folder: str | None) -> str:
+    """What a worker does that makes these runs, and what to do if it dies."""
     kept = "with folder= nothing that is made is lost" if folder is None else "the same call goes on from the rows in the folder"
-    return WorkError(
-        f"workers died while they made the runs {runs[0]} to {runs[1] - 1}; the system may have ended them for want of memory",
-        hint=f"more shards make each task smaller; {kept}",
-    )
+    return f"made the runs {runs[0]} to {runs[1] - 1}\nmore shards make each task smaller; {kept}"
 
 
 def _made(where: _Where, runs: _Runs) -> bytes | None:

@@ -161,6 +161,6 @@ def _bytes(table: Table, name: str) -> Any:
 
 
 def _unpickled(columns: dict[str, Any]) -> Table:
-    return Table(
-        {name: memoryview(of).cast("d") if isinstance(of, bytes) else list(of) for name, of in columns.items()}
-    )
+    # A column of words is a tuple, since there may be none.
+    given = {name: memoryview(of).cast("d") if isinstance(of, bytes) else tuple(of) for name, of in columns.items()}
+    return Table(native.Table.from_columns(given))

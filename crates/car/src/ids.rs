@@ -9,10 +9,12 @@ pub struct ElementId(u8);
 
 /// A gear by its place among the gears of its gearbox.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GearId(u8);
 
 /// A gear, or none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Gear {
     /// No gear drives the car.
     Neutral,

@@ -47,6 +47,7 @@ pub struct Commands<T = f64>([Option<Reading<T>>; MAX_ELEMENTS]);
 
 /// The gear, or the shift, that the gearbox controller commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShiftCommand {
     /// The gear before.
     pub from: Gear,

@@ -35,6 +35,17 @@ pub struct Estimator {
     elements: Vec<String>,
 }
 
+/// Of the memory.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+fn is_version(text: &str) -> bool {
+    text.len() < 32 && text.starts_with(|c: char| c.is_ascii_digit())
+}
+
+fn broken() -> EvaluateError {
+    EvaluateError::Memory("is damaged".to_owned())
+}
+
 /// Of no gearbox.
 const NO_TABLES: GearboxTables<'static, f64> = GearboxTables { elements: &[], gears: &[], shifts: &[] };
 
@@ -94,6 +105,48 @@ impl Estimator {
     /// What was learnt of the car so far.
     pub fn learnt(&self) -> &Learnt<f64> {
         self.state.learnt()
+    }
+
+    /// All that it knows after the steps so far, as bytes: with them an estimator of the same car and sensors goes on ([`Self::go_on_from`]).
+    ///
+    /// # Errors
+    /// There is no room for them.
+    pub fn memory(&self) -> Result<Vec<u8>, EvaluateError> {
+        postcard::to_allocvec(&(VERSION, &self.state))
+            .map_err(|error| EvaluateError::Memory(format!("is not made: {error}")))
+    }
+
+    /// Refuses a memory of another version.
+    ///
+    /// # Errors
+    /// It is one, or none at all.
+    pub fn check_version(memory: &[u8]) -> Result<(), EvaluateError> {
+        match postcard::take_from_bytes::<&str>(memory) {
+            Ok((VERSION, _)) => Ok(()),
+            Ok((version, _)) if is_version(version) => {
+                let version = version.escape_debug();
+                Err(EvaluateError::Memory(format!("is of version {version}, and this is {VERSION}")))
+            }
+            _ => Err(broken()),
+        }
+    }
+
+    /// Goes on as the estimator of the same car and sensors whose [`Self::memory`] this was, to the last bit.
+    ///
+    /// # Errors
+    /// The memory is of another version or of another gearbox, or is none; nothing has changed.
+    pub fn go_on_from(&mut self, memory: &[u8]) -> Result<(), EvaluateError> {
+        Self::check_version(memory)?;
+        let read = postcard::take_from_bytes::<(&str, GearboxState<f64>)>(memory);
+        let ((_, state), rest) = read.map_err(|_| broken())?;
+        if !rest.is_empty() {
+            return Err(broken());
+        }
+        if !state.fits(&self.tables.tables()) {
+            return Err(EvaluateError::Memory("is of another gearbox".to_owned()));
+        }
+        self.state = state;
+        Ok(())
     }
 
     /// The step as the filter takes it.
@@ -172,6 +225,90 @@ mod tests {
                 assert_eq!(estimator.pressure_range_pa(element), range);
             }
         }
+    }
+
+    /// Takes step after step of an upshift: in gear, in the shift, in the next gear.
+    fn take_steps(estimator: &mut Estimator, car: &Car, steps: std::ops::Range<u32>) -> Vec<String> {
+        let [first, second] = ["1", "2"].map(|name| estimator.gear(name).unwrap());
+        let ratio = |gear: GearId| car.gearbox.gears[gear.place()].ratio;
+        let taken = steps.map(|at| {
+            let output = 40.0 + 0.05 * f64::from(at);
+            let after = (f64::from(at) - 150.0).clamp(0.0, 50.0) / 50.0;
+            let mut step = Step::none(0.01);
+            step.speeds.engine = Some(Reading::now(230.0));
+            let turbine = output * (ratio(first) + after * (ratio(second) - ratio(first)));
+            step.speeds.turbine = Some(Reading { value: turbine, age_s: 0.003 });
+            step.speeds.output = Some(Reading::now(output));
+            let gears = if at < 200 { [first, if at < 150 { first } else { second }] } else { [second; 2] };
+            step.shift = Some(ShiftCommand { from: Gear::In(gears[0]), to: Gear::In(gears[1]) });
+            for element in (0..car.gearbox.elements.len()).filter_map(ElementId::new) {
+                step.commands[element] = Some(Reading::now(0.1 + 0.02 * f64::from(at % 7)));
+            }
+            format!("{:?}", estimator.step(&step))
+        });
+        taken.collect()
+    }
+
+    #[test]
+    fn a_memory_goes_on_to_the_last_bit_from_any_step() {
+        let car = six_speed();
+        for at in [0, 1, 100, 170, 199, 230] {
+            let mut estimator = Estimator::new(&car, None, None).unwrap();
+            take_steps(&mut estimator, &car, 0..at);
+            let memory = estimator.memory().unwrap();
+            let mut other = Estimator::new(&car, None, None).unwrap();
+            other.go_on_from(&memory).unwrap();
+            assert_eq!(other.memory().unwrap(), memory);
+            let after = take_steps(&mut estimator, &car, at..300);
+            assert_eq!(take_steps(&mut other, &car, at..300), after, "from step {at}");
+            assert_eq!(other.memory().unwrap(), estimator.memory().unwrap());
+        }
+    }
+
+    #[test]
+    fn a_memory_of_another_version_or_gearbox_is_refused() {
+        let car = six_speed();
+        let mut estimator = Estimator::new(&car, None, None).unwrap();
+        take_steps(&mut estimator, &car, 0..170);
+        let memory = estimator.memory().unwrap();
+        let refused = |memory: &[u8]| {
+            let mut other = Estimator::new(&car, None, None).unwrap();
+            let before = other.memory().unwrap();
+            let error = other.go_on_from(memory).unwrap_err().to_string();
+            assert_eq!(other.memory().unwrap(), before);
+            error
+        };
+        let mut old = memory.clone();
+        old[1] = b'9';
+        assert!(refused(&old).contains("is of version 9.1.0, and this is 0.1.0\nhint: "), "{}", refused(&old));
+        for bytes in [&memory[..memory.len() - 1], &[memory.as_slice(), &[0]].concat(), b"", b"\xff\xff", &[7; 50_000]]
+        {
+            assert!(refused(bytes).contains("damaged"));
+        }
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles/dual_clutch.toml");
+        let mut other = Estimator::new(&config::CarFile::read(&path).unwrap().car, None, None).unwrap();
+        assert!(other.go_on_from(&memory).unwrap_err().to_string().contains("another gearbox"));
+    }
+
+    #[test]
+    fn a_memory_with_wrong_bytes_is_refused_or_steps_without_a_panic() {
+        let car = six_speed();
+        let mut estimator = Estimator::new(&car, None, None).unwrap();
+        take_steps(&mut estimator, &car, 0..170);
+        let memory = estimator.memory().unwrap();
+        let mut taken = 0;
+        for at in (0..memory.len()).step_by(97) {
+            for byte in [0, 1, 127, 255] {
+                let mut wrong = memory.clone();
+                wrong[at] = byte;
+                let mut other = Estimator::new(&car, None, None).unwrap();
+                if other.go_on_from(&wrong).is_ok() {
+                    taken += 1;
+                    take_steps(&mut other, &car, 170..175);
+                }
+            }
+        }
+        assert!(taken > 100);
     }
 
     #[test]

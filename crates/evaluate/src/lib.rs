@@ -63,6 +63,11 @@ pub enum EvaluateError {
     /// A shift is none from one clutch with plates and valve to another.
     #[error("the filter has no tables for {0}\nhint: `wetclutch check` lists the shifts from one clutch to another")]
     NoTables(String),
+    /// Bytes are no memory of an estimator of this version and car.
+    #[error(
+        "this memory of an observer {0}\nhint: make the observer anew, with what was learnt of the car, and save that: it lasts over versions"
+    )]
+    Memory(String),
 }
 
 /// A number that belongs to two others: the mixing function of G. Steele, D. Lea, C. Flood, Fast splittable

@@ -10,6 +10,7 @@ const REMEMBERED: usize = 36;
 
 /// One command.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sent<T> {
     /// Time since its sample, s; below zero while that sample is still to come.
     age_s: T,
@@ -21,8 +22,16 @@ struct Sent<T> {
 
 /// Commands that may still be on their way to the valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Commands<T> {
     /// Newest first.
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            with = "serde_big_array::BigArray",
+            bound(serialize = "T: serde::Serialize", deserialize = "T: serde::Deserialize<'de>")
+        )
+    )]
     sent: [Sent<T>; REMEMBERED],
     count: usize,
 }

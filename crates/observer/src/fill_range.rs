@@ -46,6 +46,7 @@ pub(crate) struct Outlet<T> {
 
 /// What is known of a piston and its cylinder.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PistonRange<T> {
     /// Minimum and maximum stroke over that to the kiss point, `xi_lo` and `xi_hi`.
     stroke: [T; 2],

@@ -39,6 +39,7 @@ const PERIODS: usize = 5;
 
 /// Memory of the range of the pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PressureRange<T> {
     /// Ages are those at the newest reading.
     commands: Commands<T>,
@@ -57,6 +58,7 @@ pub struct PressureRange<T> {
 
 /// The last times between two readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Periods<T> {
     /// In the order in which they came, around `at`; those to come are infinite.
     last_s: [T; PERIODS],
@@ -95,6 +97,7 @@ impl<T: Real> Periods<T> {
 
 /// What is known of the valve and the cylinder at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Limits<T> {
     /// The lowest and the highest command that were in effect, and the minimum and maximum pressure that they end at, Pa.
     commands: [T; 2],

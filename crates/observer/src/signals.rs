@@ -122,6 +122,7 @@ impl<T: Real> InputLimits<T> {
 
 /// Health of an estimate, from best to worst. If several apply, the worst one is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Health {
     /// Every reading is usable, and the estimate is within its limits.
     Good,
@@ -213,6 +214,7 @@ impl Health {
 
 /// What became of a channel in one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ChannelHealth {
     /// The log has no such channel, or the observer does without it.
     Unused,
@@ -246,6 +248,7 @@ impl ChannelHealth {
 
 /// One of something for each channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Channels<V> {
     /// Engine speed.
     pub engine: V,

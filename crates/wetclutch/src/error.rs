@@ -194,9 +194,10 @@ impl From<EvaluateError> for Error {
     fn from(error: EvaluateError) -> Self {
         match error {
             EvaluateError::Car(error) => error.into(),
-            EvaluateError::Train(_) | EvaluateError::TooManyElements(_) | EvaluateError::NoTables(_) => {
-                Self::Input(error.to_string())
-            }
+            EvaluateError::Train(_)
+            | EvaluateError::TooManyElements(_)
+            | EvaluateError::NoTables(_)
+            | EvaluateError::Memory(_) => Self::Input(error.to_string()),
         }
     }
 }

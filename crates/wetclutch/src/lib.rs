@@ -24,6 +24,7 @@ mod vehicle;
 
 pub use ::export::{ExportOptions, ExportedFile};
 pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors, ShiftCommand, ShiftId, Step};
+pub use config::Source;
 pub use error::Error;
 pub use estimate::{Destination, EstimateOptions, Estimates, InMemory, LogInput, estimate};
 pub use evaluate::Estimator;
@@ -39,7 +40,7 @@ pub use table::{Column, Table, Values, Words};
 pub use text::{grouped, shell_quoted};
 pub use vehicle::{
     TemplateNumbers, VehicleFile, gearboxes, learnt_without_effect, method_named, observer_named, read_drive,
-    read_sensors,
+    read_sensors, sensors_of,
 };
 
 /// Takes a sentence for the user as it comes. It may have several lines; one that begins with `hint: ` says what to do.

@@ -5,7 +5,9 @@ use car::{Car, Drive, Sensors};
 use drivetrain::CommandKind;
 use evaluate::measured::{MeasuredRow, SensedDrive, has_ages};
 use evaluate::recording::{input_clutch_n_m, lock_up_is_applied, reported_engine_n_m};
-use plant::car::{CarCalibration, CarDriveSummary, CarModel, CarSample, ElementSample, ShiftStage, simulate_car_drive};
+use plant::car::{
+    CarCalibration, CarDriveSummary, CarModel, CarSample, ElementSample, ShiftStage, simulate_car_drive_while,
+};
 use trace::{Cell, ColumnKind, signal};
 
 use crate::{Error, Table};
@@ -26,20 +28,20 @@ pub struct Simulation {
 /// # Errors
 /// The car cannot be driven so, or the simulation fails.
 pub fn simulate(car: &Car, drive: &Drive) -> Result<Simulation, Error> {
-    simulate_until(car, drive, &|| false)
+    simulate_until(car, drive, &|_| false)
 }
 
-/// As [`simulate()`], until the simulation is interrupted.
+/// As [`simulate()`], until the simulation is interrupted; `is_interrupted` gets the time of each row, s.
 ///
 /// # Errors
 /// It was, or as [`simulate()`].
-pub fn simulate_until(car: &Car, drive: &Drive, is_interrupted: &dyn Fn() -> bool) -> Result<Simulation, Error> {
+pub fn simulate_until(car: &Car, drive: &Drive, is_interrupted: &dyn Fn(f64) -> bool) -> Result<Simulation, Error> {
     let (all, measured) = (drive_columns(car), measured_columns(car, sensors_of(drive)));
     let (mut truth, mut readings) = (Rows::new(all), Rows::new(measured));
     let summary = simulate_rows(car, drive, |row| {
         truth.push(car, &MeasuredRow::exact(&row.sample));
         readings.push(car, row);
-        if is_interrupted() { Err(Error::interrupted()) } else { Ok(()) }
+        if is_interrupted(row.sample.time_s) { Err(Error::interrupted()) } else { Ok(()) }
     })?;
     Ok(Simulation { truth: truth.table, measured: readings.table, summary })
 }
@@ -49,7 +51,7 @@ pub fn sensors_of(drive: &Drive) -> Option<(&Sensors, f64)> {
     drive.sensors.as_ref().zip(Some(drive.sample_time_s))
 }
 
-/// Simulates a drive of a car; `take` gets each row as it comes, and ends the writing, not the simulation, where it fails.
+/// Simulates a drive of a car; `take` gets each row as it comes, and ends the simulation where it fails.
 ///
 /// # Errors
 /// The car cannot be driven so, the simulation fails, or `take` did.
@@ -63,14 +65,15 @@ pub fn simulate_rows(
     let recorded_s = sensed.as_ref().map_or(drive.sample_time_s, SensedDrive::record_s);
     let recorded = Drive { sample_time_s: recorded_s, ..drive.clone() };
     let mut taken = Ok(());
-    let summary = simulate_car_drive(&model, car, CarCalibration::of(drive.controller), &recorded, |sample| {
-        // After an error the simulation continues to its end without rows: this takes seconds.
+    let summary = simulate_car_drive_while(&model, car, CarCalibration::of(drive.controller), &recorded, |sample| {
+        // A step of the controller may have several samples.
         if taken.is_ok() {
             taken = match &mut sensed {
                 Some(sensed) => sensed.push(sample, &mut take),
                 None => take(&MeasuredRow::exact(sample)),
             };
         }
+        taken.is_ok()
     })?;
     taken?;
     if let Some(sensed) = &mut sensed {

@@ -188,8 +188,16 @@ impl VehicleFile {
 /// # Errors
 /// The file cannot be read, or has no such table.
 pub fn read_sensors(path: &Path) -> Result<Sensors, Error> {
-    config::read_sensors(path)?.ok_or_else(|| {
-        let path = path.shown();
+    sensors_of(&Source::read(path)?)
+}
+
+/// The sensors that the text of a file describes.
+///
+/// # Errors
+/// It has no such table, or a value cannot be right.
+pub fn sensors_of(source: &Source) -> Result<Sensors, Error> {
+    config::sensors_of(source)?.ok_or_else(|| {
+        let path = source.path.shown();
         Error::Input(format!("{path}: there is no [sensors] table\nhint: add one, as in experiments/bench.toml"))
     })
 }

@@ -16,6 +16,7 @@ use super::{GearboxFilter, GearboxState, OUTPUT, ShiftPhase, TURBINE, square};
 
 /// Torque of all clutches together, at the turbine.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClutchesAtTurbine<T> {
     /// Torque, N m: positive when the turbine drives.
     pub torque_n_m: T,

@@ -9,6 +9,7 @@ use super::{IN_GEAR, KISS, N, OUTPUT, PRESSURE, TURBINE};
 
 /// Mean and covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Gaussian<T> {
     pub(super) mean: [T; N],
     pub(super) covariance: [[T; N]; N],

@@ -89,6 +89,7 @@ impl<T: Real> Pressing<T> {
 
 /// What is learnt of lag and delay of a valve, in standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ValveTiming<T> {
     pub(super) mean: [T; 2],
     /// Of all errors of both, also of those that are others in each shift.
@@ -103,6 +104,7 @@ impl<T: Real> ValveTiming<T> {
 
 /// The newest command.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct NewestCommand<T> {
     command: T,
     /// The pressure that it ends at, Pa.
@@ -116,6 +118,7 @@ struct NewestCommand<T> {
 
 /// Memory of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ElementState<T> {
     commands: Commands<T>,
     /// Pressure by the valve model, Pa, and its rate over the last step, Pa/s.

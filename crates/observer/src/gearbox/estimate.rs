@@ -18,6 +18,7 @@ const HIDDEN: f64 = 0.9;
 
 /// Pressure and torque of one clutch of a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClutchEstimate<T> {
     /// The element.
     pub element: ShiftElement,
@@ -49,6 +50,7 @@ pub struct ClutchEstimate<T> {
 
 /// Output of the filter after one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShiftEstimate<T> {
     /// The gear or shift that the filter is in; none while it has only the valve models.
     pub gear: Option<ShiftCommand>,

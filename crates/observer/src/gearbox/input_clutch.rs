@@ -15,6 +15,7 @@ use super::{GearboxFilter, GearboxState, OUTPUT, ShiftInput, TURBINE, square};
 
 /// Torque of the clutch between engine and gearbox.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InputClutch<T> {
     /// Torque, N m: positive when the engine drives.
     pub torque_n_m: T,

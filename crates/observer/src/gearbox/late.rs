@@ -23,6 +23,7 @@ const SAME_S: f64 = 1e-6;
 
 /// The steps that wait for their readings, newest first, and what is known of now.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Late<T> {
     steps: [Option<ShiftInput<T>>; KEPT],
     /// Lowest and highest pressure of the elements, Pa.

@@ -40,6 +40,9 @@
 //! Friction and gain are not told apart here: what the speeds show of both is `f` and `k`. A gain moves both, a
 //! friction only `f`, and [`LearntElement`] has what follows of each from what the budget says of them.
 
+#[cfg(feature = "serde")]
+mod big_square;
+
 use drivetrain::Real;
 
 use super::elements::ValveTiming;
@@ -111,12 +114,15 @@ const OIL_DEGC: [f64; 2] = [-60.0, 220.0];
 /// What is learnt, as a Gaussian. It is plain data and can be written to a file and read again; what is read must pass
 /// [`Learnt::checked`].
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Learnt<T> {
     /// Means, in units of the standard deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
     /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed, reported engine torque,
     /// lags and delays of the valves by element.
+    #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
     pub mean: [T; LEARNT],
     /// Their covariance, in the same units.
+    #[cfg_attr(feature = "serde", serde(with = "big_square"))]
     pub covariance: [[T; LEARNT]; LEARNT],
     /// Shifts that were learnt from.
     pub shifts: u32,
@@ -158,6 +164,7 @@ pub(super) struct Acting<T> {
 
 /// Means and covariance of the acting quantities, as the filter has them.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Known<T> {
     pub(super) mean: [T; ACTING],
     pub(super) covariance: [[T; ACTING]; ACTING],

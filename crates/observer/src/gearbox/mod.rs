@@ -144,6 +144,7 @@ const NOT_CAUGHT: u8 = 50;
 
 /// What came since the step before: of each channel the newest reading, or none.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShiftInput<T> {
     /// Time since the step before, s. Ignored in the first step.
     pub dt_s: T,
@@ -189,6 +190,7 @@ pub struct GearboxFilter<'a, T> {
 
 /// Memory of an [`GearboxFilter`].
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GearboxState<T> {
     started: bool,
     elements: [Option<ElementState<T>>; MAX_ELEMENTS],
@@ -227,6 +229,7 @@ pub struct GearboxState<T> {
 
 /// The filter at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Running<T> {
     x: Gaussian<T>,
     /// The gear, while there is no shift.
@@ -472,6 +475,11 @@ impl<T: Real> GearboxState<T> {
     /// What was learnt up to now.
     pub fn learnt(&self) -> &Learnt<T> {
         &self.learnt
+    }
+
+    /// Whether it can be the memory of the filter of a gearbox with these tables.
+    pub fn fits(&self, tables: &GearboxTables<'_, T>) -> bool {
+        self.elements.iter().flatten().count() == tables.elements.len()
     }
 
     /// Takes a reading of the oil's temperature, degC: what depends on it is forgotten with its changes, from the next shift on. A car

@@ -18,6 +18,7 @@ const STD_DEVS: f64 = 5.0;
 /// The newest reading of a speed and the two before: the other channel may miss two in a row and is still compared at a time
 /// that lies between readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Newest<T> {
     pub(super) value: T,
     pub(super) age_s: T,

@@ -25,6 +25,7 @@ const OUTLIER: f64 = 5.0;
 
 /// Memory of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ReadingNoise<T> {
     /// The slip in the step before, rad/s, and the gear that it is of.
     before: Option<(T, Gear)>,

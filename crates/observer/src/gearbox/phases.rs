@@ -33,6 +33,7 @@ const SLIPS_AGAIN: f64 = 1.5;
 
 /// Which of the shift clutches hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ShiftPhase {
     /// No shift: all elements of the gear hold.
     InGear,
@@ -97,6 +98,7 @@ impl<T: Real> Slip<T> {
 /// The slip of a clutch that holds, above its threshold, from reading to reading. It is believed at the second reading in the same direction if
 /// it has grown by the threshold, as the slip of a clutch that is overloaded does, and else at the third.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct NewSlip<T> {
     /// At the reading before, rad/s.
     before: T,
@@ -143,6 +145,7 @@ impl<T: Real> Contact<T> {
 
 /// What remains between samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct PhaseMemory<T> {
     pub(super) phase: ShiftPhase,
     /// Samples in a row in which the offgoing clutch has seemed to hold again.

@@ -71,6 +71,7 @@ impl<T: Real> Piston<T> {
 
 /// One of the pistons.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Point<T> {
     /// Oil beyond that with the piston on its stop, m^3.
     volume_m3: T,
@@ -84,6 +85,7 @@ struct Point<T> {
 
 /// What presses the plates by the pistons, and the errors beside it, Pa.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Spread<T> {
     /// Probability that the plates touch.
     pub(super) touches: T,
@@ -103,6 +105,7 @@ impl<T: Real> Spread<T> {
 
 /// The pistons of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Pistons<T> {
     points: [Point<T>; POINTS],
     pub(super) spread: Spread<T>,

@@ -45,6 +45,7 @@ pub(super) fn tied<T: Real>(ratio: T, inertia_kg_m2: T) -> Response<T> {
 
 /// Torque of a shift clutch at the turbine: `U = base + f per_friction + k per_kiss + x per_pressure`, N m.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ClutchTorque<T> {
     pub(super) ratio: T,
     pub(super) base_n_m: T,
@@ -95,6 +96,7 @@ impl<T: Real> ClutchTorque<T> {
 
 /// Torques that act at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Torques<T> {
     /// Turbine torque by its sources, N m.
     pub(super) turbine_n_m: T,
@@ -238,6 +240,7 @@ pub(super) fn dot<T: Real, const L: usize>(a: &[T; L], b: &[T; L]) -> T {
 
 /// The solution over one step under constant torques.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Motion<T> {
     /// The response and the step that it was made for, s.
     pub(super) of: (Response<T>, T),

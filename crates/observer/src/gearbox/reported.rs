@@ -28,6 +28,7 @@ const HALVED_S: f64 = 60.0;
 
 /// What was compared in the gear up to now.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Compared<T> {
     time_s: T,
     /// What the engine has given to the pump, and what that takes by the maps, N m s.

@@ -89,6 +89,7 @@ pub struct GearRow<T> {
 
 /// Which element changes in a shift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ShiftElement {
     /// A clutch or brake, by its place in [`GearboxTables::elements`].
     Friction(u8),
@@ -123,6 +124,7 @@ impl ShiftElement {
 
 /// An element that changes in a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShiftClutch<T> {
     /// Which one it is.
     pub element: ShiftElement,
@@ -141,6 +143,7 @@ impl<T> ShiftClutch<T> {
 
 /// A shift between two elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShiftRow<T> {
     /// The gear before, by its place in [`GearboxTables::gears`].
     pub from: usize,

@@ -28,6 +28,7 @@ pub(super) type ByTiming<T> = [[T; 2]; 2];
 
 /// What the readings have shown of the timing since the shift began.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Timing<T> {
     /// Errors of the timing that the valve models have taken off, in standard deviations.
     taken_off: [T; TIMINGS],

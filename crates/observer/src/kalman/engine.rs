@@ -40,6 +40,7 @@ impl<T: Real> EngineNoise<T> {
 
 /// Memory of the engine's filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Engine<T> {
     /// Speed, rad/s, and acceleration, rad/s^2.
     mean: [T; 2],

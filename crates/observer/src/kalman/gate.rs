@@ -18,6 +18,7 @@ pub(crate) enum Verdict {
 
 /// Memory of a gate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Gate {
     /// Largest innovation of a reading that is believed, in its own standard deviations.
     std_devs: u8,

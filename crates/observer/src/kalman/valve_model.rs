@@ -20,6 +20,7 @@ pub struct ValveModel<T> {
 
 /// A command that was sent, as the pressure it ends at.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sent<T> {
     age_s: T,
     settled_pa: T,
@@ -27,6 +28,7 @@ struct Sent<T> {
 
 /// The commands on their way to the valve, newest first.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Commands<T> {
     sent: [Sent<T>; REMEMBERED],
     count: usize,

@@ -62,6 +62,23 @@ pub fn simulate_car_drive(
     drive: &Drive,
     mut record: impl FnMut(&CarSample),
 ) -> Result<CarDriveSummary, CarError> {
+    simulate_car_drive_while(model, nominal, calibration, drive, |sample| {
+        record(sample);
+        true
+    })
+}
+
+/// As [`simulate_car_drive`], as long as `record` says true.
+///
+/// # Errors
+/// As there.
+pub fn simulate_car_drive_while(
+    model: &CarModel,
+    nominal: &Car,
+    calibration: CarCalibration,
+    drive: &Drive,
+    mut record: impl FnMut(&CarSample) -> bool,
+) -> Result<CarDriveSummary, CarError> {
     let mut road = Road::new(drive)?;
     let mut shifting = Shifting::new(&model.car, drive)?;
     let driver = road.at_start();
@@ -73,7 +90,8 @@ pub fn simulate_car_drive(
     }
     let duration_s = drive.duration_s();
     let mut summary = CarDriveSummary { duration_s, ..CarDriveSummary::default() };
-    while run.time_s() < duration_s - SAME_INSTANT_S {
+    let mut goes_on = true;
+    while goes_on && run.time_s() < duration_s - SAME_INSTANT_S {
         let now_s = run.time_s();
         let driver = road.at(now_s, &run);
         let [engine_rad_s, ..] = model.speeds(run.state());
@@ -88,7 +106,7 @@ pub fn simulate_car_drive(
             summary.over_speed = Some(OverSpeed { time_s: now_s, engine_rad_s, map_rad_s, gears });
         }
         shifting.step(&mut run, &driver)?;
-        run.advance(driver, |_| {}, &mut record)?;
+        run.advance(driver, |_| {}, |sample| goes_on &= record(sample))?;
         let vehicle_m_s = run.state().vehicle_m_s;
         let dt_s = run.time_s() - now_s;
         summary.distance_m += vehicle_m_s.abs() * dt_s;

@@ -37,7 +37,7 @@ pub use controller::{
     CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftProgress, ShiftStage, SlipCurve, SlipTarget,
     SlipTargets,
 };
-pub use drive::{CarDriveSummary, OverSpeed, Shifting, simulate_car_drive};
+pub use drive::{CarDriveSummary, OverSpeed, Shifting, simulate_car_drive, simulate_car_drive_while};
 pub use energy::{CarPowers, stored_car_energy};
 pub use follow::SpeedError;
 pub use integrate::{CarError, CarIntegrator, CarStep};

@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock};
 
 use car::{GainMethod, ObserverKind, Sensors};
@@ -36,6 +36,8 @@ pub struct EstimateOptions {
     pub with_page: bool,
     /// Set when the estimate is to end with an error, before the end of the log.
     pub interrupt: Option<Arc<AtomicBool>>,
+    /// Counts the rows of the log that are done.
+    pub rows_done: Option<Arc<AtomicU64>>,
     /// For a log that is still being written: set when it is to end.
     pub follow: Option<Arc<AtomicBool>>,
 }
@@ -45,8 +47,11 @@ impl EstimateOptions {
         self.follow.is_some()
     }
 
-    /// Ends the estimate if it is to end.
-    pub(crate) fn check_interrupt(&self) -> Result<(), Error> {
+    /// Counts a row as done, and ends the estimate if it is to end.
+    pub(crate) fn row_done(&self) -> Result<(), Error> {
+        if let Some(rows) = &self.rows_done {
+            rows.fetch_add(1, Ordering::Relaxed);
+        }
         match &self.interrupt {
             Some(flag) if flag.load(Ordering::Relaxed) => Err(Error::interrupted()),
             _ => Ok(()),

@@ -240,6 +240,7 @@ fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
         threads: arguments.threads_of_log(),
         with_page: false,
         interrupt: None,
+        rows_done: None,
         follow: stop(arguments)?,
     };
     let vehicle = VehicleFile::read(&arguments.vehicle)?;

@@ -142,7 +142,7 @@ pub fn estimate(
     // Without a page no shift is drawn.
     let max_drawn = if options.with_page { MAX_DRAWN } else { 0 };
     while let Some(step) = source.next_step()? {
-        options.check_interrupt()?;
+        options.row_done()?;
         times.push(&step);
         if let Some(checks) = &mut checks {
             checks.push(&step);

@@ -180,7 +180,7 @@ fn pass<'log, 'rows>(
     let in_gears = std::iter::from_fn(|| {
         let mut log = log.borrow_mut();
         loop {
-            if let Err(interrupted) = options.check_interrupt() {
+            if let Err(interrupted) = options.row_done() {
                 return Some(Err(interrupted));
             }
             match log.advance() {

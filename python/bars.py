@@ -1,0 +1,88 @@
+"""Measures the package: size, import, a step of the observer, a million rows. `python python/bars.py` with the package installed.
+
+With the command's path in the variable WETCLUTCH the same log is estimated by the command, too.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+import timeit
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+import wetclutch as wc
+
+ROOT = Path(__file__).resolve().parents[1]
+ROWS = 1_000_000
+
+
+def show(what: str, value: float, unit: str) -> None:
+    print(f"{what:60} {value:10.2f} {unit}", flush=True)
+
+
+def import_ms() -> float:
+    code = "import time; begin = time.perf_counter(); import wetclutch; print(1e3 * (time.perf_counter() - begin))"
+    return min(float(subprocess.check_output([sys.executable, "-c", code])) for _ in range(5))
+
+
+def step_us(car: wc.Car, aged: bool) -> float:
+    """A step with four speeds, the engine torque and all commands."""
+    names = {"engine_speed_rad_s": 230.0, "turbine_speed_rad_s": 215.0, "output_speed_rad_s": 52.0, "wheel_speed_rad_s": 17.0}
+    readings: dict[str, Any] = {**names, "engine_torque_n_m": 120.0}
+    if aged:
+        readings = {name: (value, 0.004) for name, value in readings.items()}
+    step = {**readings, "dt_s": 0.01, "commands": {name: 0.5 for name in car.elements}, "gear": "1", "target_gear": "1"}
+    observer = wc.Observer(car)
+    return 1e6 * min(timeit.repeat(lambda: observer.step(**step), number=20_000, repeat=5)) / 20_000
+
+
+def many_rows(car: wc.Car) -> pl.DataFrame:
+    """A million rows of the city drive, driven again and again."""
+    once = pl.DataFrame(wc.simulate(car, ROOT / "drives" / "city.toml").measured)
+    times = -(-ROWS // once.height)
+    drives = [once.with_columns(pl.col("time_s") + at * 0.01 * once.height) for at in range(times)]
+    return pl.concat(drives)[:ROWS]
+
+
+def peak_mb() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+
+
+def main() -> None:
+    library = Path(wc._wetclutch.__file__)  # type: ignore[attr-defined]
+    show("native part", library.stat().st_size / 1e6, "MB")
+    show("import", import_ms(), "ms")
+    car = wc.Car.read(ROOT / "vehicles" / "eight_speed.toml")
+    show("Observer.step, numbers", step_us(car, aged=False), "us")
+    show("Observer.step, pairs of number and age", step_us(car, aged=True), "us")
+    six_speed = wc.Car.read(ROOT / "vehicles" / "six_speed.toml")
+    frame = many_rows(six_speed)
+    frame_mb = frame.estimated_size() / 1e6
+    before_mb = peak_mb()
+    begin_s = time.perf_counter()
+    found = pl.DataFrame(wc.estimate(six_speed, frame).rows)
+    show("estimate of a million rows from polars and back", time.perf_counter() - begin_s, "s")
+    show("the frame", frame_mb, "MB")
+    show("the estimates", found.estimated_size() / 1e6, "MB")
+    show("more memory at the peak", peak_mb() - before_mb, "MB")
+    command = os.environ.get("WETCLUTCH")
+    if not command:
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        log, out = Path(folder) / "log.csv", Path(folder) / "out.csv"
+        frame.write_csv(log)
+        begin_s = time.perf_counter()
+        vehicle = ROOT / "vehicles" / "six_speed.toml"
+        subprocess.run([command, "estimate", log, "--vehicle", vehicle, "-o", out], check=True, capture_output=True)
+        show("the command on the same log as CSV, with reading and writing", time.perf_counter() - begin_s, "s")
+
+
+if __name__ == "__main__":
+    main()
