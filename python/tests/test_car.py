@@ -73,9 +73,11 @@ def test_errors_have_their_parts_and_pickle(tmp_path: Path) -> None:
 def test_arguments_that_cannot_be_right_are_named() -> None:
     with pytest.raises(wc.InputError, match="gearboxes are"):
         wc.Car.template("9hp", mass_kg=1900.0)
-    with pytest.raises(wc.WetclutchError):
-        wc.Car.template("8hp", mass_kg=-5.0)
-    with pytest.raises(wc.WetclutchError):
-        wc.Car.template("8hp", mass_kg=float("nan"))
+    for name, value in [("mass_kg", -5.0), ("mass_kg", float("nan")), ("wheel_radius_m", 9.0), ("final_ratio", 99.0), ("engine_torque_n_m", 1.0)]:
+        with pytest.raises(wc.InputError, match=f"{name} is {value}, expected .* to ") as raised:
+            wc.Car.template("8hp", **{"mass_kg": 1900.0, name: value})
+        assert raised.value.key == name
+    for mass_kg in (200.0, 60000.0):
+        assert wc.Car.template("8hp", mass_kg=mass_kg, engine_torque_n_m=300.0).gears
     with pytest.raises(TypeError):
         wc.Car.template("8hp")  # type: ignore[call-arg]

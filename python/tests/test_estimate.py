@@ -79,6 +79,12 @@ def test_what_is_no_log_of_the_car_is_refused_with_a_hint(car: wc.Car, measured:
         wc.estimate(wc.Car.read(ROOT / "vehicles" / "two_speed_at.toml"), measured, observer="kalmann")
     with pytest.raises(wc.InputError, match="no column"):
         wc.estimate(car, measured, columns=["pressure"])
+    for shift in (0, -1, 2**70):
+        with pytest.raises(wc.InputError, match="shift is .*, expected 1"):
+            wc.estimate(car, measured, shift=shift)
+    for seed in (-1, 2**64):
+        with pytest.raises(wc.InputError, match="seed is .*, expected 0 to"):
+            wc.simulate(car, ROOT / "drives" / "city.toml", seed=seed)
     with pytest.raises(ValueError, match="threads"):
         wc.estimate(car, measured, threads=0)
     with pytest.raises(wc.InputError):
@@ -131,6 +137,8 @@ def test_whatever_comes_in_ends_in_an_estimate_or_an_error(times: list[Any], spe
 def test_the_same_seed_gives_the_same_drive(car: wc.Car, drive_file: str, run: wc.Simulation) -> None:
     assert wc.simulate(car, drive_file).measured == run.measured
     assert run.shifts > 10 and run.distance_m > 1000.0
+    truth, measured = run
+    assert truth is run.truth and measured is run.measured
 
 
 def test_threads_estimate_at_the_same_time(car: wc.Car, measured: wc.Table) -> None:

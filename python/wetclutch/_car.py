@@ -6,7 +6,7 @@ import os
 from typing import Any, Self
 
 from . import _wetclutch as native
-from ._errors import InputError, of_files
+from ._errors import InputError, check_range, of_files
 
 
 def gearboxes() -> tuple[str, ...]:
@@ -99,6 +99,10 @@ class Car:
         >>> Car.template("8hp", mass_kg=1900.0)
         Car('my car', 8 forward gears)
         """
+        check_range("mass_kg", mass_kg, 200, 60000)
+        check_range("wheel_radius_m", wheel_radius_m, 0.1, 1)
+        check_range("final_ratio", final_ratio, 0.5, 10)
+        check_range("engine_torque_n_m", engine_torque_n_m, 20, 2000)
         return cls._of(
             native.template_car(
                 gearbox, name, mass_kg, wheel_radius_m, final_ratio, engine_torque_n_m, converter, stroke

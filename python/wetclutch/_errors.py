@@ -85,6 +85,12 @@ def _made(
     return kind(message, hint=hint, file=file, line=line, key=key)
 
 
+def check_range(name: str, value: float | None, low: float, high: float) -> None:
+    """Refuses an argument that is out of its range, or no number; None is one that is not given."""
+    if value is not None and not low <= value <= high:
+        raise InputError(f"{name} is {value}, expected {low} to {high}", key=name)
+
+
 @contextmanager
 def of_files(*paths: str | os.PathLike[str] | None) -> Iterator[None]:
     """Raises all errors of these files where one of them has several, in place of the first."""

@@ -10,7 +10,7 @@ from typing import Any, TypedDict, Unpack, overload
 
 from . import _wetclutch as native
 from ._car import Car
-from ._errors import of_files
+from ._errors import check_range, of_files
 from ._executor import each
 from ._progress import Progress, Report, reported
 from ._table import Table
@@ -217,8 +217,8 @@ def estimate(
         InputError: A log cannot be read or is not of this car, or an argument does not fit it.
         WorkError: Workers died again and again at the same log.
     """
-    if not 1 <= threads <= 1024:
-        raise ValueError(f"threads is {threads}, expected 1 to 1024")
+    check_range("threads", threads, 1, 1024)
+    check_range("shift", shift, 1, 10**9)
     options = {
         "observer": observer,
         "method": method,

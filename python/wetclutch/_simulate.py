@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from . import _wetclutch as native
 from ._car import Car
-from ._errors import of_files
+from ._errors import check_range, of_files
 from ._progress import Progress, reported
 from ._table import Table
 
@@ -30,6 +31,10 @@ class Simulation:
     shifts: int
     speed_max_m_s: float
 
+    def __iter__(self) -> Iterator[Table]:
+        """Both tables: ``truth, measured = simulate(...)``."""
+        return iter((self.truth, self.measured))
+
 
 def simulate(
     car: Car, drive: str | os.PathLike[str], *, seed: int | None = None, progress: Progress = False
@@ -48,6 +53,7 @@ def simulate(
         InputError: The file is wrong, or the car is one of a single shift.
         WorkError: The simulation failed.
     """
+    check_range("seed", seed, 0, 2**64 - 1)
     with of_files(drive), reported(progress) as report:
         truth, measured, summary = native.simulate(car._native, os.fspath(drive), seed, report)
     distance_m, shifts, speed_max_m_s = summary

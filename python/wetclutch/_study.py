@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from . import _wetclutch as native
-from ._errors import InputError, of_files
+from ._errors import InputError, check_range, of_files
 from ._estimate import framed
 from ._executor import counted, in_executor
 from ._progress import Progress, reported
@@ -135,8 +135,7 @@ def study(
         InputError: A file cannot be read, something in it is wrong, or an argument is out of range.
         WorkError: Workers died again and again at the same runs, or there are no gains for the vehicle.
     """
-    if not 1 <= threads <= 1024:
-        raise ValueError(f"threads is {threads}, expected 1 to 1024")
+    check_range("threads", threads, 1, 1024)
     with of_files(None if _is_text(study) else study):
         plan, name, at_once = _planned(study)
     tasks = list(_tasks(plan, shards, at_once))
