@@ -9,7 +9,7 @@ use observer::{ShiftTables, gearbox_filter};
 use plant::car::{CarModel, CarSample, CarShiftQuality, CarShiftRating};
 
 use crate::EvaluateError;
-use crate::checks::log_beside::is_of_its_gears;
+use crate::checks::is_of_its_gears;
 use crate::felt_shift::{FeltShift, Motion};
 use crate::plate_temperature::PlateTemperatures;
 use crate::recording::Recording;

@@ -9,6 +9,7 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod carried_pressures;
 pub mod checks;
 pub mod drive;
 pub mod errors;
@@ -22,6 +23,7 @@ pub mod recording;
 pub mod score;
 mod scored_shift;
 pub mod shift_comfort;
+mod shift_jerk;
 pub mod shift_summary;
 mod step;
 mod thinned;

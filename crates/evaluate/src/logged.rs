@@ -8,29 +8,18 @@ use observer::{ShiftTables, gearbox_filter};
 use plant::car::{BeyondGears, CarShiftQuality};
 
 use crate::LogStep;
-use crate::checks::CameSpeed;
-use crate::checks::Unusable;
-use crate::checks::WrongScale;
-use crate::checks::command_delay::CommandDelay;
-use crate::checks::contradictions::CommandCheck;
-use crate::checks::converter_check::ConverterCheck;
-use crate::checks::held_commands::HeldCommands;
-use crate::checks::in_gear::{InGear, InGearRow};
-use crate::checks::lock_up_check::LockUpCheck;
-use crate::checks::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk, not_of_their_gears};
-use crate::checks::still_commands::StillCommands;
+use crate::carried_pressures::CarriedPressures;
+use crate::checks::{CameSpeed, CheckedRow, Checks, EndedShift, GearSpeeds, Unusable, WrongScale};
 use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift, slips_rad_s};
 use crate::felt_shift::{FeltShift, Motion};
 use crate::learning_count::LearningCount;
 use crate::score::within;
 use crate::shift_comfort::AccelerationSource;
+use crate::shift_jerk::ShiftJerk;
 use crate::{ClutchRow, EvaluateError, ROUNDING_N_M, ROUNDING_PA, ShiftScoreRow};
 
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
-
-/// Rows further apart, and three times as far as usual, are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
-const HOLE_S: f64 = 0.5;
 
 /// The filter of a car on its way through a log.
 pub struct LoggedDrive<'c> {
@@ -46,55 +35,13 @@ pub struct LoggedDrive<'c> {
     begun_s: f64,
     /// Where the turbine is in it.
     beyond: BeyondGears,
-    in_gear: InGear<'c>,
-    /// The gear of the row before, and changes of the gear which no target gear announced.
-    gear: Option<Gear>,
-    unannounced: u64,
-    commands: CommandCheck<'c>,
-    delay: CommandDelay<'c>,
-    converter: ConverterCheck,
-    lock_up: LockUpCheck,
-    still: StillCommands,
-    held: HeldCommands,
-    holes: Holes,
+    gear_speeds: GearSpeeds<'c>,
+    checks: Checks<'c>,
     carried: CarriedPressures,
-    doubted: DoubtedPressures,
     jerk: ShiftJerk,
     felt: FeltShift,
     /// Newest temperature of the oil, degC; that of the vehicle file where the log has none.
     oil_degc: f64,
-}
-
-/// Holes of the recording within shifts.
-struct Holes {
-    count: u64,
-    /// The shift that the last one cut, as long as the log goes on in it: the rest is no other shift.
-    cut: Option<ShiftCommand>,
-    /// The last times between rows, s; the oldest is at `at`.
-    steps_s: [f64; 31],
-    at: usize,
-}
-
-impl Default for Holes {
-    fn default() -> Self {
-        // What is not a number sorts behind the numbers: half of the times must be known.
-        Self { count: 0, cut: None, steps_s: [f64::NAN; 31], at: 0 }
-    }
-}
-
-impl Holes {
-    /// Takes a time between two rows, s: whether it is a hole. In a log whose rows are always so far apart it is none.
-    fn is_hole(&mut self, dt_s: f64) -> bool {
-        const TIMES: f64 = 3.0;
-        let mut before_s = self.steps_s;
-        self.steps_s[self.at] = dt_s;
-        self.at = (self.at + 1) % self.steps_s.len();
-        if dt_s <= HOLE_S {
-            return false;
-        }
-        before_s.sort_by(f64::total_cmp);
-        dt_s > TIMES * before_s[before_s.len() / 2]
-    }
 }
 
 /// The error budget of a car whose log was recorded with these sensors.
@@ -125,18 +72,9 @@ impl<'c> LoggedDrive<'c> {
             speeds_rad_s: [f64::NAN; 3],
             begun_s: f64::NAN,
             beyond: BeyondGears::new(car, ShiftCommand::NEUTRAL, [f64::NAN; 2]),
-            in_gear: InGear::new(car),
-            gear: None,
-            unannounced: 0,
-            commands: CommandCheck::new(car, tables, &budget),
-            delay: CommandDelay::new(tables, &budget),
-            converter: ConverterCheck::default(),
-            lock_up: LockUpCheck::default(),
-            still: StillCommands::default(),
-            held: HeldCommands::default(),
-            holes: Holes::default(),
+            gear_speeds: GearSpeeds::new(car),
+            checks: Checks::new(car, tables, &budget),
             carried: CarriedPressures::default(),
-            doubted: DoubtedPressures::default(),
             jerk: ShiftJerk::default(),
             felt: FeltShift::of(AccelerationSource::OutputSpeed),
             oil_degc: car.oil_temperature_degc,
@@ -170,7 +108,7 @@ impl<'c> LoggedDrive<'c> {
             self.oil_degc = degc;
         }
         let mut estimate = self.filter.step(&mut self.state, input);
-        if self.delay.is_found() {
+        if self.checks.delay.is_found() {
             estimate.health = estimate.health.max(Health::CommandsMistimed);
         }
         self.learning.push(self.state.learnt());
@@ -195,50 +133,32 @@ impl<'c> LoggedDrive<'c> {
             health: estimate.health,
         });
         let gears = Some(input.gear).filter(|gear| !gear.is_steady());
-        if gears != self.holes.cut {
-            self.holes.cut = None;
+        let holes = &mut self.checks.holes;
+        if gears != holes.cut {
+            holes.cut = None;
         }
-        let is_hole = self.holes.is_hole(input.dt_s);
-        let came_rad_s = self.came.each_ref().map(|came| came.at(step.time_s));
+        let is_hole = holes.is_hole(input.dt_s);
         if let Some(open) = self.passing.open.as_ref().filter(|_| is_hole) {
-            self.holes.count += 1;
-            self.holes.cut = gears.filter(|gears| *gears == open.gears);
+            holes.count += 1;
+            holes.cut = gears.filter(|gears| *gears == open.gears);
             self.end(None);
         } else if self.passing.ends(gears) {
             self.end(Some((step.time_s, from)));
         }
-        let is_same = self.gear.is_none_or(|before| before == from || before.is_neutral() || from.is_neutral());
-        match gears {
-            Some(_) if self.holes.cut.is_some() => {}
-            Some(_) => self.during(step, &estimate),
-            None => {
-                // Without a converter dogs change while the clutch is open: this is no shift.
-                let is_open = matches!(estimate.health, Health::ClutchOpen | Health::TooSlow);
-                let are_dogs = self.car.converter.is_none() && is_open;
-                // What happens in a hole is not seen.
-                self.unannounced += u64::from(!is_same && !is_hole && !are_dogs);
-                self.in_gear.push(&InGearRow {
-                    gear: from,
-                    dt_s: input.dt_s,
-                    time_s: step.time_s,
-                    came_rad_s,
-                    has_ended: self.has_ended(&came_rad_s),
-                    output: input.output_rad_s,
-                    wheel: input.wheel_rad_s,
-                    health: estimate.health,
-                });
-            }
+        if gears.is_some() && self.checks.holes.cut.is_none() {
+            self.during(step, &estimate);
         }
-        // In a shift the gear may be the new one already.
-        self.gear = gears.map_or(Some(from), |_| None);
-        let [engine, turbine, output] = came_rad_s;
-        if gears.is_none() {
-            self.converter.push(self.car, step, [engine, turbine]);
-            self.lock_up.push(self.car, step, [engine, turbine]);
-        }
-        self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
-        self.still.push(&input.commands);
-        self.held.push(step.time_s, &input.commands);
+        let came_rad_s = self.came.each_ref().map(|came| came.at(step.time_s));
+        let row = CheckedRow {
+            step,
+            estimate: &estimate,
+            came_rad_s,
+            used_rad_s: self.speeds_rad_s,
+            in_gear: self.gear_speeds.row(step, came_rad_s, estimate.health),
+            has_ended: self.has_ended(&came_rad_s),
+            is_hole,
+        };
+        self.checks.each().into_iter().for_each(|check| check.row(&row));
         let jerk_m_s3 = self.jerk.ended(step.time_s);
         self.passing.take_jerk(jerk_m_s3);
         let [_, turbine, output] = self.speeds_rad_s;
@@ -251,7 +171,6 @@ impl<'c> LoggedDrive<'c> {
         }
         let comfort = self.felt.ended(step.time_s);
         self.passing.take_comfort(comfort);
-        self.delay.push(step, &estimate, [turbine, output]);
         estimate
     }
 
@@ -267,13 +186,13 @@ impl<'c> LoggedDrive<'c> {
 
     /// Rows in a gear at speed, and those whose turbine and output speed do not fit the ratio of that gear.
     pub fn rows_in_gear(&self) -> [u64; 2] {
-        self.in_gear.rows()
+        self.checks.in_gear.rows()
     }
 
     /// The rows in a gear while the car moves, if there are enough of them and the filter could use the readings of none. Without an engine
     /// speed it is rightly the open loop.
     pub fn unusable(&self) -> Option<Unusable> {
-        self.in_gear.unusable().filter(|_| !self.is_open_loop())
+        self.checks.in_gear.unusable().filter(|_| !self.checks.open_loop.is_open_loop())
     }
 
     /// Whether a speed of the engine, turbine or output came before, and comes no more.
@@ -281,24 +200,19 @@ impl<'c> LoggedDrive<'c> {
         self.came.iter().zip(came_rad_s).any(|(came, now)| came.has_come() && now.is_nan())
     }
 
-    /// Whether the engine speed, which the filter needs in front of a converter, has never come.
-    fn is_open_loop(&self) -> bool {
-        self.car.converter.is_some() && !self.car.gearbox.has_ratios_alone() && !self.came[0].has_come()
-    }
-
     /// Output over wheel speed in a gear at speed, in the middle; not a number where too few rows have both.
     pub fn output_over_wheel(&self) -> f64 {
-        self.in_gear.output_over_wheel()
+        self.checks.scales.output_over_wheel()
     }
 
     /// What contradicts the channels of engine and turbine speed, in a sentence.
     pub fn swapped_speeds(&self) -> Option<String> {
-        self.in_gear.swapped_speeds()
+        self.checks.swapped.contradiction()
     }
 
     /// A speed whose scale is wrong by the ratios in the gears.
     pub fn wrong_scale(&self) -> Option<WrongScale> {
-        self.in_gear.wrong_scale()
+        self.checks.scales.wrong_scale()
     }
 
     fn during(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>) {
@@ -315,7 +229,7 @@ impl<'c> LoggedDrive<'c> {
             self.passing.take_jerk(jerk_m_s3);
             let comfort = self.felt.begin(step.time_s);
             self.passing.take_comfort(comfort);
-            self.still.begin();
+            self.checks.each().into_iter().for_each(|check| check.begin());
             let ratios = [gears.from, gears.to].map(|gear| self.car.ratio(gear).unwrap_or(f64::NAN));
             self.beyond = BeyondGears::new(self.car, gears, ratios);
         }
@@ -356,7 +270,7 @@ impl<'c> LoggedDrive<'c> {
             health: estimate.health,
             flare_rad_s: estimate.flare_rad_s,
         };
-        self.doubted.push(shift.elements, &row);
+        self.checks.each().into_iter().for_each(|check| check.shift_row(shift.elements, &row));
         shift.rows.push(row);
     }
 
@@ -364,15 +278,20 @@ impl<'c> LoggedDrive<'c> {
     fn end(&mut self, at: Option<(f64, Gear)>) {
         let Some(shift) = &self.passing.open else { return };
         let completed_s = at.filter(|(_, gear)| *gear == shift.gears.to).map(|(time_s, _)| time_s);
-        if let Some((row, time_s)) = self.tables.tables().commanded(shift.gears).zip(completed_s) {
-            self.still.end(row.clutches.map(|clutch| clutch.element));
-            self.delay.end(shift.gears, [self.begun_s, time_s]);
-        }
+        let row = self.tables.tables().commanded(shift.gears).copied();
+        let completed = row.zip(completed_s).map(|(row, end_s)| {
+            let elements = row.clutches.map(|clutch| clutch.element);
+            (elements, [self.begun_s, end_s])
+        });
         let complete_s = completed_s.map(|time_s| time_s - self.begun_s);
         // A log has no slip of the held elements.
         let unknown =
             CarShiftQuality { jerk_m_s3: f64::NAN, held_slip_rad_s: f64::NAN, tie_up_n_m: f64::NAN, ..shift.quality };
         self.passing.end(self.car, self.oil_degc, CarShiftQuality { complete_s, ..unknown });
+        if let Some(shift) = self.passing.drive.shifts.last() {
+            let ended = EndedShift { shift, completed };
+            self.checks.each().into_iter().for_each(|check| check.end(&ended));
+        }
         self.jerk.end(at.map(|(time_s, _)| time_s));
         self.felt.end(completed_s);
     }
@@ -391,55 +310,7 @@ impl<'c> LoggedDrive<'c> {
         self.passing.take_comfort(comfort);
         // A shift that the log cuts off is not complete.
         self.end(None);
-        let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));
-        let mut warnings: Vec<String> = swapped.into_iter().chain(self.commands.warnings()).collect();
-        let ended = self.in_gear.ended();
-        if ended > 0 {
-            warnings.push(format!(
-                "warning: engine, turbine or output speed came no more, or was refused, in {ended} rows in a gear with the car moving: pressures and torques \
-                 there are those of the valve models alone (open loop)"
-            ));
-        }
-        if self.is_open_loop() {
-            warnings.push(
-                "warning: there is no engine speed, which gives the turbine torque: pressures and torques are those of the valve models alone (open loop)"
-                    .to_owned(),
-            );
-        }
-        warnings.extend(self.doubted.warning(self.car));
-        warnings.extend(self.delay.warning());
-        warnings.extend(self.converter.warning(self.car));
-        warnings.extend(self.lock_up.warning());
-        warnings.extend(self.still.warnings(self.car, self.tables));
-        warnings.extend(self.held.warnings(self.car, self.tables));
-        if self.holes.count > 0 {
-            warnings.push(format!(
-                "warning: {} shifts have a hole of more than {HOLE_S} s in the recording: they end with it and count as not completed",
-                self.holes.count
-            ));
-        }
-        warnings.extend(not_of_their_gears(&self.passing.drive.shifts));
-        if self.unannounced > 0 {
-            warnings.push(format!(
-                "warning: gear changes without a target_gear that says so before (so often: {}): these shifts are not estimated. target_gear has to \
-                 change when a shift is requested, gear when it is done",
-                self.unannounced
-            ));
-        }
-        let final_ratio = self.car.driveline.final_ratio;
-        let (off, bound) = (self.output_over_wheel() / final_ratio - 1.0, ErrorBudget::of_car(self.car).wheel_scale);
-        let wrong = self.wrong_scale();
-        warnings.extend(wrong.iter().map(|wrong| format!("warning: {}", wrong.text)));
-        if off.abs() > bound && wrong.is_none_or(|wrong| !wrong.is_output) {
-            warnings.push(format!(
-                "warning: output_speed over wheel_speed is {:.3} in the middle, {:+.1} % from the final ratio {final_ratio:.3}: the filter learns the \
-                 scale of wheel_speed within {:.1} % and refuses what is further off. Correct the scale of wheel_speed or `driveline.final_ratio`, or \
-                 give its bound as `error_bounds.wheel_scale_share`",
-                self.output_over_wheel(),
-                100.0 * off,
-                100.0 * bound
-            ));
-        }
+        let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings()).collect();
         ScoredDrive { warnings, ..self.passing.drive }
     }
 }

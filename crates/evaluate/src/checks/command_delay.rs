@@ -11,9 +11,9 @@ use std::collections::VecDeque;
 
 use car::{ElementErrors, ErrorBudget, ShiftCommand};
 use observer::ShiftTables;
-use observer::gearbox::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
+use observer::gearbox::{MAX_ELEMENTS, ShiftRow};
 
-use crate::LogStep;
+use super::{Check, CheckedRow, EndedShift};
 
 /// Time between two points of a shift, and between two moves, s.
 const GRID_S: f64 = 0.02;
@@ -144,39 +144,6 @@ impl<'c> CommandDelay<'c> {
         self.found.is_some()
     }
 
-    /// Takes a row with the newest speeds of turbine and output, rad/s.
-    pub(crate) fn push(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>, [turbine, output]: [f64; 2]) {
-        let time_s = step.time_s;
-        if self.rows.back().is_some_and(|row| time_s - row.time_s < 0.9 * GRID_S) {
-            return;
-        }
-        let ages_s = step.input.commands.iter().flatten().map(|command| command.age_s);
-        self.age_s = ages_s.fold(self.age_s, f64::max);
-        self.rows.push_back(Point {
-            time_s,
-            turbine_rad_s: turbine,
-            output_rad_s: output,
-            turbine_n_m: estimate.turbine_n_m.unwrap_or(f64::NAN),
-            valve_pa: estimate.valve_pa,
-        });
-        let after_s = span_s(AROUND + 2);
-        while self.rows.front().is_some_and(|row| time_s - row.time_s > LONGEST_S + 2.0 * after_s) {
-            self.rows.pop_front();
-        }
-        if self.waiting.front().is_some_and(|shift| time_s > shift.end_s + after_s)
-            && let Some(shift) = self.waiting.pop_front()
-        {
-            self.judge(&shift);
-        }
-    }
-
-    /// A shift between these gears is completed.
-    pub(crate) fn end(&mut self, shift: ShiftCommand, [begin_s, end_s]: [f64; 2]) {
-        if end_s - begin_s <= LONGEST_S {
-            self.waiting.push_back(Waiting { shift, begin_s, end_s });
-        }
-    }
-
     fn judge(&mut self, waiting: &Waiting) {
         let Some(&shift) = self.tables.tables().commanded(waiting.shift) else { return };
         // A one-way clutch has no pressure.
@@ -267,7 +234,7 @@ impl<'c> CommandDelay<'c> {
     }
 
     /// The delay of the log, in a sentence.
-    pub(crate) fn warning(&self) -> Option<String> {
+    fn warning(&self) -> Option<String> {
         let (delay_s, is_at_end) = self.found?;
         // It is not known to the millisecond.
         let delay_s = 0.01 * (delay_s / 0.01).round();
@@ -282,6 +249,46 @@ impl<'c> CommandDelay<'c> {
             1e3 * delay_s.abs(),
             self.shifts.iter().sum::<u32>()
         ))
+    }
+}
+
+impl Check for CommandDelay<'_> {
+    fn row(&mut self, row: &CheckedRow<'_>) {
+        let (step, estimate, [_, turbine, output]) = (row.step, row.estimate, row.used_rad_s);
+        let time_s = step.time_s;
+        if self.rows.back().is_some_and(|row| time_s - row.time_s < 0.9 * GRID_S) {
+            return;
+        }
+        let ages_s = step.input.commands.iter().flatten().map(|command| command.age_s);
+        self.age_s = ages_s.fold(self.age_s, f64::max);
+        self.rows.push_back(Point {
+            time_s,
+            turbine_rad_s: turbine,
+            output_rad_s: output,
+            turbine_n_m: estimate.turbine_n_m.unwrap_or(f64::NAN),
+            valve_pa: estimate.valve_pa,
+        });
+        let after_s = span_s(AROUND + 2);
+        while self.rows.front().is_some_and(|row| time_s - row.time_s > LONGEST_S + 2.0 * after_s) {
+            self.rows.pop_front();
+        }
+        if self.waiting.front().is_some_and(|shift| time_s > shift.end_s + after_s)
+            && let Some(shift) = self.waiting.pop_front()
+        {
+            self.judge(&shift);
+        }
+    }
+
+    fn end(&mut self, ended: &EndedShift<'_>) {
+        let Some((_, [begin_s, end_s])) = ended.completed else { return };
+        let shift = ended.shift.gears;
+        if end_s - begin_s <= LONGEST_S {
+            self.waiting.push_back(Waiting { shift, begin_s, end_s });
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.warning().into_iter().collect()
     }
 }
 

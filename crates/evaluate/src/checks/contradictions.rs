@@ -9,6 +9,8 @@ use car::{Car, Gear};
 use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
 
+use super::{Check, CheckedRow};
+
 /// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.
 const STEADY_S: f64 = 1.0;
 /// The turbine fits the gear within this fraction \[chosen\]: readings that are 20 ms apart differ by 1 % while the car accelerates.
@@ -59,35 +61,6 @@ impl<'c> CommandCheck<'c> {
         Self { car, places, limits_pa, gear: None, since_s: f64::NAN, of_gears }
     }
 
-    /// Takes a row: the gear, none while the gearbox shifts, turbine and output speed, and the pressures by the valve models.
-    pub(crate) fn push(
-        &mut self,
-        time_s: f64,
-        gear: Option<Gear>,
-        [turbine, output]: [f64; 2],
-        valve_pa: &[f64; MAX_ELEMENTS],
-    ) {
-        let ratio = gear.and_then(|gear| self.car.ratio(gear)).unwrap_or(f64::NAN);
-        let in_gear = ratio * output;
-        let fits = output > OUTPUT_MIN_RAD_S && (turbine - in_gear).abs() <= FITS * in_gear.abs();
-        if gear != self.gear || !fits {
-            (self.gear, self.since_s) = (gear, time_s);
-        }
-        let is_steady = fits && time_s - self.since_s >= STEADY_S;
-        let place = gear.and_then(Gear::place).filter(|_| is_steady);
-        let Some(of_gear) = place.and_then(|place| self.of_gears.get_mut(place)) else { return };
-        of_gear.rows += 1;
-        for (place, ([opens_pa, presses_pa], valve_pa)) in self.limits_pa.iter().zip(valve_pa).enumerate() {
-            of_gear.opens[place] += u64::from(valve_pa < opens_pa);
-            of_gear.presses[place] += u64::from(valve_pa > presses_pa);
-        }
-    }
-
-    /// What the log shows against the channels of the commands: a sentence for each element.
-    pub(crate) fn warnings(&self) -> Vec<String> {
-        self.places.iter().filter_map(|&(element, place)| self.warning(element, place)).collect()
-    }
-
     /// The gear in which the most rows contradict the command of this element, in a sentence.
     fn warning(&self, element: usize, place: usize) -> Option<String> {
         let holds = |gear: usize, element: usize| {
@@ -120,5 +93,31 @@ impl<'c> CommandCheck<'c> {
             name(element),
             opens[place],
         ))
+    }
+}
+
+impl Check for CommandCheck<'_> {
+    fn row(&mut self, row: &CheckedRow<'_>) {
+        let (time_s, valve_pa) = (row.step.time_s, &row.estimate.valve_pa);
+        let gear = Some(row.step.input.gear).filter(|gear| gear.is_steady()).map(|gear| gear.from);
+        let [_, turbine, output] = row.came_rad_s;
+        let ratio = gear.and_then(|gear| self.car.ratio(gear)).unwrap_or(f64::NAN);
+        let in_gear = ratio * output;
+        let fits = output > OUTPUT_MIN_RAD_S && (turbine - in_gear).abs() <= FITS * in_gear.abs();
+        if gear != self.gear || !fits {
+            (self.gear, self.since_s) = (gear, time_s);
+        }
+        let is_steady = fits && time_s - self.since_s >= STEADY_S;
+        let place = gear.and_then(Gear::place).filter(|_| is_steady);
+        let Some(of_gear) = place.and_then(|place| self.of_gears.get_mut(place)) else { return };
+        of_gear.rows += 1;
+        for (place, ([opens_pa, presses_pa], valve_pa)) in self.limits_pa.iter().zip(valve_pa).enumerate() {
+            of_gear.opens[place] += u64::from(valve_pa < opens_pa);
+            of_gear.presses[place] += u64::from(valve_pa > presses_pa);
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.places.iter().filter_map(|&(element, place)| self.warning(element, place)).collect()
     }
 }

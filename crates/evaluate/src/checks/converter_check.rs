@@ -3,11 +3,11 @@
 //! At a steady engine speed the pump takes all of it. The estimates of torque, and what is learnt, are in proportion to the converter's
 //! capacity: where both differ by more than their bounds, one of them is not that of this car.
 
-use car::Car;
-use car::ErrorBudget;
+use car::{Car, ErrorBudget};
 
+use super::ratio_histogram::RatioHistogram;
+use super::{Check, CheckedRow};
 use crate::LogStep;
-use crate::checks::ratio_histogram::RatioHistogram;
 
 /// Engine speed counts as steady if it has changed by no more than so much, rad/s, in so long, s \[chosen\]: the engine's inertia takes some 3 N m.
 const STEADY_RAD_S: f64 = 10.0;
@@ -21,8 +21,8 @@ const ENOUGH: (u64, f64) = (200, 3.0);
 const MORE: f64 = 0.05;
 
 /// Reported over pump torque, so far.
-#[derive(Default)]
-pub(crate) struct ConverterCheck {
+pub(crate) struct ConverterCheck<'c> {
+    car: &'c Car,
     ratio: RatioHistogram<100>,
     rows: (u64, f64),
     /// An engine speed, rad/s, and when it was read, s.
@@ -31,13 +31,18 @@ pub(crate) struct ConverterCheck {
     reported_n_m: Option<f64>,
 }
 
-impl ConverterCheck {
+impl<'c> ConverterCheck<'c> {
+    pub(super) fn new(car: &'c Car) -> Self {
+        let ratio = RatioHistogram::default();
+        Self { car, ratio, rows: (0, 0.0), before: None, is_steady: false, reported_n_m: None }
+    }
+
     /// Takes a row with the newest speeds of engine and turbine, rad/s.
-    pub(crate) fn push(&mut self, car: &Car, step: &LogStep, [engine, turbine]: [f64; 2]) {
+    fn push(&mut self, step: &LogStep, [engine, turbine]: [f64; 2]) {
         if let Some(reported) = step.reported_n_m {
             self.reported_n_m = Some(reported.value);
         }
-        let Some(converter) = &car.converter else { return };
+        let Some(converter) = &self.car.converter else { return };
         match self.before {
             Some((before, at_s)) if step.time_s - at_s < STEADY_S && step.time_s >= at_s => {
                 self.is_steady &= (engine - before).abs() <= STEADY_RAD_S;
@@ -57,9 +62,9 @@ impl ConverterCheck {
     }
 
     /// What contradicts the vehicle file, in a sentence.
-    pub(crate) fn warning(&self, car: &Car) -> Option<String> {
+    fn warning(&self) -> Option<String> {
         let (rows, time_s) = self.rows;
-        let errors = ErrorBudget::of_logged_car(car);
+        let errors = ErrorBudget::of_logged_car(self.car);
         let ratio = self.ratio.middle();
         let maximum = (1.0 + errors.converter) * (1.0 + errors.engine) + MORE;
         if rows < ENOUGH.0 || time_s < ENOUGH.1 || (maximum.recip()..=maximum).contains(&ratio) {
@@ -70,6 +75,19 @@ impl ConverterCheck {
              speed: the torques of the estimate are off by as much if the signal is right. `converter.capacity_n_m_s2` times {ratio:.2} would agree; \
              `wetclutch inspect LOG --shifts -o PAGE.html` fits it. Or the signal is no torque at the crankshaft, or in percent"
         ))
+    }
+}
+
+impl Check for ConverterCheck<'_> {
+    fn row(&mut self, row: &CheckedRow<'_>) {
+        if row.step.input.gear.is_steady() {
+            let [engine, turbine, _] = row.came_rad_s;
+            self.push(row.step, [engine, turbine]);
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.warning().into_iter().collect()
     }
 }
 
@@ -85,7 +103,7 @@ mod tests {
     /// A log in which the engine has this fraction of the torque that the converter takes; its speed changes at this rate, rad/s^2.
     fn said(fraction: f64, rate: f64, lock_up_applied: bool, rows: u32) -> Option<String> {
         let car = CarFile::eight_speed().unwrap();
-        let mut check = ConverterCheck::default();
+        let mut check = ConverterCheck::new(&car);
         for row in 0..rows {
             let time_s = f64::from(row) * SAMPLE_S;
             let [engine, turbine] = [200.0 + rate * time_s, 150.0];
@@ -103,9 +121,9 @@ mod tests {
             };
             let reported_n_m = (row % 4 == 0).then(|| Reading::now(fraction * torque));
             let step = LogStep { reported_n_m, ..LogStep::of(time_s, input) };
-            check.push(&car, &step, [engine, turbine]);
+            check.push(&step, [engine, turbine]);
         }
-        check.warning(&car)
+        check.warning()
     }
 
     #[test]

@@ -8,6 +8,8 @@ use observer::Reading;
 use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
 
+use super::{Check, CheckedRow};
+
 /// Longest time between two changes that is one message, s \[chosen\]: what stands longer is a command that rests.
 const LONGEST_S: f64 = 0.5;
 /// Changes after repeated readings that are needed to judge, and the fraction of changes from one reading to the next that a message leaves
@@ -45,14 +47,10 @@ pub struct CommandTimes {
 }
 
 /// The times of all commands of a log.
-pub(crate) struct HeldCommands {
+pub(crate) struct HeldCommands<'c> {
+    car: &'c Car,
+    tables: &'c ShiftTables<f64>,
     of_elements: [CommandTimes; MAX_ELEMENTS],
-}
-
-impl Default for HeldCommands {
-    fn default() -> Self {
-        Self { of_elements: std::array::from_fn(|_| CommandTimes::default()) }
-    }
 }
 
 impl Default for CommandTimes {
@@ -71,19 +69,23 @@ impl Default for CommandTimes {
     }
 }
 
-impl HeldCommands {
-    /// Takes the commands of a row.
-    pub(crate) fn push(&mut self, time_s: f64, commands: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
-        for (times, command) in self.of_elements.iter_mut().zip(commands) {
-            times.push(time_s, *command);
+impl<'c> HeldCommands<'c> {
+    pub(super) fn new(car: &'c Car, tables: &'c ShiftTables<f64>) -> Self {
+        Self { car, tables, of_elements: std::array::from_fn(|_| CommandTimes::default()) }
+    }
+}
+
+impl Check for HeldCommands<'_> {
+    fn row(&mut self, row: &CheckedRow<'_>) {
+        for (times, command) in self.of_elements.iter_mut().zip(&row.step.input.commands) {
+            times.push(row.step.time_s, *command);
         }
     }
 
-    /// What is said of the commands of the elements.
-    pub(crate) fn warnings(&self, car: &Car, tables: &ShiftTables<f64>) -> Vec<String> {
-        let elements = car.gearbox.elements.iter().enumerate();
+    fn warnings(&self) -> Vec<String> {
+        let elements = self.car.gearbox.elements.iter().enumerate();
         let commands = elements.filter_map(|(element, described)| {
-            Some((described.name.as_str(), &self.of_elements[tables.place(element)?]))
+            Some((described.name.as_str(), &self.of_elements[self.tables.place(element)?]))
         });
         warnings_of(&commands.collect::<Vec<_>>())
     }

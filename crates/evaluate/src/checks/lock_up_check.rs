@@ -5,6 +5,7 @@
 
 use car::Car;
 
+use super::{Check, CheckedRow};
 use crate::LogStep;
 
 /// Speed ratio from which on the lock-up clutch may be closed or slip \[chosen\]: a slip-controlled one slips by some rad/s.
@@ -22,8 +23,8 @@ const SLOW_RAD_S2: f64 = 40.0;
 const ENOUGH_S: f64 = 3.0;
 
 /// The time in which it was closed, so far.
-#[derive(Default)]
-pub(crate) struct LockUpCheck {
+pub(crate) struct LockUpCheck<'c> {
+    car: &'c Car,
     is_named: bool,
     reported_n_m: Option<f64>,
     /// By the reported torque, s; by the speeds alone, and since the last break.
@@ -35,11 +36,24 @@ pub(crate) struct LockUpCheck {
     is_slow: bool,
 }
 
-impl LockUpCheck {
+impl<'c> LockUpCheck<'c> {
+    pub(super) fn new(car: &'c Car) -> Self {
+        Self {
+            car,
+            is_named: false,
+            reported_n_m: None,
+            by_torque_s: 0.0,
+            alike_s: 0.0,
+            since_s: 0.0,
+            before: None,
+            is_slow: false,
+        }
+    }
+
     /// Takes a row with the newest speeds of engine and turbine, rad/s.
-    pub(crate) fn push(&mut self, car: &Car, step: &LogStep, [engine, turbine]: [f64; 2]) {
+    fn push(&mut self, step: &LogStep, [engine, turbine]: [f64; 2]) {
         const RATE_S: f64 = 0.2;
-        let Some(converter) = car.converter.as_ref() else { return };
+        let Some(converter) = self.car.converter.as_ref() else { return };
         self.is_named |= step.input.lock_up_applied;
         if let Some(reported) = step.reported_n_m {
             self.reported_n_m = Some(reported.value);
@@ -68,7 +82,7 @@ impl LockUpCheck {
     }
 
     /// What the log leaves out, in a sentence.
-    pub(crate) fn warning(&self) -> Option<String> {
+    fn warning(&self) -> Option<String> {
         let closed_s = if self.reported_n_m.is_some() { self.by_torque_s } else { self.alike_s };
         let why = match self.reported_n_m {
             Some(_) => "the engine reports far more torque than the converter takes at these speeds",
@@ -84,6 +98,19 @@ impl LockUpCheck {
     }
 }
 
+impl Check for LockUpCheck<'_> {
+    fn row(&mut self, row: &CheckedRow<'_>) {
+        if row.step.input.gear.is_steady() {
+            let [engine, turbine, _] = row.came_rad_s;
+            self.push(row.step, [engine, turbine]);
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.warning().into_iter().collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,7 +123,7 @@ mod tests {
     /// What is said of so long a log with this slip, rad/s, an engine that reports the pump's torque and more, N m, and a flag.
     fn said(seconds: u32, slip: f64, more_n_m: Option<f64>, lock_up_applied: bool) -> Option<String> {
         let car = CarFile::eight_speed().unwrap();
-        let mut check = LockUpCheck::default();
+        let mut check = LockUpCheck::new(&car);
         for row in 0..100 * seconds {
             let time_s = f64::from(row) * SAMPLE_S;
             let turbine = 150.0 + 20.0 * (0.3 * time_s).sin();
@@ -114,7 +141,7 @@ mod tests {
             };
             let pump_n_m = car.converter.unwrap().torques(speeds[0], turbine).pump_n_m;
             let reported_n_m = more_n_m.map(|more_n_m| Reading::now(pump_n_m + more_n_m));
-            check.push(&car, &LogStep { reported_n_m, ..LogStep::of(time_s, input) }, speeds);
+            check.push(&LogStep { reported_n_m, ..LogStep::of(time_s, input) }, speeds);
         }
         check.warning()
     }

@@ -1,18 +1,150 @@
 //! Whether a log is one of this car: what its readings contradict, each rule in a file of its own.
 
 mod came_speed;
-pub(crate) mod command_delay;
-pub(crate) mod contradictions;
-pub(crate) mod converter_check;
+mod command_delay;
+mod contradictions;
+mod converter_check;
+mod doubted_pressures;
 pub mod held_commands;
-pub(crate) mod in_gear;
-pub(crate) mod lock_up_check;
-pub(crate) mod log_beside;
+mod holes;
+mod in_gear;
+mod lock_up_check;
+mod open_loop;
+mod other_shifts;
 pub mod ratio_histogram;
-pub(crate) mod ratio_scale;
-pub(crate) mod still_commands;
+mod ratio_scale;
+mod scales;
+mod still_commands;
 pub mod swapped_speeds;
+mod unannounced;
+
+use car::{Car, ErrorBudget};
+use observer::ShiftTables;
+use observer::gearbox::{ShiftElement, ShiftEstimate};
+
+use self::command_delay::CommandDelay;
+use self::contradictions::CommandCheck;
+use self::converter_check::ConverterCheck;
+use self::doubted_pressures::DoubtedPressures;
+use self::held_commands::HeldCommands;
+use self::holes::Holes;
+use self::in_gear::{InGear, RowInGear};
+use self::lock_up_check::LockUpCheck;
+use self::open_loop::OpenLoop;
+use self::other_shifts::OtherShifts;
+use self::scales::Scales;
+use self::still_commands::StillCommands;
+use self::swapped_speeds::SwappedSpeeds;
+use self::unannounced::UnannouncedShifts;
+use crate::scored_shift::ScoredShift;
+use crate::{LogStep, ShiftScoreRow};
 
 pub use came_speed::CameSpeed;
 pub use in_gear::Unusable;
 pub use ratio_scale::WrongScale;
+
+pub(crate) use in_gear::GearSpeeds;
+pub(crate) use other_shifts::is_of_its_gears;
+
+/// A rule that the readings of a log keep if they are of this car.
+pub(crate) trait Check {
+    /// Takes a row.
+    fn row(&mut self, _row: &CheckedRow<'_>) {}
+
+    /// A shift begins.
+    fn begin(&mut self) {}
+
+    /// Takes an estimate of a shift between these elements, by their places in the gearbox.
+    fn shift_row(&mut self, _elements: [Option<usize>; 2], _row: &ShiftScoreRow) {}
+
+    /// Takes a shift that has ended.
+    fn end(&mut self, _shift: &EndedShift<'_>) {}
+
+    /// What the log contradicts, each in a sentence.
+    fn warnings(&self) -> Vec<String>;
+}
+
+/// A row of a log, and what the filter says of it.
+pub(crate) struct CheckedRow<'a> {
+    /// The row.
+    pub(crate) step: &'a LogStep,
+    /// Its estimate.
+    pub(crate) estimate: &'a ShiftEstimate<f64>,
+    /// Newest speeds of engine, turbine and output as they came, rad/s; not a number of one that comes no more.
+    pub(crate) came_rad_s: [f64; 3],
+    /// The newest of them that the filter did not refuse, rad/s.
+    pub(crate) used_rad_s: [f64; 3],
+    /// What it shows of a gear; `None` in a shift and in neutral.
+    pub(crate) in_gear: Option<RowInGear>,
+    /// Whether one of the speeds came before, and comes no more.
+    pub(crate) has_ended: bool,
+    /// Whether the recording has a hole before it.
+    pub(crate) is_hole: bool,
+}
+
+/// A shift that has ended.
+pub(crate) struct EndedShift<'a> {
+    /// What is known of it.
+    pub(crate) shift: &'a ScoredShift,
+    /// Its elements, and its begin and end, s, if it was completed and the filter has tables of it.
+    pub(crate) completed: Option<([ShiftElement; 2], [f64; 2])>,
+}
+
+/// All checks of a log.
+pub(crate) struct Checks<'c> {
+    pub(crate) swapped: SwappedSpeeds,
+    commands: CommandCheck<'c>,
+    pub(crate) in_gear: InGear,
+    pub(crate) open_loop: OpenLoop,
+    doubted: DoubtedPressures<'c>,
+    pub(crate) delay: CommandDelay<'c>,
+    converter: ConverterCheck<'c>,
+    lock_up: LockUpCheck<'c>,
+    still: StillCommands<'c>,
+    held: HeldCommands<'c>,
+    pub(crate) holes: Holes,
+    other: OtherShifts,
+    unannounced: UnannouncedShifts,
+    pub(crate) scales: Scales<'c>,
+}
+
+impl<'c> Checks<'c> {
+    pub(crate) fn new(car: &'c Car, tables: &'c ShiftTables<f64>, budget: &ErrorBudget) -> Self {
+        Self {
+            swapped: SwappedSpeeds::default(),
+            commands: CommandCheck::new(car, tables, budget),
+            in_gear: InGear::default(),
+            open_loop: OpenLoop::new(car),
+            doubted: DoubtedPressures::new(car),
+            delay: CommandDelay::new(tables, budget),
+            converter: ConverterCheck::new(car),
+            lock_up: LockUpCheck::new(car),
+            still: StillCommands::new(car, tables),
+            held: HeldCommands::new(car, tables),
+            holes: Holes::default(),
+            other: OtherShifts::default(),
+            unannounced: UnannouncedShifts::new(car),
+            scales: Scales::new(car),
+        }
+    }
+
+    /// Each of them, in the order of their warnings.
+    pub(crate) fn each(&mut self) -> [&mut dyn Check; 14] {
+        [
+            &mut self.swapped,
+            &mut self.commands,
+            &mut self.in_gear,
+            &mut self.open_loop,
+            &mut self.doubted,
+            &mut self.delay,
+            &mut self.converter,
+            &mut self.lock_up,
+            &mut self.still,
+            &mut self.held,
+            &mut self.holes,
+            &mut self.other,
+            &mut self.unannounced,
+            &mut self.scales,
+        ]
+    }
+}

@@ -4,16 +4,18 @@
 //! commands have to move between the last reading before it and its end.
 
 use car::Car;
-use observer::Reading;
-use observer::ShiftTables;
 use observer::gearbox::{MAX_ELEMENTS, ShiftElement};
+use observer::{Reading, ShiftTables};
+
+use super::{Check, CheckedRow, EndedShift};
 
 /// Readings of a command in a shift that are needed to judge \[chosen\].
 const ENOUGH: u32 = 3;
 
 /// Counts the shifts in which a command stands still.
-#[derive(Default)]
-pub(crate) struct StillCommands {
+pub(crate) struct StillCommands<'c> {
+    car: &'c Car,
+    tables: &'c ShiftTables<f64>,
     /// The newest command of each place in the filter's tables.
     newest: [Option<f64>; MAX_ELEMENTS],
     /// Of the shift that goes on, by place: readings, and whether one of them differs from the one before.
@@ -24,15 +26,27 @@ pub(crate) struct StillCommands {
     still: [u64; MAX_ELEMENTS],
 }
 
-impl StillCommands {
-    /// A shift begins with the next row.
-    pub(crate) fn begin(&mut self) {
+impl<'c> StillCommands<'c> {
+    pub(super) fn new(car: &'c Car, tables: &'c ShiftTables<f64>) -> Self {
+        Self {
+            car,
+            tables,
+            newest: [None; MAX_ELEMENTS],
+            readings: [0; MAX_ELEMENTS],
+            has_moved: [false; MAX_ELEMENTS],
+            shifts: [0; MAX_ELEMENTS],
+            still: [0; MAX_ELEMENTS],
+        }
+    }
+}
+
+impl Check for StillCommands<'_> {
+    fn begin(&mut self) {
         (self.readings, self.has_moved) = ([0; MAX_ELEMENTS], [false; MAX_ELEMENTS]);
     }
 
-    /// Takes the commands of a row.
-    pub(crate) fn push(&mut self, commands: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
-        for (place, command) in commands.iter().enumerate() {
+    fn row(&mut self, row: &CheckedRow<'_>) {
+        for (place, command) in row.step.input.commands.iter().enumerate() {
             let Some(Reading { value, .. }) = *command else { continue };
             self.readings[place] += 1;
             // The first reading of all tells of no move.
@@ -41,9 +55,9 @@ impl StillCommands {
         }
     }
 
-    /// The shift between these elements is completed.
-    pub(crate) fn end(&mut self, elements: [ShiftElement; 2]) {
-        for place in elements.into_iter().filter_map(ShiftElement::place) {
+    fn end(&mut self, ended: &EndedShift<'_>) {
+        let elements = ended.completed.map(|(elements, _)| elements);
+        for place in elements.into_iter().flatten().filter_map(ShiftElement::place) {
             if self.readings.get(place).is_some_and(|readings| *readings >= ENOUGH) {
                 self.shifts[place] += 1;
                 self.still[place] += u64::from(!self.has_moved[place]);
@@ -51,12 +65,11 @@ impl StillCommands {
         }
     }
 
-    /// The elements whose command stood still in a shift that moves them, each in a sentence.
-    pub(crate) fn warnings(&self, car: &Car, tables: &ShiftTables<f64>) -> Vec<String> {
-        let elements = car.gearbox.elements.iter().enumerate();
+    fn warnings(&self) -> Vec<String> {
+        let elements = self.car.gearbox.elements.iter().enumerate();
         elements
             .filter_map(|(element, described)| {
-                let place = tables.place(element).filter(|place| self.still[*place] > 0)?;
+                let place = self.tables.place(element).filter(|place| self.still[*place] > 0)?;
                 Some(format!(
                     "warning: in {} of {} completed shifts that apply or release {}, its command does not change: the channel is frozen there, or \
                      is another signal, and the estimates of these shifts rest on it",

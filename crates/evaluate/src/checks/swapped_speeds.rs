@@ -3,6 +3,8 @@
 //! In a gear the turbine turns with the gearbox output, times the ratio of that gear. The engine does so only where the converter
 //! hardly slips, and then the turbine does too. Times at which the engine fits a gear and the turbine none contradict the channels.
 
+use super::{Check, CheckedRow};
+
 /// A speed fits a gear within this fraction: readings that are 20 ms apart differ by 1 % while the car accelerates, teeth are
 /// counted to 1 % \[chosen\].
 const FITS: f64 = 0.02;
@@ -48,6 +50,19 @@ impl SwappedSpeeds {
                  engine_speed is the output speed times the ratio of a gear and turbine_speed is not; the other way round it is in {turbine_alone}"
             )
         })
+    }
+}
+
+impl Check for SwappedSpeeds {
+    fn row(&mut self, row: &CheckedRow<'_>) {
+        if let Some(in_gear) = row.in_gear.as_ref().filter(|of| of.is_compared) {
+            let [engine, turbine, output] = row.came_rad_s;
+            self.push(engine, turbine, &[in_gear.ratio * output]);
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.contradiction().map(|swapped| format!("warning: {swapped}")).into_iter().collect()
     }
 }
 
