@@ -1,7 +1,5 @@
 //! Formats of files, by their first bytes.
 
-use crate::CanKind;
-
 /// Formats of files, as their first bytes tell them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -15,6 +13,21 @@ pub enum Format {
     NotRead(&'static str),
     /// Anything else: a table as text.
     Csv,
+}
+
+/// The kinds of CAN logs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CanKind {
+    /// Text of candump.
+    Candump,
+    /// Vector's text.
+    Asc,
+    /// Vector's objects in containers.
+    Blf,
+    /// PCAN trace.
+    Trc,
+    /// Table of frames of SavvyCAN.
+    Savvy,
 }
 
 /// First bytes of formats that are not read.

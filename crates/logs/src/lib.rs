@@ -15,6 +15,7 @@ mod ahead;
 pub mod arrays;
 #[cfg(not(target_family = "wasm"))]
 pub mod can;
+pub mod channel;
 pub mod columns;
 pub mod convert;
 mod copies;
@@ -50,13 +51,14 @@ pub mod suggest;
 mod time_column;
 
 pub use arrays::Arrays;
+pub use channel::{Channel, TimeColumn};
 pub use columns::{Block, Column, Columns};
 pub use error::LogError;
-pub use format::Format;
+pub use format::{CanKind, Format};
 pub use frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
 pub use held::HeldSpeed;
 pub use inspect::{ChannelSummary, Inspection, inspect};
-pub use log::{CanKind, Channel, Log, OpenOptions, TimeColumn, needs_map};
+pub use log::{Log, OpenOptions, needs_map};
 pub use look_ahead::{LOOK_AHEAD_S, LookAhead};
 pub use map::{ChannelMap, Combine, Gearbox, Mapped};
 pub use on_change::OnChange;

@@ -23,27 +23,7 @@ use crate::not_in_browser::{CanLog, Database, MdfLog, ParquetLog};
 #[cfg(not(target_family = "wasm"))]
 use crate::parquet_log::ParquetLog;
 use crate::samples::Samples;
-use crate::{Format, LogError, csv_log, error};
-
-/// A channel of a log.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Channel {
-    /// Its name.
-    pub name: String,
-    /// Its unit as the log writes it; may be empty.
-    pub unit: String,
-    /// What it shares a clock with: the message of a bus signal, the channel group of an MDF file. Empty for tables.
-    pub group: String,
-}
-
-/// Which column of a table is the time.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TimeColumn {
-    /// Its name.
-    pub name: String,
-    /// Its unit, if the log does not say it.
-    pub unit: Option<String>,
-}
+use crate::{CanKind, Channel, Format, LogError, TimeColumn, csv_log, error};
 
 /// What must be known to open some logs.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -415,19 +395,4 @@ fn first_bytes(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
         }
     }
     Ok(head)
-}
-
-/// The kinds of CAN logs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CanKind {
-    /// Text of candump.
-    Candump,
-    /// Vector's text.
-    Asc,
-    /// Vector's objects in containers.
-    Blf,
-    /// PCAN trace.
-    Trc,
-    /// Table of frames of SavvyCAN.
-    Savvy,
 }

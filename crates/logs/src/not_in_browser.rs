@@ -8,7 +8,7 @@ use std::path::Path;
 use crate::LogError;
 use crate::ahead::Crew;
 use crate::columns::Stream;
-use crate::log::{CanKind, Channel, TimeColumn};
+use crate::{CanKind, Channel, TimeColumn};
 
 /// What to do with a log of such a format.
 const NOT_READ: &str = "MDF, Parquet and CAN logs are not read in a browser\nhint: save the channels as CSV, or use the program `wetclutch`";

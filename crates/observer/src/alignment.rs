@@ -3,8 +3,8 @@
 use drivetrain::{Real, ReducedShift};
 
 use crate::{
-    ChannelHealth, Channels, CompliantObserver, Estimate, Estimator, ExtendedFilter, Health, Input, InputLimits,
-    Inversion, LOST_S, Reading, RigidObserver, Sample, SampleEstimator, SlidingObserver, SuperTwisting,
+    Aligned, ChannelHealth, Channels, CompliantObserver, Estimate, Estimator, ExtendedFilter, Health, Input,
+    InputLimits, Inversion, LOST_S, Reading, RigidObserver, Sample, SampleEstimator, SlidingObserver, SuperTwisting,
     UnscentedFilter,
 };
 
@@ -39,15 +39,6 @@ pub struct Alignment<'a, T> {
     pub shift: &'a ReducedShift<T>,
     /// What counts as a measurement.
     pub limits: &'a InputLimits<T>,
-}
-
-/// All signals at the time of a step, and what became of each channel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Aligned<T> {
-    /// The signals; NaN where there is none.
-    pub sample: Sample<T>,
-    /// What became of each channel.
-    pub channels: Channels<ChannelHealth>,
 }
 
 impl<T: Real> AlignmentState<T> {

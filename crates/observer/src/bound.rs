@@ -7,56 +7,12 @@
 //! serves all observers of a run.
 
 use drivetrain::clutch::{DRAG_PEAK_RAD_S, drag_torque};
-use drivetrain::{Clutch, ClutchValve, Real};
+use drivetrain::{Clutch, Real};
 
-use crate::fill_range::FillBudget;
 use crate::{
-    Aligned, Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange,
-    Reading, Sample, ShaftMemory, ShaftRange, Tracker, TrackerState,
+    Aligned, Alignment, AlignmentState, Bounds, Budget, ChannelHealth, Estimate, Estimator, Input, Phase,
+    PressureRange, Reading, Sample, ShaftMemory, ShaftRange, Tracker, TrackerState,
 };
-
-/// Largest errors under which the ranges of pressure and clutch torque hold.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Budget<T> {
-    /// The valve as measured: lag, gain and delay over the operating point.
-    pub valve: ClutchValve<T>,
-    /// Minimum and maximum factor on its lag.
-    pub lag_factor: [T; 2],
-    /// Minimum and maximum factor on its gain.
-    pub gain_factor: [T; 2],
-    /// Minimum and maximum delay, s.
-    pub delay_s: [T; 2],
-    /// Maximum half-width of its hysteresis, Pa: how far the settled pressure may be from that of the command.
-    pub hysteresis_pa: T,
-    /// Error of a reading of the command, A or %.
-    pub command: T,
-    /// Maximum time between a command and the sample that first shows it, s; it counts up to the time step.
-    pub command_age_s: T,
-    /// Minimum and maximum line pressure, Pa: what the supply gives at most at any time.
-    pub line_pressure_pa: [T; 2],
-    /// Highest pressure that the supply can give, Pa.
-    pub pressure_max_pa: T,
-    /// The piston's stroke; without one the cylinder has the pressure of the valve's outlet.
-    pub fill: Option<FillBudget<T>>,
-    /// Minimum and maximum factor on the clutch's friction.
-    pub friction_factor: [T; 2],
-    /// Maximum peak of the drag of its open plates, N m ([`drag_torque`]).
-    pub drag_n_m: T,
-    /// Error of a reading of the slip, rad/s.
-    pub slip_rad_s: T,
-}
-
-/// Ranges of pressure and torque at the time of a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds<T> {
-    /// Lowest and highest pressure, Pa.
-    pub pressure_pa: [T; 2],
-    /// Lowest and highest clutch torque while the clutch slips, N m; a locked one carries any torque up to the larger.
-    pub clutch_torque_n_m: [T; 2],
-    /// Lowest and highest expected drive-shaft torque, N m, where the wheel speed is measured.
-    pub shaft_torque_n_m: Option<[T; 2]>,
-}
 
 /// Computes the ranges of a run, once for all observers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -323,69 +279,6 @@ impl<T: Real, O: Estimator<T>> Estimator<T> for Bounded<T, O> {
         let aligned = self.range.align(range, input);
         let estimate = self.observer.step_aligned(state, input, &aligned);
         self.range.step_aligned(range, input, &aligned).clip(estimate)
-    }
-}
-
-impl<T: Real> Bounds<T> {
-    /// Whether an estimate is in all of them.
-    pub fn hold(&self, estimate: &Estimate<T>) -> bool {
-        let within = |[low, high]: [T; 2], value: T| low <= value && value <= high;
-        let shaft = self.shaft_torque_n_m.zip(estimate.shaft_torque_n_m);
-        within(self.pressure_pa, estimate.pressure_pa)
-            && within(self.clutch_torque_n_m, estimate.clutch_torque_n_m)
-            && shaft.is_none_or(|(range, torque)| within(range, torque))
-    }
-
-    /// The estimate as it is, with these ranges. Its health is [`Health::OutsideRange`] if it is outside one of them, unless
-    /// it was worse before.
-    #[inline]
-    pub fn around(&self, estimate: Estimate<T>) -> Estimate<T> {
-        let found = if self.hold(&estimate) { Health::Good } else { Health::OutsideRange };
-        Estimate { bounds: Some(*self), health: estimate.health.max(found), ..estimate }
-    }
-
-    /// The estimate with its pressure and clutch torque brought into the guaranteed ranges, and with these ranges. Its
-    /// health is [`Health::LimitedToRange`] if that changed it, and [`Health::OutsideRange`] if its shaft torque, which is left
-    /// as it is, is outside the expected range; unless it was worse before.
-    #[inline]
-    pub fn clip(&self, estimate: Estimate<T>) -> Estimate<T> {
-        let nearest = |[low, high]: [T; 2], value: T| value.at_least(low).at_most(high);
-        let limited = Estimate {
-            pressure_pa: nearest(self.pressure_pa, estimate.pressure_pa),
-            clutch_torque_n_m: nearest(self.clutch_torque_n_m, estimate.clutch_torque_n_m),
-            bounds: Some(*self),
-            ..estimate
-        };
-        let changed =
-            limited.pressure_pa != estimate.pressure_pa || limited.clutch_torque_n_m != estimate.clutch_torque_n_m;
-        let found = match (changed, self.hold(&limited)) {
-            (true, _) => Health::LimitedToRange,
-            (false, false) => Health::OutsideRange,
-            (false, true) => Health::Good,
-        };
-        Estimate { health: limited.health.max(found), ..limited }
-    }
-}
-
-impl<T: Real> Budget<T> {
-    /// The same budget in another precision.
-    pub fn cast<U: Real>(&self) -> Budget<U> {
-        let to = |x: T| U::of(x.to_f64_exact());
-        Budget {
-            valve: self.valve.cast(),
-            lag_factor: self.lag_factor.map(to),
-            gain_factor: self.gain_factor.map(to),
-            delay_s: self.delay_s.map(to),
-            hysteresis_pa: to(self.hysteresis_pa),
-            command: to(self.command),
-            command_age_s: to(self.command_age_s),
-            line_pressure_pa: self.line_pressure_pa.map(to),
-            pressure_max_pa: to(self.pressure_max_pa),
-            fill: self.fill.as_ref().map(FillBudget::cast),
-            friction_factor: self.friction_factor.map(to),
-            drag_n_m: to(self.drag_n_m),
-            slip_rad_s: to(self.slip_rad_s),
-        }
     }
 }
 

@@ -15,6 +15,8 @@ extern crate std;
 
 pub mod alignment;
 pub mod bound;
+mod bounds;
+mod budget;
 mod commands;
 pub mod compliant;
 pub mod compliant_model;
@@ -30,6 +32,7 @@ pub mod of_sensors;
 pub mod pressure_range;
 pub mod rigid;
 pub mod rigid_model;
+mod sample_estimator;
 pub mod schedule;
 pub mod shaft_range;
 pub mod signals;
@@ -39,8 +42,10 @@ pub mod supervisor;
 pub mod tracker;
 pub mod unscented;
 
-pub use alignment::{Aligned, AlignedState, Alignment, AlignmentState};
-pub use bound::{Bounded, Bounds, Budget, RangeEstimator, RangeState};
+pub use alignment::{AlignedState, Alignment, AlignmentState};
+pub use bound::{Bounded, RangeEstimator, RangeState};
+pub use bounds::Bounds;
+pub use budget::Budget;
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};
 pub use extended::{ExtendedFilter, ExtendedState, FilterNoise, Readings};
@@ -55,10 +60,11 @@ pub use of_car::{ShiftTables, element_uncertainty, gearbox_filter};
 pub use pressure_range::PressureRange;
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};
+pub use sample_estimator::SampleEstimator;
 pub use schedule::{Mix, Schedule};
 pub use shaft_range::{ShaftErrors, ShaftMemory, ShaftRange};
 pub use signals::{
-    ChannelHealth, Channels, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Reading, Sample, SampleEstimator,
+    Aligned, ChannelHealth, Channels, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Reading, Sample,
 };
 pub use sliding::{SlidingGains, SlidingObserver, SlidingSample, SlidingState};
 pub use super_twisting::{SuperTwisting, SuperTwistingState, TwistingSample};

@@ -3,7 +3,7 @@
 pub use car::{Input, LOST_S, Reading};
 use drivetrain::{Real, ReducedShift};
 
-use crate::{Aligned, Bounds, Phase, Tracker};
+use crate::{Bounds, Phase};
 
 /// All signals at one time, as an observer with a fixed sample time needs them. A value that is not a number is not
 /// known.
@@ -36,6 +36,15 @@ impl<T: Real> Sample<T> {
             ..Input::none(self.dt_s)
         }
     }
+}
+
+/// All signals at the time of a step, and what became of each channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aligned<T> {
+    /// The signals; NaN where there is none.
+    pub sample: Sample<T>,
+    /// What became of each channel.
+    pub channels: Channels<ChannelHealth>,
 }
 
 /// Ranges outside which an input cannot be a measurement, and an estimate cannot be a pressure.
@@ -341,31 +350,6 @@ impl<T, O: Estimator<T>> Estimator<T> for &O {
     fn step_aligned(&self, state: &mut Self::State, input: &Input<T>, aligned: &Aligned<T>) -> Estimate<T> {
         (**self).step_aligned(state, input, aligned)
     }
-}
-
-/// An observer that needs all signals at one time. As an [`Estimator`] it gets them from [`crate::Alignment`].
-pub trait SampleEstimator<T> {
-    /// What it remembers from one sample to the next.
-    type SampleState;
-
-    /// Whether it reads the speed of the driven wheels.
-    const READS_WHEEL: bool;
-
-    /// Whether it needs the engine speed. One that does not takes the turbine speed in its place where the log has none: a converter that
-    /// does not slip.
-    #[inline]
-    fn needs_engine(&self) -> bool {
-        true
-    }
-
-    /// Its checks, valve and phase.
-    fn tracker(&self) -> &Tracker<T>;
-
-    /// Its memory before the first sample.
-    fn start_sample(&self) -> Self::SampleState;
-
-    /// Takes one sample and returns the estimate at its time. Never panics; allocates nothing.
-    fn step_sample(&self, state: &mut Self::SampleState, sample: &Sample<T>) -> Estimate<T>;
 }
 
 #[cfg(test)]

@@ -17,10 +17,9 @@ use std::path::{Path, PathBuf};
 pub use database::Database;
 
 use self::database::Found;
-
+use crate::CanKind;
 use crate::LogError;
 use crate::columns::{Batch, Stream};
-use crate::log::CanKind;
 use crate::samples::Sample;
 
 /// Largest payload, bytes: that of CAN FD.

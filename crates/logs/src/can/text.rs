@@ -7,7 +7,7 @@ use super::line::{Line, classic_length};
 use super::savvy::Savvy;
 use super::trc::Trc;
 use super::{Frame, Frames, PAYLOAD};
-use crate::log::CanKind;
+use crate::CanKind;
 use crate::stamp::StampForm;
 use crate::{LogError, error};
 

@@ -9,7 +9,7 @@ use falcon_mdf::blocks::data_block::CompressionType;
 use falcon_mdf::data_index::DataBlockInfo;
 use libdeflater::{DecompressionError, Decompressor};
 
-use super::LARGEST_BLOCK;
+use super::limits::LARGEST_BLOCK;
 use crate::ahead::{Crew, Job};
 use crate::columns::Memory;
 

@@ -2,7 +2,7 @@
 
 use falcon_mdf::CanFrames;
 
-use super::BATCH;
+use super::limits::BATCH;
 use crate::LogError;
 use crate::can::{Decoder, Frame};
 use crate::columns::{Batch, Stream};

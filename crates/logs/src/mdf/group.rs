@@ -5,10 +5,11 @@ use std::path::Path;
 use falcon_mdf::blocks::channel::ChannelType;
 use falcon_mdf::{Channel as MdfChannel, Conversion, Mf4Error, Signal, SignalValues, SignalsChunks};
 
+use super::MdfLog;
 use super::conversion::keeps_numbers;
 use super::field::{Field, Tile};
+use super::limits::{BATCH, GroupAt, ON_TRUST};
 use super::records::Records;
-use super::{BATCH, GroupAt, MdfLog, ON_TRUST};
 use crate::LogError;
 use crate::columns::{Batch, Block, Column, Memory, Stream};
 use crate::samples::Quality;

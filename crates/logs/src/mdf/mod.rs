@@ -9,6 +9,7 @@ mod conversion;
 mod cut;
 mod field;
 mod group;
+mod limits;
 mod records;
 mod times;
 mod units;
@@ -29,19 +30,10 @@ use bus::Bus;
 use conversion::unreadable;
 use field::{Field, Tile};
 use group::{Decoding, Group, Part};
+use limits::{GroupAt, LARGEST_BLOCK, ON_TRUST};
 use records::Records;
 use times::{Times, time_channel};
 use units::{TimeUnits, unit_of};
-
-/// Records that are given at once: their columns stay in the second cache.
-const BATCH: usize = 8192;
-/// Largest block of data that is unpacked, bytes. Writers use up to 4 MiB.
-const LARGEST_BLOCK: u64 = 256 << 20;
-/// Memory that is taken on the word of the file, bytes.
-const ON_TRUST: usize = 16 << 20;
-
-/// Data group and channel group.
-type GroupAt = (usize, usize);
 
 /// An open MDF file.
 pub(crate) struct MdfLog {

@@ -7,8 +7,8 @@ use falcon_mdf::blocks::data_block::CompressionType;
 use falcon_mdf::data_index::DataBlockInfo;
 use falcon_mdf::{ChannelGroup, DataGroup};
 
-use super::ON_TRUST;
 use super::blocks::{Ahead, Blocks, Packed, can_unpack, in_rows};
+use super::limits::ON_TRUST;
 use crate::ahead::Crew;
 use crate::columns::Memory;
 

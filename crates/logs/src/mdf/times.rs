@@ -6,7 +6,8 @@ use falcon_mdf::blocks::SyncType;
 use falcon_mdf::{Channel as MdfChannel, ChannelGroup, Mf4File};
 
 use super::conversion::unreadable;
-use super::{GroupAt, groups};
+use super::groups;
+use super::limits::GroupAt;
 
 /// Bytes of the head of a block, its number of links in them, and the link of a channel group to the one with its time.
 const HEAD: usize = 24;

@@ -6,7 +6,7 @@ use std::path::Path;
 use falcon_mdf::{Channel as MdfChannel, Mf4File};
 use trace::{Quantity, Unit};
 
-use super::GroupAt;
+use super::limits::GroupAt;
 use crate::{LogError, TimeColumn, error};
 
 /// Bytes of the head of a block, and the place in it of its length and of the number of its links.

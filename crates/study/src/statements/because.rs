@@ -5,8 +5,8 @@ use config::ExperimentFile;
 use drivetrain::{ClutchValve, Real, Table1, Valve, ValveMaps};
 use trace::units::mpa;
 
-use super::Statement;
 use super::rows::{BUS_PERIOD_S, COMPLIANT, COMPLIANT_SAMPLED, I, RIGID, T, min_multipliers, of, open, shaft_rms};
+use super::statement::Statement;
 use crate::{Comparison, StudyError, compare};
 
 /// Runs that take one cause of error away, to say what an error is made of.

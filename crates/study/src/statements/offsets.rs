@@ -11,39 +11,16 @@ use design::{Certificate, CompliantCertificate, error_bound};
 use drivetrain::Real;
 use nalgebra::DMatrix;
 use observer::Phase;
-use serde::Serialize;
 use trace::signal;
 
 use super::rows::{CHAPTER_COMPLIANT, COMPLIANT, I, RIGID, T};
-use super::{Case, Figure, Statement, Unit};
+use super::statement::{BoundCheck, Case, Figure, Statement, Unit};
 use crate::{Comparison, StudyError};
 
 /// Time constants of `kappa2` after which an error has settled: the chapter's, from which it has `kappa2`.
 const SETTLING: f64 = 4.0;
 /// `H` of Eq. (2.86): turbine torque 15 % off, mass and grade.
 const CHAPTER_H: [f64; 4] = [2.38, 0.0, 0.0, 0.13];
-
-/// Whether an error respects a certified offset.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BoundCheck {
-    /// The offset, Pa.
-    pub bound_pa: f64,
-    /// Time from the start of the phase after which the initial error has decayed, s.
-    pub decayed_after_s: f64,
-    /// Largest error after that, Pa; NaN if the phase ends before.
-    pub largest_after_decay_pa: f64,
-    /// Whether it is within the offset; `None` if the phase ends before.
-    pub holds: Option<bool>,
-    /// Largest fraction of the bound with the initial error in it, Eq. (2.40), that the error has after the first sample,
-    /// in which it is the initial error.
-    pub largest_share_of_bound: f64,
-    /// Whether the error is always within that bound.
-    pub holds_with_initial_error: bool,
-    /// Largest error from the start of the phase on, Pa.
-    pub largest_from_start_pa: f64,
-    /// Whether that is within the offset.
-    pub holds_at_start: bool,
-}
 
 /// What a certificate says about the pressure.
 #[derive(Clone, Copy)]

@@ -6,7 +6,8 @@ use drivetrain::Real;
 use observer::Phase;
 use trace::signal;
 
-use super::{Case, Figure, Statement, Unit, offsets};
+use super::offsets;
+use super::statement::{Case, Figure, Statement, Unit};
 use crate::{Comparison, ObserverRun, PhaseScore, StudyError};
 
 pub(super) const RIGID: &str = "rigid ISS";

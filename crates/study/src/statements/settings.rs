@@ -7,8 +7,8 @@ use car::ObserverKind;
 use config::{ExperimentFile, Study};
 use serde::Serialize;
 
-use super::Statement;
 use super::rows::{NAMED, rows};
+use super::statement::{Fractions, Statement};
 use crate::campaign::{factor_values, in_order, run_seed};
 use crate::comparison::compare_shift;
 use crate::{Comparison, StudyError};
@@ -26,19 +26,6 @@ pub struct Settings {
     pub no_gains: u64,
     /// Of which values do not go together.
     pub refused: u64,
-}
-
-/// In which fraction of the settings something comes out; `None` where there is nothing to test.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Fractions {
-    /// Our figure agrees with the chapter's.
-    pub agrees: Option<f64>,
-    /// The offset holds after the initial error has decayed.
-    pub holds: Option<f64>,
-    /// The bound with the initial error in it holds.
-    pub holds_with_initial_error: Option<f64>,
-    /// The offset holds from the start of the phase on.
-    pub holds_at_start: Option<f64>,
 }
 
 /// What came out of one row in one setting, in the order of [`Fractions`].

@@ -18,6 +18,7 @@ mod calibration;
 mod engine;
 mod launch;
 mod lock_up;
+mod measured;
 mod pressure;
 mod shift;
 mod strokes;
@@ -36,6 +37,7 @@ pub use calibration::CarCalibration;
 use engine::EngineControl;
 use launch::Launch;
 use lock_up::LockUpControl;
+pub use measured::CarMeasured;
 use pressure::Controlled;
 pub use shift::ShiftStage;
 use shift::{ActiveShift, ShiftVehicle};
@@ -52,21 +54,6 @@ const AT_REST_RAD_S: f64 = 10.0;
 
 /// A clutch that opens into neutral counts as open after so long, s \[chosen\].
 const OPENS_S: f64 = 0.2;
-
-/// What the controller measures.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CarMeasured {
-    /// Engine speed, rad/s.
-    pub engine_rad_s: f64,
-    /// Turbine speed, rad/s; without a converter that of the gearbox input.
-    pub turbine_rad_s: f64,
-    /// Gearbox output speed, rad/s.
-    pub output_rad_s: f64,
-    /// Driven wheel speed, rad/s.
-    pub wheel_rad_s: f64,
-    /// Brake, 0 to 1.
-    pub brake: f64,
-}
 
 /// What the controller commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
