@@ -52,8 +52,8 @@ fn a_fitted_file_estimates_the_torque_of_other_shifts_better() {
     let output = wetclutch(&arguments);
     let said = printed(&output);
     let valve_gain = said.lines().find(|line| line.starts_with("valve gain ")).unwrap();
-    assert!(valve_gain.ends_with("not told by these logs"), "{valve_gain}");
-    assert!(said.contains("torque scale: not told by these logs"), "{said}");
+    assert!(valve_gain.ends_with("not identified by these logs"), "{valve_gain}");
+    assert!(said.contains("torque scale: not identified by these logs"), "{said}");
     assert!(said.contains("weigh the car"), "{said}");
     let text = std::fs::read_to_string(&fitted).unwrap();
     let given = std::fs::read_to_string(VEHICLE).unwrap();

@@ -52,7 +52,7 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     for words in [
         "converter capacity",
         "M11 of 1-2",
-        "torque scale: not told by these logs",
+        "torque scale: not identified by these logs",
         "correlated: ",
         "shifts held out: ",
         "better one in ",
@@ -86,7 +86,7 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let stroke = format!("{ROOT}vehicles/eight_speed_stroke.toml");
     let output = wetclutch(&["fit", &log, "--vehicle", &stroke, "-o", &folder.path("stroke.toml")]);
     let text = printed(&output);
-    assert!(text.contains("E: fill volume") && text.contains("not told by these logs, measure the pressure"), "{text}");
+    assert!(text.contains("E: fill volume") && text.contains("not identified by these logs, measure the pressure"), "{text}");
     assert!(folder.read("stroke.toml").contains("[clutch.E.fill]\n"), "{}", folder.read("stroke.toml"));
 }
 

@@ -50,7 +50,7 @@ mod tests {
         around(factors(0.01, 1.0, [0.5, 1.5]), [(-0.04_f64).exp(), 0.04_f64.exp()]);
         // The fitted value is near the end of what was known: beyond it only the 95 % interval.
         around(factors(0.05, 1.14, [0.85, 1.15]), [(-0.2_f64).exp(), 0.1_f64.exp()]);
-        // What is not told at all: the 95 % interval of a normal distribution over the same range.
+        // What is not identified at all: the 95 % interval of a normal distribution over the same range.
         around(factors(1.0, 1.0, [0.5, 1.5]), [0.5, 3.0_f64.sqrt()]);
         assert_eq!(fraction(0.001, 1.0, 0.1, 0.03), 0.03);
         assert!((fraction(1.0, 0.9, 0.1, 0.03) - 0.2).abs() < 1e-12);

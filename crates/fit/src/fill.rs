@@ -95,12 +95,12 @@ impl FillFit {
         Self { log_volume, sd: [variance.sqrt().min(before), before], preload, shifts: count, is_misfit }
     }
 
-    /// What the logs tell of it.
+    /// How far the logs identify it.
     pub fn verdict(&self) -> Verdict {
         if self.shifts == 0 { Verdict::NotIdentifiable } else { Verdict::of(self.sd[0], self.sd[1]) }
     }
 
-    /// Factor on the volume in the fitted file: that of the given file where it is not told.
+    /// Factor on the volume in the fitted file: that of the given file where it is not identified.
     pub(crate) fn factor(&self) -> f64 {
         if self.verdict() == Verdict::NotIdentifiable { 1.0 } else { Real::exp(self.log_volume) }
     }
@@ -115,7 +115,7 @@ impl FillFit {
         self.is_misfit.then(|| {
             format!(
                 "warning: the measured pressure of {clutch} before both clutches slip is not that of a fill by its commands: it is frozen, late, of \
-                 another clutch or in another unit, or passages and oil are not those of the file. Its fill volume is not told"
+                 another clutch or in another unit, or passages and oil are not those of the file. Its fill volume is not identified"
             )
         })
     }

@@ -14,16 +14,16 @@ use crate::{BacklashFit, Channel, Fit, Known, MapChange, MapKey, Measure, Parame
 const MISFIT_GAIN: f64 = 0.6;
 /// What driving does not tell of road load.
 pub(crate) const MEAN_GRADE: &str = "Grade is not measured, and a mean grade acts like rolling resistance: coasting down both ways on a straight of \
-     constant grade would tell it, and a fit does not read that";
+     constant grade would identify it, and a fit does not read that";
 
 impl Fit {
-    /// What the logs tell of a parameter.
+    /// How far the logs identify a parameter.
     pub fn verdict(&self, parameter: Parameter) -> Verdict {
         let Some(place) = self.place(parameter) else { return Verdict::NotIdentifiable };
         Verdict::of(self.sd(parameter).unwrap_or(f64::INFINITY), self.priors[place].sd)
     }
 
-    /// What the logs tell of the factor that all torques have in common: an engine torque signal is a measurement of it.
+    /// How far the logs identify the factor that all torques have in common: an engine torque signal is a measurement of it.
     pub fn torque_scale_verdict(&self) -> Verdict {
         if self.available.engine_torque { Verdict::Partly } else { Verdict::NotIdentifiable }
     }
@@ -234,7 +234,7 @@ impl Fit {
         when(
             self.fill.is_some_and(|fill| fill.verdict() == Verdict::NotIdentifiable),
             &format!(
-                "for the fill volume of the oncoming clutch, which is not told by these logs, {FILL_IDENTIFIED_BY}"
+                "for the fill volume of the oncoming clutch, which is not identified by these logs, {FILL_IDENTIFIED_BY}"
             ),
         );
         when(!self.available.wheel, "for shafts, tyres and mass, log the speed of the driven wheels");

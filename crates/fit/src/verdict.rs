@@ -1,9 +1,9 @@
-//! What logs tell of a parameter.
+//! How far logs identify a parameter.
 
 /// Standard deviations on either side of a stated interval.
 pub(crate) const SIDES: f64 = 2.0;
 
-/// What logs tell of a parameter.
+/// How far logs identify a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// Its interval is less than a third of what it was.
@@ -28,8 +28,8 @@ impl Verdict {
     pub fn name(self) -> &'static str {
         match self {
             Self::Measured => "measured",
-            Self::Partly => "partly told by these logs",
-            Self::NotIdentifiable => "not told by these logs",
+            Self::Partly => "partly identified by these logs",
+            Self::NotIdentifiable => "not identified by these logs",
         }
     }
 }

@@ -35,7 +35,7 @@ fn a_backlash_lies_in_its_interval_and_goes_into_the_file() {
 }
 
 #[test]
-fn a_backlash_is_not_told_without_reversals_or_a_wheel_speed() {
+fn a_backlash_is_not_identified_without_reversals_or_a_wheel_speed() {
     let (mut car, shifts, log) = drawn();
     let mut without = log.clone();
     without.columns.retain(|column| column.name != signal::WHEEL_SPEED);
@@ -46,7 +46,7 @@ fn a_backlash_is_not_told_without_reversals_or_a_wheel_speed() {
         let fit = fitted(&car, &shifts, &car.collected(&log, "untold").driving);
         assert!(fit.backlash.as_ref().unwrap_err().contains("0 reversals"), "{:?}", fit.backlash);
         let said = fit.statements().join("\n");
-        assert!(said.contains("backlash of the driveline: not told") && said.contains("press and release"), "{said}");
+        assert!(said.contains("backlash of the driveline: not identified") && said.contains("press and release"), "{said}");
         let file = fit.vehicle_file(&car.file, "a simulation").unwrap();
         assert_eq!(file.backlash_rad, car.file.backlash_rad);
     }
@@ -84,5 +84,5 @@ fn the_speed_of_the_car_in_place_of_that_of_the_wheels_tells_no_backlash() {
     let found = fit.backlash.as_ref().unwrap();
     assert!((found.rad - car.car.backlash_rad).abs() < 2.0 * found.sd_rad, "{found:?}");
     assert_eq!(found.verdict(), Verdict::NotIdentifiable, "{found:?}");
-    assert!(fit.statements().iter().any(|line| line.starts_with("backlash of the driveline: not told, +- ")));
+    assert!(fit.statements().iter().any(|line| line.starts_with("backlash of the driveline: not identified, +- ")));
 }

@@ -1,4 +1,4 @@
-//! The fill volume of a clutch whose piston has a stroke, and logs with which it is not told.
+//! The fill volume of a clutch whose piston has a stroke, and logs with which it is not identified.
 use std::ops::ControlFlow::Continue;
 
 use crate::common::{FittedFile as _, Logs, TestCar, fitted, given};
@@ -75,7 +75,7 @@ fn the_preload_that_was_found_with_the_volume_is_written_with_it() {
 }
 
 #[test]
-fn without_a_measured_pressure_the_fill_volume_is_said_not_to_be_told() {
+fn without_a_measured_pressure_the_fill_volume_is_not_identified() {
     let mut car = TestCar::with_stroke(5);
     let mut shifts = shifts(&mut car, 2);
     shifts.iter_mut().for_each(|shift| shift.pressure = Series::default());
@@ -84,7 +84,7 @@ fn without_a_measured_pressure_the_fill_volume_is_said_not_to_be_told() {
     assert_eq!((fill.verdict(), fill.log_volume, fill.sd[0]), (Verdict::NotIdentifiable, 0.0, fill.sd[1]));
     let said = fit.statements().join("\n");
     assert!(
-        said.contains("fill volume of the oncoming clutch, which is not told by these logs, measure the pressure"),
+        said.contains("fill volume of the oncoming clutch, which is not identified by these logs, measure the pressure"),
         "{said}"
     );
     let file = fit.vehicle_file(&car.file, "a simulation").unwrap();
@@ -98,7 +98,7 @@ fn with_pressure(shifts: &[ShiftRecord], change: impl Fn(&Series) -> Series) -> 
     shifts.iter().map(changed).collect()
 }
 
-/// A pressure channel that is not what the map says: the fill volume is not told, or a warning stands in the report.
+/// A pressure channel that is not what the map says: the fill volume is not identified, or a warning stands in the report.
 #[test]
 fn a_wrong_pressure_channel_is_not_believed() {
     let mut car = TestCar::with_stroke(5);

@@ -28,7 +28,7 @@ fn driving_tells_of_the_mass_where_there_are_few_shifts() {
     assert!(found[0].abs() < 2.0 * found[1], "{found:?}");
     let said = with.statements().join("\n");
     assert!(said.contains("driving between shifts: ") && said.contains("Mass over converter capacity"), "{said}");
-    // What is not told stays as it is in the text.
+    // What is not identified stays as it is in the text.
     let file = with.vehicle_file(&car.file, "a simulation").unwrap();
     for (parameter, key) in [(Parameter::Rolling, "rolling_moment_n_m"), (Parameter::Air, "drag_coefficient")] {
         assert_eq!(with.verdict(parameter), Verdict::NotIdentifiable);

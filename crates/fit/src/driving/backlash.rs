@@ -28,7 +28,7 @@ const BEFORE_RAD: f64 = 0.1 / 3.464;
 /// Maximum backlash that the error budget of a file may have, rad.
 pub(crate) const MAX_RAD: f64 = 0.2;
 
-/// Which drive tells it.
+/// Which drive identifies it.
 const BACKLASH_IDENTIFIED_BY: &str = "press and release the accelerator in a gear on a straight road, each for 2 s, with the speed of the driven wheels logged";
 
 /// What was found of the backlash.
@@ -43,7 +43,7 @@ pub struct BacklashFit {
 }
 
 impl BacklashFit {
-    /// What the logs tell of it.
+    /// How far the logs identify it.
     pub fn verdict(&self) -> Verdict {
         Verdict::of(self.sd_rad, BEFORE_RAD)
     }
@@ -75,11 +75,11 @@ impl BacklashFit {
             ),
             Ok(found) => {
                 format!(
-                    "backlash of the driveline: not told, +- {:.3} rad; {BACKLASH_IDENTIFIED_BY}",
+                    "backlash of the driveline: not identified, +- {:.3} rad; {BACKLASH_IDENTIFIED_BY}",
                     SIDES * found.sd_rad
                 )
             }
-            Err(reason) => format!("backlash of the driveline: not told: {reason}"),
+            Err(reason) => format!("backlash of the driveline: not identified: {reason}"),
         }
     }
 }

@@ -21,7 +21,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// What the logs tell of it.
+    /// How far the logs identify it.
     pub fn verdict(&self) -> Verdict {
         Verdict::of(self.sd, self.before)
     }
@@ -31,13 +31,13 @@ impl Known {
         Self { value, sd: Real::hypot(sd, floor).min(before), before }
     }
 
-    /// Whether it is told, and more than this and its interval away from zero.
+    /// Whether it is identified, and more than this and its interval away from zero.
     pub(crate) fn is_off_by(&self, minimum: f64) -> bool {
         self.verdict() != Verdict::NotIdentifiable && self.value.abs() > (SIDES * self.sd).max(minimum)
     }
 }
 
-/// The change of the channel map for a signal that is late by this, s, where it is told and not about zero.
+/// The change of the channel map for a signal that is late by this, s, where it is identified and not about zero.
 pub(crate) fn change_of_delay(signal: &str, late_s: &Known) -> Option<MapChange> {
     late_s.is_off_by(MIN_DELAY_S).then(|| MapChange::of_delay(signal, late_s))
 }
@@ -53,7 +53,7 @@ pub(crate) fn said_of_delay(
     let [late_ms, half_ms] = [late_s.value, SIDES * late_s.sd].map(|time_s| 1e3 * time_s);
     let found = format!("{role} is {late_ms:+.1} +- {half_ms:.1} ms behind {against}");
     if late_s.verdict() == Verdict::NotIdentifiable {
-        return format!("{found}: its delay is not told by these logs; {identified_by}");
+        return format!("{found}: its delay is not identified by these logs; {identified_by}");
     }
     let ahead = if late_s.is_off_by(MIN_DELAY_S) && late_ms < 0.0 { ", ahead of it" } else { "" };
     match change {

@@ -56,7 +56,7 @@ pub struct SkewFit {
 }
 
 impl SkewFit {
-    /// By how much the readings are late, s, where it is told and not small.
+    /// By how much the readings are late, s, where it is identified and not small.
     pub(crate) fn identified_late_s(&self) -> Option<f64> {
         self.late_s.is_off_by(MIN_DELAY_S).then_some(self.late_s.value)
     }
@@ -65,9 +65,9 @@ impl SkewFit {
     pub(crate) fn statement(role: &str, found: &Result<Self, String>) -> String {
         let found = match found {
             Ok(found) => found,
-            Err(reason) => return format!("{role} against the turbine speed: delay not told: {reason}"),
+            Err(reason) => return format!("{role} against the turbine speed: delay not identified: {reason}"),
         };
-        const IDENTIFIED_BY: &str = "speeds that change in a gear would tell it";
+        const IDENTIFIED_BY: &str = "speeds that change in a gear would identify it";
         let change = change_of_delay(role, &found.late_s);
         let mut text = said_of_delay(role, "the turbine speed", &found.late_s, change.as_ref(), IDENTIFIED_BY);
         if found.scale.is_off_by(MIN_SCALE) {

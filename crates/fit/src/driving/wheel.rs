@@ -23,7 +23,7 @@ const FLOORS: [f64; 3] = [1e-4, 0.3e-3, 0.015];
 
 /// The signal in a channel map.
 const SIGNAL: &str = "wheel_speed";
-/// Which drive tells it.
+/// Which drive identifies it.
 const WHEEL_IDENTIFIED_BY: &str =
     "press and release the accelerator in a gear on a straight road, with the speed of the driven wheels logged";
 const STIFFNESS_IDENTIFIED_BY: &str =
@@ -59,7 +59,7 @@ impl WheelFit {
             Ok(found) => {
                 vec![found.said_of_scale(), found.said_of_delay(output_late_s), found.said_of_stiffness()]
             }
-            Err(reason) => vec![format!("wheel speed and drive shafts: not told: {reason}")],
+            Err(reason) => vec![format!("wheel speed and drive shafts: not identified: {reason}")],
         }
     }
 
@@ -72,7 +72,7 @@ impl WheelFit {
             self.time_s
         );
         if self.scale.verdict() == Verdict::NotIdentifiable {
-            return format!("{found}: its scale is not told by these logs; {WHEEL_IDENTIFIED_BY}");
+            return format!("{found}: its scale is not identified by these logs; {WHEEL_IDENTIFIED_BY}");
         }
         let Some(change) = self.change_of_scale() else {
             return format!("{found}: its scale and the final ratio fit together");
@@ -115,7 +115,7 @@ impl WheelFit {
         match self.stiffness.verdict() {
             Verdict::NotIdentifiable => {
                 format!(
-                    "stiffness of the drive shafts: not told by these logs, +- {half:.0} %; {STIFFNESS_IDENTIFIED_BY}"
+                    "stiffness of the drive shafts: not identified by these logs, +- {half:.0} %; {STIFFNESS_IDENTIFIED_BY}"
                 )
             }
             verdict => format!(

@@ -98,7 +98,7 @@ impl GearboxFit {
         [minimum.max(known[0]).min(of_file[0]), maximum.min(known[1]).max(of_file[1])]
     }
 
-    /// Ranges of friction and valve gain where only their product is told, beside the file that has the product as friction: what the product
+    /// Ranges of friction and valve gain where only their product is identified, beside the file that has the product as friction: what the product
     /// leaves of one where the other is anywhere in its range, and no more than was known before. Both contain 1, so that the range of the
     /// torque contains that of the file.
     fn unidentified_friction_and_gain(&self, place: usize, [friction, gain]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {

@@ -35,13 +35,13 @@ impl ChannelFits {
         }
     }
 
-    /// By how much the readings of output and engine speed are late against those of the turbine speed where it is told, s.
+    /// By how much the readings of output and engine speed are late against those of the turbine speed where it is identified, s.
     pub(crate) fn late_s(&self) -> [f64; 2] {
         let late_s = |found: Option<&SkewFit>| found.and_then(SkewFit::identified_late_s).unwrap_or(0.0);
         [late_s(self.output.as_ref().ok()), late_s(self.engine.as_ref().and_then(|found| found.as_ref().ok()))]
     }
 
-    /// By how much the readings of the output speed are late, s, where it is told and not small.
+    /// By how much the readings of the output speed are late, s, where it is identified and not small.
     pub(crate) fn output_late_s(&self) -> Option<Known> {
         self.output.as_ref().ok().map(|found| found.late_s).filter(|late_s| late_s.is_off_by(MIN_DELAY_S))
     }

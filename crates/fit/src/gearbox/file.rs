@@ -32,7 +32,7 @@ pub struct GivenFile<'a> {
 
 impl GearboxFit {
     /// The text of the vehicle file with the fitted values, as it is to stand at `path`. Elements and pairs of gears without a fitted
-    /// shift stay as they are. What is not told singly changes too: its ratio to the others may be told. Every value that changes has a
+    /// shift stay as they are. What is not identified singly changes too: its ratio to the others may be identified. Every value that changes has a
     /// comment with its interval. An inertia that the logs do not tell and draw far off stays too. `logs` are named at the head of the
     /// file. Where shifts were held out, `checked` says how far the filter of `estimate` may trust the valves.
     ///

@@ -313,7 +313,7 @@ impl GearboxFit {
         along.dot(&(&self.stated * &along)).max(0.0).sqrt()
     }
 
-    /// What the logs tell of a quantity.
+    /// How far the logs identify a quantity.
     pub fn verdict(&self, quantity: Quantity) -> Verdict {
         let Some(place) = self.quantities.place(quantity) else { return Verdict::NotIdentifiable };
         Verdict::of(self.sd(quantity), self.quantities.sd_before(place))
@@ -341,7 +341,7 @@ impl GearboxFit {
         (of(torque, torque) + of(gain, gain) - 2.0 * of(torque, gain)).max(0.0).sqrt()
     }
 
-    /// What the logs tell of it.
+    /// How far the logs identify it.
     pub(crate) fn friction_verdict(&self, place: usize) -> Verdict {
         Verdict::of(self.friction_sd(place), self.friction_sd_of(place, &self.quantities.before))
     }
@@ -402,7 +402,7 @@ mod tests {
         assert_eq!((drawn_off, x), (vec![(3, 3.4 * before)], 0.0));
         assert_eq!(stated[(place, place)], before * before);
         assert_eq!(stated.column(place).iter().filter(|value| **value != 0.0).count(), 1);
-        // What is told, and what lies within what was known before, stays.
+        // What is identified, and what lies within what was known before, stays.
         for (x, after) in [(3.4, 0.5), (1.9, 1.0), (-1.9, 1.0)] {
             assert_eq!((found(x, after).0, found(x, after).1), (Vec::new(), x * before));
         }

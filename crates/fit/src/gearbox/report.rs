@@ -16,7 +16,7 @@ const MISFIT: f64 = 2.0;
 /// Standard deviations on either side that 99.9 % lie within: 5 % over some 40 quantities.
 const SIDES_OF_ALL: f64 = 3.3;
 
-/// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
+/// What no shift tells, or no fit looks for, and which manoeuvre would identify it.
 const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, damping of the drive shafts, tyres, hysteresis of the valves and the shapes of all maps. \
      The intervals contain what a hysteresis within the error bounds may do; a smaller `valve_hysteresis_pa` there, where it is known, narrows them";
 
@@ -75,14 +75,14 @@ impl GearboxFit {
             Quantity::Torque(at) | Quantity::Kiss(at) | Quantity::Lag(at) => self.elements_seen[at],
             Quantity::Delay(at) => self.elements_seen[at],
             Quantity::Gain(at) => self.quantities.measured[at],
-            // Of one that is always open or held in these shifts the drag may be told too.
+            // Of one that is always open or held in these shifts the drag may be identified too.
             Quantity::Drag(at) => self.elements_seen[at] || self.is_identifiable(quantity),
             Quantity::Inertia(at) => self.by_pair[at].iter().any(|count| *count > 0),
             _ => true,
         }
     }
 
-    /// What is to be said besides the table: torque scale, what is not told, misfit, and which drive would tell more.
+    /// What is to be said besides the table: torque scale, what is not identified, misfit, and which drive would tell more.
     pub fn statements(&self) -> Vec<String> {
         let scale = 100.0 * SIDES * self.torque_scale_sd();
         let beside = |at: usize| {
@@ -93,7 +93,7 @@ impl GearboxFit {
             (0..self.elements_seen.len()).filter(|at| self.elements_seen[*at]).map(beside).collect();
         let mut lines = vec![
             format!(
-                "torque scale: not told by these logs, +- {scale:.1} %. Speeds fix the ratios of all torques and inertias and not their common \
+                "torque scale: not identified by these logs, +- {scale:.1} %. Speeds fix the ratios of all torques and inertias and not their common \
                  factor; it comes from what was known before of {} together, and is in every interval",
                 self.anchors()
             ),
@@ -162,7 +162,7 @@ impl GearboxFit {
                 beside(Quantity::Mass)
             )),
             Some(reason) => lines.push(format!(
-                "mass and road load are not told by these logs: {reason}. Accelerating and rolling in gear without the brake would tell them"
+                "mass and road load are not identified by these logs: {reason}. Accelerating and rolling in gear without the brake would identify them"
             )),
         }
         match self.balances.reason(Balance::Engine) {
@@ -184,7 +184,7 @@ impl GearboxFit {
         self.quantities.place(quantity).map_or(f64::NAN, |place| self.quantities.sd_before(place))
     }
 
-    /// Of which elements friction and gain are told apart.
+    /// Of which elements friction and gain are identified separately.
     fn said_of_gain(&self) -> String {
         let names = |is_measured: bool| {
             let elements = self.quantities.elements.iter().enumerate();
@@ -195,13 +195,13 @@ impl GearboxFit {
         let (measured, others) = (names(true), names(false));
         let mut text = String::new();
         if !measured.is_empty() {
-            text += &format!("the measured pressure tells friction and valve gain apart of {measured}");
+            text += &format!("the measured pressure identifies friction and valve gain separately for {measured}");
         }
         if !others.is_empty() {
             let between = if text.is_empty() { "" } else { "; " };
             text += &format!(
-                "{between}friction and valve gain are not told apart of {others}: their product stands in the file as friction, and the kiss \
-                 point is that of the valve's maps. A measured pressure of an element would tell them"
+                "{between}friction and valve gain are not identified separately for {others}: their product stands in the file as friction, and the kiss \
+                 point is that of the valve's maps. A measured pressure of an element would identify them"
             );
         }
         text
@@ -209,7 +209,7 @@ impl GearboxFit {
 
     /// Delays of output and engine speed, for the channel map.
     fn said_of_channels(&self) -> Vec<String> {
-        const IDENTIFIED_BY: &str = "shifts in which the engine changes its speed quickly would tell it";
+        const IDENTIFIED_BY: &str = "shifts in which the engine changes its speed quickly would identify it";
         let mut lines = self.channels.statements();
         let engine = self.engine_late_s();
         lines.extend(engine.map(|late_s| {
@@ -258,9 +258,9 @@ impl GearboxFit {
         let kept: Vec<String> = self.drawn_off.iter().map(name).collect();
         (!kept.is_empty()).then(|| {
             format!(
-                "M11 of {} stays as in the given file: these logs do not tell it, and what they draw it to is outside of what was known before. Where the \
+                "M11 of {} stays as in the given file: these logs do not identify it, and the value that they lead to is outside of what was known before. Where the \
                  turbine changes its speed slowly it is what small errors of large torques leave, as of a hysteresis. A smaller \
-                 `valve_hysteresis_pa` in the error bounds, where it is known, or quicker shifts would tell it",
+                 `valve_hysteresis_pa` in the error bounds, where it is known, or quicker shifts would identify it",
                 kept.join(", ")
             )
         })
@@ -362,7 +362,7 @@ impl GearboxFit {
         let fill = open.map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         if !fill.is_empty() {
             lines.push(format!(
-                "to know more: for the fill volume of {fill}, which is not told by these logs, {FILL_IDENTIFIED_BY}"
+                "to know more: for the fill volume of {fill}, which is not identified by these logs, {FILL_IDENTIFIED_BY}"
             ));
         }
         if !torque.is_empty() {

@@ -87,12 +87,12 @@ fn what_the_wheel_speed_does_not_tell_stays_as_in_the_file_and_is_said() {
     };
     let usual = of(&recorded.driving);
     let said = usual.statements().join("\n");
-    assert!(said.contains("stiffness of the drive shafts: not told by these logs"), "{said}");
+    assert!(said.contains("stiffness of the drive shafts: not identified by these logs"), "{said}");
     assert!(said.contains("its scale and the final ratio fit together") && said.contains("they belong together"));
     let none = of(&Driving::default());
     let said = none.statements().join("\n");
     assert!(
-        said.contains("wheel speed and drive shafts: not told: 0 s of driving in a gear with a wheel speed"),
+        said.contains("wheel speed and drive shafts: not identified: 0 s of driving in a gear with a wheel speed"),
         "{said}"
     );
     for fit in [&usual, &none] {

@@ -82,7 +82,7 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
             assert!(error.abs() <= 2.0 * sd, "{seed} {quantity:?}: {error} {sd}");
         }
         assert_ne!(with.verdict(Quantity::Mass), Verdict::NotIdentifiable, "{seed}");
-        // Not what verdicts call "not told".
+        // Not what verdicts call "not identified".
         let before = with.quantities.sd_before(with.quantities.place(Quantity::Mass).unwrap());
         assert!(with.sd_beside_scale(Quantity::Mass) < 0.7 * before, "{}", with.sd_beside_scale(Quantity::Mass));
         // More is known of the common factor of all torques.
@@ -95,7 +95,7 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
         let factor = with.unknown(Quantity::Mass).exp();
         assert!((file.road.mass_kg / drawn.file.road.mass_kg / factor - 1.0).abs() < 1e-3);
         assert!(file.error_bounds.mass_share.is_some_and(|fraction| fraction < 0.25), "{:?}", file.error_bounds);
-        // What is not told stays as it is in the text.
+        // What is not identified stays as it is in the text.
         for (quantity, key) in
             [(Quantity::EngineInertia, "inertia_kg_m2 = "), (Quantity::Rolling, "rolling_moment_n_m")]
         {
@@ -160,7 +160,7 @@ fn a_reported_torque_that_is_none_is_left_out_and_said() {
 }
 
 #[test]
-fn a_log_without_driving_says_that_mass_is_not_told() {
+fn a_log_without_driving_says_that_mass_is_not_identified() {
     let drawn = Drawn::of(car("eight_speed.toml"), 25, Case::Usual);
     let rows = rows(&drawn);
     let (usual, said) = changed(&drawn, &rows, |_, _| ());
@@ -169,7 +169,7 @@ fn a_log_without_driving_says_that_mass_is_not_told() {
         fit(&drawn.file, &drawn.tables(), &recorded(&drawn, &rows).shifts, &Driving::default(), &mut |_| Continue(()))
             .unwrap();
     let said = alone.statements().join("\n");
-    assert!(said.contains("mass and road load are not told by these logs: 0 s of driving"), "{said}");
+    assert!(said.contains("mass and road load are not identified by these logs: 0 s of driving"), "{said}");
     assert_eq!(alone.quantities.place(Quantity::Mass), None);
     assert!(alone.report().iter().all(|row| row.name != "mass"));
     // A wheel speed that is off is not used.

@@ -159,7 +159,7 @@ fn one_shift_tells_little_and_says_so() {
         assert!(fit.sd(*quantity) <= 1.000_001 * before(place), "{quantity:?}");
     }
     let said = fit.statements().join("\n");
-    for words in ["one shift only", "torque scale: not told", "no fitted shift has", "drive shifts between gears"] {
+    for words in ["one shift only", "torque scale: not identified", "no fitted shift has", "drive shifts between gears"] {
         assert!(said.contains(words), "{words}: {said}");
     }
     assert!(fit.report().iter().all(|row| !row.name.starts_with("B:")), "{:?}", fit.report());
@@ -340,7 +340,7 @@ fn a_measured_pressure_tells_friction_and_gain_apart() {
     let friction = |car: &Car| car.clutches[at].unwrap().clutch.friction.at(50.0);
     let product = with.unknown(Quantity::Torque(place)) - with.unknown(gain);
     assert!((friction(&found) / friction(&before) / product.exp() - 1.0).abs() < 1e-3);
-    let said = [&without, &with].map(|fit| fit.statements().join("\n").contains("gain apart of C"));
+    let said = [&without, &with].map(|fit| fit.statements().join("\n").contains("gain separately for C"));
     assert_eq!(said, [false, true]);
     assert!(with.report().iter().any(|row| row.name == "C: valve gain"), "{:?}", with.report());
 
