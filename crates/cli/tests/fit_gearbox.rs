@@ -86,7 +86,10 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let stroke = format!("{ROOT}vehicles/eight_speed_stroke.toml");
     let output = wetclutch(&["fit", &log, "--vehicle", &stroke, "-o", &folder.path("stroke.toml")]);
     let text = printed(&output);
-    assert!(text.contains("E: fill volume") && text.contains("not identified by these logs, measure the pressure"), "{text}");
+    assert!(
+        text.contains("E: fill volume") && text.contains("not identified by these logs, measure the pressure"),
+        "{text}"
+    );
     assert!(folder.read("stroke.toml").contains("[clutch.E.fill]\n"), "{}", folder.read("stroke.toml"));
 }
 

@@ -149,7 +149,7 @@ impl<'a> Check<'a> {
     ) -> Result<[f64; 2], ConfigError> {
         match *self.numbers(&key, values, range)? {
             [minimum, maximum] if minimum <= maximum => Ok([minimum, maximum]),
-            _ => Err(self.meaning(&key, values.span().start, "expected [least, greatest]".to_owned(), None)),
+            _ => Err(self.meaning(&key, values.span().start, "expected [minimum, maximum]".to_owned(), None)),
         }
     }
 

@@ -117,7 +117,7 @@ fn a_default_that_cannot_be_right_names_the_file_and_the_numbers_that_it_follows
     let numbers = "[engine]\nmax_torque_n_m = 2000\n[vehicle]\nmass_kg = 60e3\nwheel_radius_m = 1.0\n";
     let message = car(numbers).map(|_| "a car").unwrap_err();
     assert!(message.starts_with("car.toml:4: `driveline.wheel_inertia_kg_m2`: its default"), "{message}");
-    assert!(message.contains("hint: check the greatest engine torque"), "{message}");
+    assert!(message.contains("hint: check the maximum engine torque"), "{message}");
     assert!(car(&format!("{numbers}[driveline]\nwheel_inertia_kg_m2 = 900\n")).is_ok());
 }
 

@@ -46,7 +46,10 @@ fn a_backlash_is_not_identified_without_reversals_or_a_wheel_speed() {
         let fit = fitted(&car, &shifts, &car.collected(&log, "untold").driving);
         assert!(fit.backlash.as_ref().unwrap_err().contains("0 reversals"), "{:?}", fit.backlash);
         let said = fit.statements().join("\n");
-        assert!(said.contains("backlash of the driveline: not identified") && said.contains("press and release"), "{said}");
+        assert!(
+            said.contains("backlash of the driveline: not identified") && said.contains("press and release"),
+            "{said}"
+        );
         let file = fit.vehicle_file(&car.file, "a simulation").unwrap();
         assert_eq!(file.backlash_rad, car.file.backlash_rad);
     }

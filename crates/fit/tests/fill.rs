@@ -84,7 +84,9 @@ fn without_a_measured_pressure_the_fill_volume_is_not_identified() {
     assert_eq!((fill.verdict(), fill.log_volume, fill.sd[0]), (Verdict::NotIdentifiable, 0.0, fill.sd[1]));
     let said = fit.statements().join("\n");
     assert!(
-        said.contains("fill volume of the oncoming clutch, which is not identified by these logs, measure the pressure"),
+        said.contains(
+            "fill volume of the oncoming clutch, which is not identified by these logs, measure the pressure"
+        ),
         "{said}"
     );
     let file = fit.vehicle_file(&car.file, "a simulation").unwrap();

@@ -211,7 +211,7 @@ pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
                 continue;
             }
             let reference = of.name.as_str();
-            let why = format!("its greatest value is {ratio:.2} times that of {reference}; it looks like {likely}");
+            let why = format!("its maximum value is {ratio:.2} times that of {reference}; it looks like {likely}");
             findings.push(finding(entry, unit, &why, likely));
         }
         if of.extremes.is_forward() && entry.extremes.is_backward() {
@@ -231,7 +231,7 @@ fn slow_output(output: &RoleSummary, wheel: &RoleSummary, summary: &[RoleSummary
     let likely = if output.unit_name == "rpm" { "rad/s" } else { "another unit or scale" };
     let (of_wheel, of_turbine) = (&wheel.name, &turbine.name);
     let why = format!(
-        "the greatest value of {of_wheel} is {by_wheel:.2} times its own, and that of {of_turbine} {by_turbine:.1} times; it looks like {likely}"
+        "the maximum value of {of_wheel} is {by_wheel:.2} times its own, and that of {of_turbine} {by_turbine:.1} times; it looks like {likely}"
     );
     let is_slow = wheel.role == Role::WheelSpeed && by_turbine > MAX_RATIO;
     is_slow.then(|| finding(output, &output.unit_name, &why, likely))
@@ -279,28 +279,26 @@ fn alone(entry: &RoleSummary, summary: &[RoleSummary], seen: Seen) -> Option<Fin
     let (size, unit) = (entry.extremes.size(), entry.unit_name.as_str());
     let say = |text: String, likely| Some(finding(entry, unit, &format!("{text}; it looks like {likely}"), likely));
     match entry.role.quantity()? {
-        Quantity::Current if unit == "A" && size > 10.0 => {
-            say(format!("its greatest value would be {size:.0} A"), "mA")
-        }
+        Quantity::Current if unit == "A" && size > 10.0 => say(format!("its maximum value would be {size:.0} A"), "mA"),
         Quantity::Rotation
             if entry.extremes.speed() > 2000.0 || entry.role == Role::EngineSpeed && middle > ENGINE_RAD_S =>
         {
             say(format!("most values would be about {:.0} rpm", rpm(middle)), slower(unit, middle))
         }
         Quantity::Fraction if unit == "1" && size > 1.5 && !is_duty(entry.role) => {
-            say(format!("its greatest value is {size:.1}"), "%")
+            say(format!("its maximum value is {size:.1}"), "%")
         }
         Quantity::Fraction if unit == "1" && is_duty(entry.role) && size > 150.0 => {
-            say(format!("its greatest value is {:.1}", size / 100.0), "%")
+            say(format!("its maximum value is {:.1}", size / 100.0), "%")
         }
         Quantity::Pressure if size > 20e6 => {
-            say(format!("its greatest value would be {:.0} MPa", mpa(size)), "a smaller unit (bar, kPa or Pa)")
+            say(format!("its maximum value would be {:.0} MPa", mpa(size)), "a smaller unit (bar, kPa or Pa)")
         }
         Quantity::Velocity if size > 120.0 => {
-            say(format!("its greatest value would be {:.0} km/h", 3.6 * size), "a smaller unit (km/h)")
+            say(format!("its maximum value would be {:.0} km/h", 3.6 * size), "a smaller unit (km/h)")
         }
         Quantity::Torque if size > 20e3 => {
-            say(format!("its greatest value would be {size:.0} N m"), "a share or raw value; give `scale`")
+            say(format!("its maximum value would be {size:.0} N m"), "a fraction or raw value; give `scale`")
         }
         // What follows is too small, or never of the right sign, which only a whole log shows.
         _ if seen == Seen::Beginning => None,
@@ -317,12 +315,12 @@ fn alone(entry: &RoleSummary, summary: &[RoleSummary], seen: Seen) -> Option<Fin
         // That of an element which no shift applies is small in any unit, and the others of its kind tell.
         Quantity::Current | Quantity::Pressure if max_of_kind(entry, summary) > size => None,
         Quantity::Current if unit == "mA" && size < 0.003 => {
-            say(format!("its greatest value would be {:.3} mA", 1e3 * size), "A")
+            say(format!("its maximum value would be {:.3} mA", 1e3 * size), "A")
         }
         // No other element is measured, and this one may not be applied.
         Quantity::Pressure if entry.role == Role::ElementPressure && !(0.3..100.0).contains(&size) => None,
         Quantity::Pressure if size < 5e3 => {
-            say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
+            say(format!("its maximum value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
         }
         _ => None,
     }

@@ -203,7 +203,7 @@ impl<'a> Readings<'a> {
                     format!("{message}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`")
                 }
                 Likely::OtherChannel => format!(
-                    "{message}\nhint: check that `channel.{name}.name` is this signal and that its sensor works; `wetclutch inspect` shows least and greatest values"
+                    "{message}\nhint: check that `channel.{name}.name` is this signal and that its sensor works; `wetclutch inspect` shows minimum and maximum values"
                 ),
                 Likely::OtherSign => format!("{message}\nhint: set `channel.{name}.scale` to a negative number"),
             })),

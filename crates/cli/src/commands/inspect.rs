@@ -188,7 +188,7 @@ fn channels(log: &Log, inspection: &Inspection) -> Result<(), Failure> {
             .chain(faulty.then_some(faults))
             .collect::<Vec<_>>()
     };
-    let titles = ["channel", "unit", "samples", "Hz", "from s", "to s", "least", "greatest", "longest gap s"];
+    let titles = ["channel", "unit", "samples", "Hz", "from s", "to s", "minimum", "maximum", "longest gap s"];
     let row = |(channel, summary): (&Channel, &ChannelSummary)| {
         let span = |i: usize| summary.span_s.map_or(String::new(), |span_s| format!("{:.2}", span_s[i] - origin_s));
         let range = |i: usize| summary.range.map_or(String::new(), |range| short(range[i]));

@@ -159,7 +159,8 @@ fn one_shift_tells_little_and_says_so() {
         assert!(fit.sd(*quantity) <= 1.000_001 * before(place), "{quantity:?}");
     }
     let said = fit.statements().join("\n");
-    for words in ["one shift only", "torque scale: not identified", "no fitted shift has", "drive shifts between gears"] {
+    for words in ["one shift only", "torque scale: not identified", "no fitted shift has", "drive shifts between gears"]
+    {
         assert!(said.contains(words), "{words}: {said}");
     }
     assert!(fit.report().iter().all(|row| !row.name.starts_with("B:")), "{:?}", fit.report());
@@ -239,7 +240,7 @@ fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
         ("[turbine_inertia_kg_m2]\n\"1-2\" = -1", "1-2"),
         ("[clutch.E]\nreturn_spring_n = -5", "clutch.E.return_spring_n"),
         ("[clutch.E.error_bounds]\nfriction_factor = [1.1, 1.2]", "does not contain 1"),
-        ("[clutch.E.error_bounds]\nvalve_delay_s = [0.03, 0.0]", "expected [least, greatest]"),
+        ("[clutch.E.error_bounds]\nvalve_delay_s = [0.03, 0.0]", "expected [minimum, maximum]"),
         ("[clutch.E.error_bounds]\nvalve_hysteresis_pa = -1", "clutch.E.error_bounds.valve_hysteresis_pa"),
         ("[clutch.E.error_bounds]\nfriction = 0.1", "unknown field"),
         ("[error_bounds]\nconverter_share = 2", "error_bounds.converter_share"),

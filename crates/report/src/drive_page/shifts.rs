@@ -48,7 +48,7 @@ const COLUMNS: &[Column] = &[
     column("past new gear rad/s", "largest slip of the turbine beyond the speed of the new gear", |s, _| {
         number(s.quality.past_synchronous_rad_s, 1)
     }),
-    column("jerk m/s^3", "greatest jerk of the car, from parabolas over 0.3 s of its speed", |s, _| {
+    column("jerk m/s^3", "maximum jerk of the car, from parabolas over 0.3 s of its speed", |s, _| {
         if s.quality.jerk_m_s3.is_nan() { String::new() } else { number(s.quality.jerk_m_s3, 1) }
     }),
     column(

@@ -232,7 +232,7 @@ mod tests {
             message.contains("`clutch.a.mean_radius_m`: its default for the numbers of this file is "),
             "{message}"
         );
-        assert!(message.contains("hint: check the greatest engine torque, the ratios"), "{message}");
+        assert!(message.contains("hint: check the maximum engine torque, the ratios"), "{message}");
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub use uncertainty::Uncertainty;
 const DEFAULTS: &str = include_str!("defaults.toml");
 
 /// What to do about a default that cannot be right.
-const NUMBERS: &str = "check the greatest engine torque, the ratios, the mass and the wheel radius; if they are right, give this key a value of your own";
+const NUMBERS: &str = "check the maximum engine torque, the ratios, the mass and the wheel radius; if they are right, give this key a value of your own";
 
 /// A short file with the defaults under it.
 pub(super) struct Short {

@@ -63,7 +63,7 @@ pub(crate) fn refused(unusable: Unusable, path: &Path) -> Error {
         }
         _ => {
             "check the units and scales of turbine_speed and output_speed, the gear, and whether this is the vehicle file of the car; `wetclutch \
-             inspect` shows least and greatest values, and with --shifts whether the ratios fit the gears"
+             inspect` shows minimum and maximum values, and with --shifts whether the ratios fit the gears"
         }
     };
     Error::Input(format!(

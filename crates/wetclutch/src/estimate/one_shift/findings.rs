@@ -164,7 +164,7 @@ impl Findings {
                 return Err(Error::Input(format!(
                     "{} of {} readings of {name} were refused: they are impossible for this car, or contradict the other \
                      signals\nhint: check the unit, scale and sign of {name}, and whether the vehicle file is of this car; \
-                     `wetclutch inspect` shows least and greatest values",
+                     `wetclutch inspect` shows minimum and maximum values",
                     grouped(came - taken),
                     grouped(came)
                 )));
@@ -195,7 +195,7 @@ impl Findings {
         let worst = impossible.iter().max_by_key(|health| of(health)).map_or("", |health| health.name());
         Err(Error::Input(format!(
             "{} of {} estimates are impossible for this car, most of them `{worst}`\nhint: a channel with a wrong scale does this, \
-             another car than that of the vehicle file, and a log of other gears; `wetclutch inspect` shows least and greatest values, \
+             another car than that of the vehicle file, and a log of other gears; `wetclutch inspect` shows minimum and maximum values, \
              and a channel map with `gearbox.ratios` tells the gears apart",
             grouped(count),
             grouped(self.rows)
