@@ -29,7 +29,7 @@ pub use error::ExportError;
 pub use exported_file::ExportedFile;
 pub use exported_filter::{ExportOptions, ExportedFilter};
 pub use parameters::{Entry, Image, Values};
-pub use shift_inputs::{shift_inputs, single};
+pub use shift_inputs::shift_inputs;
 
 /// The files of a car's observer.
 ///

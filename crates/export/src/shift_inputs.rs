@@ -1,6 +1,6 @@
 //! A simulated shift as the controller reads it.
 
-use car::{Car, Reading, Sensors};
+use car::{Car, Sensors};
 use evaluate::EvaluateError;
 use evaluate::score::{inputs, simulated};
 use observer::ShiftTables;
@@ -21,21 +21,5 @@ pub fn shift_inputs(
     (sensors, seed): (&Sensors, u64),
 ) -> Result<Vec<ShiftInput<f32>>, EvaluateError> {
     let samples = simulated(known, truth, &CarShift::usual(known, from, to, POWER_ON))?;
-    Ok(inputs(known, tables, &samples, sensors, seed).iter().map(|(_, input)| single(input)).collect())
-}
-
-/// An input in single precision.
-pub fn single(input: &ShiftInput<f64>) -> ShiftInput<f32> {
-    let to = |reading: Option<Reading<f64>>| reading.map(|reading| reading.cast());
-    ShiftInput {
-        dt_s: input.dt_s as f32,
-        engine_rad_s: to(input.engine_rad_s),
-        turbine_rad_s: to(input.turbine_rad_s),
-        output_rad_s: to(input.output_rad_s),
-        wheel_rad_s: to(input.wheel_rad_s),
-        engine_n_m: to(input.engine_n_m),
-        lock_up_applied: input.lock_up_applied,
-        commands: input.commands.map(to),
-        gear: input.gear,
-    }
+    Ok(inputs(known, tables, &samples, sensors, seed).iter().map(|(_, input)| input.cast()).collect())
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use car::{Drive, Sensors};
 use config::{CarFile, DriveFile, ExperimentFile};
 use evaluate::measured::SensedDrive;
-use export::{ExportOptions, ExportedFilter, shift_inputs, single};
+use export::{ExportOptions, ExportedFilter, shift_inputs};
 use observer::gearbox::ShiftInput;
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 use study::gearbox::matrix::drawn_car;
@@ -34,7 +34,7 @@ pub(crate) fn city(filter: &ExportedFilter) -> Vec<ShiftInput<f32>> {
     let recorded = Drive { sample_time_s: sensed.record_s(), ..drive };
     let mut inputs = Vec::new();
     let model = CarModel::new(filter.car.clone()).unwrap();
-    let mut take = |row: &evaluate::measured::MeasuredRow| inputs.push(single(&row.input(&filter.car, &filter.tables)));
+    let mut take = |row: &evaluate::measured::MeasuredRow| inputs.push(row.input(&filter.car, &filter.tables).cast());
     simulate_car_drive(&model, &filter.car, CarCalibration::STANDARD, &recorded, |sample| {
         sensed.each(sample, &mut take)
     })

@@ -6,6 +6,7 @@ use evaluate::{ClutchRow, ShiftScoreRow, SquaredErrors, TruePhase};
 use observer::Health;
 use trace::signal;
 
+use crate::estimate::gearbox::columns::CLUTCH;
 use crate::{Error, Table};
 
 /// Slip below which a true clutch sticks, rad/s.
@@ -84,7 +85,7 @@ fn rows(truth: &Table, estimates: &Table) -> Result<Vec<ShiftScoreRow>, Error> {
     let mut of_estimates = Vec::new();
     for role in ["offgoing", "oncoming"] {
         let mut columns = Vec::new();
-        for what in COLUMNS {
+        for what in &CLUTCH[..8] {
             columns.push(found_of(&format!("{role}_{what}"))?);
         }
         of_estimates.push(columns);
@@ -118,18 +119,6 @@ fn rows(truth: &Table, estimates: &Table) -> Result<Vec<ShiftScoreRow>, Error> {
     }
     Ok(rows)
 }
-
-/// The columns of a clutch in a table of estimates, after its role.
-const COLUMNS: [&str; 8] = [
-    "pressure_estimate_pa",
-    "pressure_least_pa",
-    "pressure_greatest_pa",
-    "torque_estimate_n_m",
-    "torque_least_n_m",
-    "torque_greatest_n_m",
-    "valve_model_pressure_pa",
-    "valve_model_torque_n_m",
-];
 
 /// A clutch at one time; `None` where truth or estimate is not there.
 fn clutch_row([pressure_pa, torque_n_m, slip_rad_s]: [f64; 3], found: &[f64]) -> Option<ClutchRow> {

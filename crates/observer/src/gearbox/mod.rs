@@ -167,6 +167,24 @@ pub struct ShiftInput<T> {
     pub gear: ShiftCommand,
 }
 
+impl<T: Real> ShiftInput<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> ShiftInput<U> {
+        let to = |reading: Option<Reading<T>>| reading.map(|reading| reading.cast());
+        ShiftInput {
+            dt_s: U::of(self.dt_s.to_f64_exact()),
+            engine_rad_s: to(self.engine_rad_s),
+            turbine_rad_s: to(self.turbine_rad_s),
+            output_rad_s: to(self.output_rad_s),
+            wheel_rad_s: to(self.wheel_rad_s),
+            engine_n_m: to(self.engine_n_m),
+            lock_up_applied: self.lock_up_applied,
+            commands: self.commands.map(to),
+            gear: self.gear,
+        }
+    }
+}
+
 /// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GearboxFilter<'a, T> {

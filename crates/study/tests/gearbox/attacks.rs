@@ -393,7 +393,7 @@ fn single_precision_estimates_the_same() {
             });
             steps += inputs.len() as f64;
             for ((_, input), estimate) in inputs.iter().zip(estimates) {
-                let rounded = single.step(&mut single_state, &cast(input));
+                let rounded = single.step(&mut single_state, &input.cast());
                 if let (Some(clutch), Some(other)) = (estimate.input_clutch, rounded.input_clutch) {
                     input_clutches += 1;
                     of_input_clutch = of_input_clutch.max((clutch.torque_n_m - f64::from(other.torque_n_m)).abs());
@@ -416,24 +416,6 @@ fn single_precision_estimates_the_same() {
     println!("clutch between engine and gearbox: largest {of_input_clutch:.3} N m of {input_clutches} steps");
     // Torques of some 100 N m in numbers of seven digits.
     assert!(input_clutches > 100 && of_input_clutch < 0.1, "{input_clutches} {of_input_clutch}");
-}
-
-// Rounding is the purpose.
-pub(crate) fn cast(input: &ShiftInput<f64>) -> ShiftInput<f32> {
-    let to = |reading: Option<Reading<f64>>| {
-        reading.map(|reading| Reading { value: reading.value as f32, age_s: reading.age_s as f32 })
-    };
-    ShiftInput {
-        dt_s: input.dt_s as f32,
-        engine_rad_s: to(input.engine_rad_s),
-        turbine_rad_s: to(input.turbine_rad_s),
-        output_rad_s: to(input.output_rad_s),
-        wheel_rad_s: to(input.wheel_rad_s),
-        engine_n_m: to(input.engine_n_m),
-        lock_up_applied: input.lock_up_applied,
-        commands: input.commands.map(to),
-        gear: input.gear,
-    }
 }
 
 /// A gear that the tables do not have is said to be none the filter can use, and no element is accused of slip; a command

@@ -15,7 +15,6 @@ use study::gearbox::tour::drive_tour;
 use study::gearbox::{inputs, score_samples, simulated};
 
 use super::PHASES;
-use super::attacks::cast;
 use super::cars::{cars, sensors};
 
 /// The wheel speed that the filter is given.
@@ -321,7 +320,7 @@ fn single_precision_learns_the_same_scale() {
         let (mut state, mut single_state) = (filter.start(), single.start());
         for input in known.inputs(scaled(scale)) {
             filter.step(&mut state, &input);
-            single.step(&mut single_state, &cast(&input));
+            single.step(&mut single_state, &input.cast());
         }
         let [found, _] = learnt(&filter, &state);
         let [rounded, _] = single.learnt_wheel_scale(single_state.learnt());

@@ -101,7 +101,7 @@ impl<'a> Row<'a> {
 }
 
 /// The columns of a clutch, after `offgoing_` or `oncoming_`.
-const CLUTCH: [&str; 11] = [
+pub(crate) const CLUTCH: [&str; 11] = [
     "pressure_estimate_pa",
     "pressure_least_pa",
     "pressure_greatest_pa",
