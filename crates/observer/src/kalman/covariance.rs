@@ -4,7 +4,7 @@ use drivetrain::Real;
 
 use super::past::SPEEDS;
 use super::powertrain::{COLUMNS, LAWS, Tangent};
-use super::{DELAY, FRACTION, FRICTION, GAIN, N, OFFGOING, PRESSURE, SCALE, SKEW, WHEEL};
+use super::states::{DELAY, FRACTION, FRICTION, GAIN, N, OFFGOING, PRESSURE, SCALE, SKEW, WHEEL};
 
 /// States of which a correction may take a fraction only: the last ones, from [`FRACTION`] on.
 pub(super) const CONSIDERED: usize = N - FRACTION;
@@ -337,7 +337,7 @@ fn subtract_square<T: Real>(upper: &mut [[T; N]; N], x: &[T; N], left: &[T; CONS
 #[cfg(test)]
 mod tests {
     use super::super::powertrain::tests::step;
-    use super::super::{LOAD, OUTPUT, SPRING, TURBINE};
+    use super::super::states::{LOAD, OUTPUT, SPRING, TURBINE};
     use super::*;
 
     /// States, and after them the earlier speeds.

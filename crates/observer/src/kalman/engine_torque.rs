@@ -8,7 +8,8 @@ use drivetrain::Real;
 use super::covariance::CONSIDERED;
 use super::engine::Engine;
 use super::past::SPEEDS;
-use super::{FRACTION, KalmanFilter, KalmanState, TURBINE};
+use super::states::{FRACTION, TURBINE};
+use super::{KalmanFilter, KalmanState};
 use crate::{ChannelHealth, Input, LOST_S, Reading};
 
 /// Time within which the filter of the engine speed finds a new acceleration, s \[chosen\].

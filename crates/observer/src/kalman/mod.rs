@@ -41,6 +41,7 @@ mod phases;
 mod powertrain;
 mod predict;
 mod readings;
+mod states;
 pub(crate) mod valve_model;
 
 use drivetrain::{Engagement, Real, ShiftCoefficients};
@@ -55,36 +56,15 @@ use engine_torque::LastTorque;
 use gate::Gate;
 use offgoing::OffgoingPressure;
 use past::Past;
+use states::{FRICTION, LEARNT, N, OUTPUT, PIECE_S, PRESSURE, SPRING, TURBINE, WHEEL};
 use valve_model::Commands;
 
 pub use engine::EngineNoise;
 pub use engine_torque::ReportedTorque;
 pub use offgoing::OffgoingClutch;
 pub use parameters::{SpeedReading, Uncertainty};
+pub use states::STATES;
 pub use valve_model::ValveModel;
-
-const N: usize = 13;
-const TURBINE: usize = 0;
-const OUTPUT: usize = 1;
-const WHEEL: usize = 2;
-const SPRING: usize = 3;
-const PRESSURE: usize = 4;
-const OFFGOING: usize = 5;
-const LOAD: usize = 6;
-const FRACTION: usize = 7;
-const FRICTION: usize = 8;
-const GAIN: usize = 9;
-const SCALE: usize = 10;
-const DELAY: usize = 11;
-const SKEW: usize = 12;
-
-/// What the filter learns and keeps from shift to shift.
-const LEARNT: [usize; 5] = [FRICTION, GAIN, SCALE, DELAY, SKEW];
-
-/// Longest time that is predicted at once, s; a longer one is cut.
-const PIECE_S: f64 = 0.0125;
-/// How old the first readings may be, s.
-const FIRST_S: f64 = 0.05;
 
 /// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -551,23 +531,6 @@ impl<T: Real> Running<T> {
         sum.is_finite() && self.covariance.is_sound()
     }
 }
-
-/// Names and units of the filter's states, in their order.
-pub const STATES: [(&str, &str); N] = [
-    ("turbine speed", "rad/s"),
-    ("output speed", "rad/s"),
-    ("wheel speed", "rad/s"),
-    ("spring torque of the shafts", "N m"),
-    ("pressure", "Pa"),
-    ("torque of the offgoing clutch", "N m"),
-    ("load of the wheels", "N m"),
-    ("share of the turbine torque", "1"),
-    ("share of the friction", "1"),
-    ("share of the valve's gain", "1"),
-    ("scale of the wheel speed", "1"),
-    ("delay of the wheel speed", "s"),
-    ("delay of the output speed against the turbine speed", "s"),
-];
 
 impl<T: Real> KalmanState<T> {
     /// Mean and standard deviation of each of the [`STATES`], while the filter runs.

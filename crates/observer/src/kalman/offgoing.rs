@@ -5,8 +5,9 @@ use drivetrain::{Clutch, Real};
 use super::covariance::CONSIDERED;
 use super::past::SPEEDS;
 use super::predict::hypot;
+use super::states::{OFFGOING, PIECE_S};
 use super::valve_model::Commands;
-use super::{KalmanFilter, OFFGOING, PIECE_S, Running, ValveModel};
+use super::{KalmanFilter, Running, ValveModel};
 use crate::{ChannelHealth, InputLimits, LOST_S, Reading};
 
 /// The offgoing clutch as the filter knows it.

@@ -3,7 +3,8 @@
 use drivetrain::Real;
 
 use super::predict::{OFFGOING_START, at_start};
-use super::{KalmanFilter, KalmanState, OFFGOING, OUTPUT, Running, SPRING, TURBINE};
+use super::states::{OFFGOING, OUTPUT, SPRING, TURBINE};
+use super::{KalmanFilter, KalmanState, Running};
 use crate::Phase;
 
 /// How old readings may be that show a slip, s: over this time the speeds change by less than the threshold of a release.

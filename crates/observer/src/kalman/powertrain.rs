@@ -2,7 +2,7 @@
 
 use drivetrain::{AccelerationRow, Real, ValveStep};
 
-use super::{FRACTION, FRICTION, GAIN, LOAD, N, OFFGOING, OUTPUT, PRESSURE, SPRING, TURBINE, WHEEL};
+use super::states::{FRACTION, FRICTION, GAIN, LOAD, N, OFFGOING, OUTPUT, PRESSURE, SPRING, TURBINE, WHEEL};
 
 /// Number of the states that have a law of their own; the others stand or fade.
 pub(super) const LAWS: usize = 5;

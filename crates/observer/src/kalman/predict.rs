@@ -7,10 +7,11 @@ use super::engine::Engine;
 use super::gate::Gate;
 use super::past::Past;
 use super::powertrain::Step;
-use super::{
-    DELAY, FIRST_S, FRACTION, FRICTION, GAIN, KalmanFilter, KalmanState, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE,
-    Running, SCALE, SKEW, SPRING, TURBINE, WHEEL,
+use super::states::{
+    DELAY, FIRST_S, FRACTION, FRICTION, GAIN, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE, SCALE, SKEW, SPRING,
+    TURBINE, WHEEL,
 };
+use super::{KalmanFilter, KalmanState, Running};
 use crate::Phase;
 
 /// Innovation beyond which a reading is refused, in its standard deviations.

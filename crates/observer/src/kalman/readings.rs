@@ -5,7 +5,8 @@ use drivetrain::Real;
 use super::covariance::{CONSIDERED, Measured, Row};
 use super::gate::Verdict;
 use super::past::SPEEDS;
-use super::{DELAY, FRACTION, FRICTION, GAIN, KalmanFilter, OUTPUT, Running, SCALE, SKEW, TURBINE, WHEEL};
+use super::states::{DELAY, FRACTION, FRICTION, GAIN, OUTPUT, SCALE, SKEW, TURBINE, WHEEL};
+use super::{KalmanFilter, Running};
 use crate::{ChannelHealth, Phase, Reading};
 
 /// Standard deviation of a uniform distribution, in its width.
