@@ -162,7 +162,6 @@ pub struct ShiftInput<T> {
     pub lock_up_applied: bool,
     /// Commands of the valves, in the order of [`GearboxTables::elements`]: current in A, or duty cycle in %.
     pub commands: [Option<Reading<T>>; MAX_ELEMENTS],
-    /// Gear or shift.
     /// The gear, or the shift, that the controller commands, by places in [`GearboxTables::gears`].
     pub gear: ShiftCommand,
 }
