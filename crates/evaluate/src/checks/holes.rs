@@ -50,3 +50,21 @@ impl Check for Holes {
         warning.into_iter().collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hole_is_long_and_longer_than_the_rows_are_usually_apart() {
+        let holes = |usual_s: f64, rows: usize, last_s: f64| {
+            let mut holes = Holes::default();
+            (0..rows).for_each(|_| assert!(!holes.is_hole(usual_s)));
+            holes.is_hole(last_s)
+        };
+        assert!(holes(0.01, 40, 0.6) && !holes(0.01, 40, 0.4));
+        // Rows that are always a second apart have none, and after a few rows it is not known.
+        assert!(!holes(0.3, 40, 0.8) && holes(0.3, 40, 1.0));
+        assert!(!holes(0.01, 10, 0.6));
+    }
+}
