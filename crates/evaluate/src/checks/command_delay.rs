@@ -13,7 +13,7 @@ use car::{ElementErrors, ErrorBudget, ShiftCommand};
 use observer::ShiftTables;
 use observer::gearbox::{MAX_ELEMENTS, ShiftRow};
 
-use super::{Check, CheckedRow, EndedShift};
+use super::check::{Check, CheckedRow, EndedShift};
 
 /// Time between two points of a shift, and between two moves, s.
 const GRID_S: f64 = 0.02;

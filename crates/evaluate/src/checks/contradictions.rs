@@ -9,7 +9,7 @@ use car::{Car, Gear};
 use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
 
-use super::{Check, CheckedRow};
+use super::check::{Check, CheckedRow};
 
 /// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.
 const STEADY_S: f64 = 1.0;

@@ -5,8 +5,8 @@
 
 use car::{Car, ErrorBudget};
 
+use super::check::{Check, CheckedRow};
 use super::ratio_histogram::RatioHistogram;
-use super::{Check, CheckedRow};
 use crate::LogStep;
 
 /// Engine speed counts as steady if it has changed by no more than so much, rad/s, in so long, s \[chosen\]: the engine's inertia takes some 3 N m.

@@ -2,7 +2,7 @@
 
 use car::Car;
 
-use super::Check;
+use super::check::Check;
 use crate::score::within;
 use crate::{ROUNDING_PA, ShiftScoreRow};
 

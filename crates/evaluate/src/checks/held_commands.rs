@@ -8,7 +8,7 @@ use observer::Reading;
 use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
 
-use super::{Check, CheckedRow};
+use super::check::{Check, CheckedRow};
 
 /// Longest time between two changes that is one message, s \[chosen\]: what stands longer is a command that rests.
 const LONGEST_S: f64 = 0.5;

@@ -2,7 +2,7 @@
 
 use car::ShiftCommand;
 
-use super::Check;
+use super::check::Check;
 
 /// Rows further apart, and three times as far as usual, are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
 const HOLE_S: f64 = 0.5;

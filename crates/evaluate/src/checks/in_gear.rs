@@ -3,7 +3,8 @@
 use car::Car;
 use observer::Health;
 
-use super::{CameSpeed, Check, CheckedRow};
+use super::came_speed::CameSpeed;
+use super::check::{Check, CheckedRow};
 use crate::LogStep;
 
 /// Speed of the output by any of the speeds from which on the ratio of a gear is compared with the speeds, rad/s, and fraction by which they

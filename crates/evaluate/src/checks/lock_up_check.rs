@@ -5,7 +5,7 @@
 
 use car::Car;
 
-use super::{Check, CheckedRow};
+use super::check::{Check, CheckedRow};
 use crate::LogStep;
 
 /// Speed ratio from which on the lock-up clutch may be closed or slip \[chosen\]: a slip-controlled one slips by some rad/s.

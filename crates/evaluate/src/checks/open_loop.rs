@@ -2,7 +2,7 @@
 
 use car::Car;
 
-use super::{Check, CheckedRow};
+use super::check::{Check, CheckedRow};
 
 /// Whether an engine speed is needed, and has come.
 pub(crate) struct OpenLoop {

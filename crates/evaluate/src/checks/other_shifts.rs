@@ -3,7 +3,7 @@
 use drivetrain::ShiftKind;
 use plant::car::CarShiftQuality;
 
-use super::{Check, EndedShift};
+use super::check::{Check, EndedShift};
 
 /// How far below the speeds of both gears the turbine has those of another shift, rad/s \[chosen\]: a flare is above them.
 const OTHER_SHIFT_RAD_S: f64 = 30.0;

@@ -3,9 +3,9 @@
 use car::{Car, ErrorBudget};
 use observer::Reading;
 
+use super::check::{Check, CheckedRow};
 use super::ratio_histogram::RatioHistogram;
 use super::ratio_scale::{RatioScale, WrongScale};
-use super::{Check, CheckedRow};
 
 /// Rows that are needed to judge, and their time, s \[chosen\].
 const ENOUGH: (u64, f64) = (200, 3.0);

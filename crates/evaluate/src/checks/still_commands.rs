@@ -7,7 +7,7 @@ use car::Car;
 use observer::gearbox::{MAX_ELEMENTS, ShiftElement};
 use observer::{Reading, ShiftTables};
 
-use super::{Check, CheckedRow, EndedShift};
+use super::check::{Check, CheckedRow, EndedShift};
 
 /// Readings of a command in a shift that are needed to judge \[chosen\].
 const ENOUGH: u32 = 3;

@@ -3,7 +3,7 @@
 //! In a gear the turbine turns with the gearbox output, times the ratio of that gear. The engine does so only where the converter
 //! hardly slips, and then the turbine does too. Times at which the engine fits a gear and the turbine none contradict the channels.
 
-use super::{Check, CheckedRow};
+use super::check::{Check, CheckedRow};
 
 /// A speed fits a gear within this fraction: readings that are 20 ms apart differ by 1 % while the car accelerates, teeth are
 /// counted to 1 % \[chosen\].

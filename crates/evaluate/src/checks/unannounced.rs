@@ -3,7 +3,7 @@
 use car::{Car, Gear};
 use observer::Health;
 
-use super::{Check, CheckedRow};
+use super::check::{Check, CheckedRow};
 
 /// How often the gear changed without a shift.
 pub(crate) struct UnannouncedShifts {

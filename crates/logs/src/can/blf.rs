@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::bufread::ZlibDecoder;
 
-use super::{Frame, Frames};
+use super::frame::{Frame, Frames};
 use crate::LogError;
 
 /// Largest object that is read, bytes; writers use containers of 128 KiB.

@@ -9,8 +9,8 @@ use can_dbc::{
 };
 use trace::text_file::LARGEST_LIST;
 
-use super::Frame;
 use super::bits::{Bits, Number};
+use super::frame::{Frame, PAYLOAD};
 use super::j1939::{self, Protocol};
 use super::names::Named;
 use crate::error::shown;
@@ -284,7 +284,7 @@ impl<'d> Entries<'d> {
     fn number(&self, message: &can_dbc::Message, signal: &can_dbc::Signal) -> Result<Number, String> {
         let [start, size] = place_of(signal);
         let named = format!("signal `{}` of message `{}`", shown(&signal.name), shown(&message.name));
-        if size == 0 || size > 64 || start >= 8 * super::PAYLOAD {
+        if size == 0 || size > 64 || start >= 8 * PAYLOAD {
             return Err(format!("{named} has {size} bits from bit {start}, expected 1 to 64 within 64 bytes"));
         }
         match (self.floats.get(&(message.id, &*signal.name)), signal.value_type, size) {

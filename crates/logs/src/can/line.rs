@@ -1,6 +1,6 @@
 //! What the lines of bus logs have in common.
 
-use super::{Frame, PAYLOAD};
+use super::frame::{Frame, PAYLOAD};
 
 /// What a line is.
 pub(super) enum Line {

@@ -3,6 +3,7 @@
 mod bits;
 mod blf;
 mod database;
+mod frame;
 mod j1939;
 mod line;
 mod names;
@@ -15,55 +16,13 @@ use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 
 pub use database::Database;
+pub(crate) use frame::{Frame, Frames};
 
 use self::database::Found;
 use crate::CanKind;
 use crate::LogError;
 use crate::columns::{Batch, Stream};
 use crate::samples::Sample;
-
-/// Largest payload, bytes: that of CAN FD.
-const PAYLOAD: usize = 64;
-
-/// A frame on the bus.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Frame {
-    pub(crate) time_s: f64,
-    pub(crate) id: u32,
-    pub(crate) extended: bool,
-    /// The number of its bus, where a log has several.
-    pub(crate) bus: u32,
-    data: [u8; PAYLOAD],
-    length: usize,
-}
-
-impl Frame {
-    /// A frame of the first bus; of a longer payload the first 64 bytes count.
-    pub(crate) fn new(time_s: f64, id: u32, extended: bool, payload: &[u8]) -> Self {
-        let mut data = [0; PAYLOAD];
-        let length = payload.len().min(PAYLOAD);
-        data[..length].copy_from_slice(&payload[..length]);
-        Self { time_s, id, extended, bus: 0, data, length }
-    }
-
-    /// The same frame on this bus.
-    pub(crate) fn on(self, bus: u32) -> Self {
-        Self { bus, ..self }
-    }
-
-    pub(crate) fn data(&self) -> &[u8] {
-        &self.data[..self.length]
-    }
-}
-
-/// Something that gives frames.
-pub(crate) trait Frames {
-    /// The next data frame; none at the end.
-    fn next_frame(&mut self) -> Result<Option<Frame>, LogError>;
-
-    /// What else is to be said.
-    fn notes(&self) -> Vec<String>;
-}
 
 /// A CAN log that has not been read yet.
 pub(crate) struct CanLog {

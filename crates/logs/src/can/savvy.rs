@@ -1,7 +1,7 @@
 //! Rows of tables of frames as SavvyCAN writes them (GVRET): `Time Stamp,ID,Extended,Dir,Bus,LEN,D1,...,D8`, with times in microseconds.
 
+use super::frame::{Frame, PAYLOAD};
 use super::line::{Line, id_of, payload};
-use super::{Frame, PAYLOAD};
 
 /// Where the columns stand; none before the row of names.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -3,10 +3,10 @@
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use super::frame::{Frame, Frames, PAYLOAD};
 use super::line::{Line, classic_length};
 use super::savvy::Savvy;
 use super::trc::Trc;
-use super::{Frame, Frames, PAYLOAD};
 use crate::CanKind;
 use crate::stamp::StampForm;
 use crate::{LogError, error};

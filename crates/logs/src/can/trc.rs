@@ -2,8 +2,8 @@
 //!
 //! A version below 2 has fixed columns; from version 2 on `;$COLUMNS=N,O,T,I,d,l,D` names them. Times are in ms from the start of the trace.
 
+use super::frame::{Frame, PAYLOAD};
 use super::line::{Line, classic_length, id_of, payload};
-use super::{Frame, PAYLOAD};
 
 /// A column of a line, by its letter in `;$COLUMNS`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
