@@ -236,11 +236,12 @@ fn what_a_killed_command_leaves_goes_with_the_next_and_a_running_one_keeps_its_o
     let begin = || {
         let child = Command::new(env!("CARGO_BIN_EXE_wetclutch"))
             .args(["estimate", &pipe, "--vehicle", VEHICLE, "--observer", "open-loop", "-o", &out])
-            .stderr(Stdio::null())
+            .stderr(std::fs::File::create(folder.path("said")).unwrap())
             .spawn()
             .unwrap();
         let mut feed = std::fs::OpenOptions::new().write(true).open(&pipe).unwrap();
-        feed.write_all(log(20_000).as_bytes()).unwrap();
+        let fed = feed.write_all(log(20_000).as_bytes());
+        assert!(fed.is_ok(), "{fed:?}: {}", folder.read("said"));
         let own = format!("out.csv.{}.partial", child.id());
         while !partials().contains(&own) {
             std::thread::yield_now();
