@@ -16,9 +16,17 @@ const LONGEST_S: f64 = 0.5;
 /// by chance \[chosen\].
 const ENOUGH: u64 = 20;
 const BY_CHANCE: f64 = 0.05;
-/// A change counts after repeated readings only if it is more than so many times the smallest one \[chosen\]: a slow ramp stands still
-/// within the resolution of its reading.
+/// Fewer changes, as those of a single shift, are enough if they all come in the period of one message, within one class of times, and if that
+/// happens by chance with at most this probability \[chosen\]; so many are looked at.
+const PERIOD_BY_CHANCE: f64 = 1e-3;
+const FEW: usize = 64;
+/// At least one in so many changes of a noise goes in the other direction than the one before \[chosen\].
+const NOISE: usize = 3;
+/// A change counts after repeated readings only if it is more than so many times the smallest one, or the resolution that the values show
+/// \[chosen\]: a slow ramp stands still within the resolution of its reading.
 const RESOLUTIONS: f64 = 3.0;
+/// Rounding of a value, as a fraction of it.
+const VALUE_ROUNDING: f64 = 1e-6;
 /// Width of a class of times, s.
 const CLASS_S: f64 = 0.01;
 const CLASSES: usize = 51;
@@ -42,8 +50,21 @@ pub struct CommandTimes {
     /// Changes from one reading to the next, and those after repeated readings by the time since the change before.
     at_once: u64,
     later: [u64; CLASSES],
+    /// The first changes, at once or not.
+    few: Vec<Change>,
     /// Readings by the time since the one before.
     apart: [u64; CLASSES],
+}
+
+/// A change of a command.
+#[derive(Debug, Clone, Copy)]
+struct Change {
+    size: f64,
+    is_rise: bool,
+    /// The larger of both values.
+    of: f64,
+    /// Time since the change before, s.
+    since_s: f64,
 }
 
 /// The times of all commands of a log.
@@ -64,6 +85,7 @@ impl Default for CommandTimes {
             smallest: f64::INFINITY,
             at_once: 0,
             later: [0; CLASSES],
+            few: Vec::new(),
             apart: [0; CLASSES],
         }
     }
@@ -135,6 +157,9 @@ impl CommandTimes {
         let change = (value - before).abs();
         self.smallest = self.smallest.min(change);
         let since_s = time_s - self.changed_s;
+        if self.few.len() < FEW {
+            self.few.push(Change { size: change, is_rise: value > before, of: value.abs().max(before.abs()), since_s });
+        }
         if self.repeated == 0 {
             self.at_once += 1;
         } else if since_s <= LONGEST_S && change > RESOLUTIONS * self.smallest {
@@ -146,8 +171,32 @@ impl CommandTimes {
     /// The usual time between two changes, s, if they come more rarely than the readings.
     fn held_s(&self) -> Option<f64> {
         let later: u64 = self.later.iter().sum();
-        let is_held = later >= ENOUGH && self.at_once as f64 <= BY_CHANCE * later as f64;
-        is_held.then(|| middle_s(&self.later))
+        let are_many = later >= ENOUGH && self.at_once as f64 <= BY_CHANCE * later as f64;
+        if are_many { Some(middle_s(&self.later)) } else { self.period_s() }
+    }
+
+    /// The time of which all times between two changes are multiples, s, where that is no chance.
+    fn period_s(&self) -> Option<f64> {
+        if self.at_once > 0 {
+            return None;
+        }
+        let resolution = resolution(&self.few);
+        // A slow ramp goes one way; noise turns.
+        let turns = self.few.windows(2).filter(|pair| pair[0].is_rise != pair[1].is_rise).count();
+        let is_noise = NOISE * turns >= self.few.len();
+        let counts =
+            |change: &&Change| change.since_s <= LONGEST_S && (is_noise || change.size > RESOLUTIONS * resolution);
+        let classes: Vec<usize> = self.few.iter().filter(counts).map(|change| class(change.since_s)).collect();
+        let period = *classes.iter().min()?;
+        let beyond = |class: &usize| {
+            let beyond = class % period.max(1);
+            beyond.min(period - beyond)
+        };
+        // How far the times are from multiples, in classes: a message may come in the row before or after.
+        let off = classes.iter().map(beyond).max().filter(|off| *off <= 1)?;
+        let others = i32::try_from(classes.len() - 1).unwrap_or(i32::MAX);
+        let by_chance = ((1 + 2 * off) as f64 / period as f64).min(1.0).powi(others);
+        (by_chance <= PERIOD_BY_CHANCE).then_some(period as f64 * CLASS_S)
     }
 
     /// The usual time between two readings, s, if it is too long for the range of the pressure and rows come without a reading.
@@ -156,6 +205,18 @@ impl CommandTimes {
         let is_known = readings >= ENOUGH && self.rows > 2 * readings;
         Some(middle_s(&self.apart)).filter(|period_s| is_known && *period_s > APART_S * (1.0 + ROUNDING))
     }
+}
+
+/// The largest step of which the values between these changes are multiples, as far as they are rounded.
+fn resolution(changes: &[Change]) -> f64 {
+    changes.iter().fold(0.0, |found, change| {
+        let (mut larger, mut rest) = (found, change.size);
+        while rest > VALUE_ROUNDING * change.of {
+            let steps = larger / rest;
+            (larger, rest) = (rest, (steps - steps.round()).abs() * rest);
+        }
+        larger
+    })
 }
 
 /// The class of a time.
@@ -199,6 +260,46 @@ mod tests {
         assert_eq!(period_s(0.01, 0.001), None);
         // Within the resolution of its reading a ramp stands still for two rows.
         assert_eq!(period_s(0.01, 0.005), None);
+    }
+
+    #[test]
+    fn the_few_changes_of_one_shift_are_enough_where_they_come_in_one_period() {
+        // At rest, a pulse that fills the clutch, a ramp, and its end.
+        let shift = |at_s: f64| match at_s {
+            _ if at_s < 2.0 => 0.1,
+            _ if at_s < 2.15 => 0.7,
+            _ if at_s < 4.0 => 0.2 + 0.17 * (at_s - 2.15),
+            _ => 1.0,
+        };
+        let period_s = |sent_s: f64, resolution: f64| {
+            let mut changes = CommandTimes::default();
+            for row in 0..800 {
+                let time_s = 0.01 * f64::from(row);
+                let at_s = (time_s / sent_s + 1e-6).floor() * sent_s;
+                changes.read(time_s, (shift(at_s) / resolution).round() * resolution);
+            }
+            changes.held_s()
+        };
+        for sent_s in [0.05, 0.1, 0.2] {
+            for resolution in [1e-3, 1e-5, 1e-9] {
+                let found_s = period_s(sent_s, resolution);
+                assert!(found_s.is_some_and(|found_s| (found_s - sent_s).abs() < 0.011), "{sent_s}: {found_s:?}");
+            }
+        }
+        // Sent in each row; and a ramp within the resolution of its reading, which changes every 0.1 s.
+        assert_eq!([1e-9, 1e-3, 0.015].map(|resolution| period_s(0.01, resolution)), [None; 3]);
+        // A current that is measured at 10 Hz, with a noise of two steps of its resolution.
+        let mut measured = CommandTimes::default();
+        for row in 0..400_i32 {
+            measured.read(0.01 * f64::from(row), 0.001 * f64::from((row / 10).pow(2) % 7 % 3));
+        }
+        assert_eq!(measured.held_s(), Some(0.1));
+        // Three steps, as of a valve that is switched.
+        let mut steps = CommandTimes::default();
+        for row in 0..800 {
+            steps.read(0.01 * f64::from(row), [0.0, 0.8, 0.3, 1.0][usize::try_from(row / 20).unwrap().min(3)]);
+        }
+        assert_eq!(steps.held_s(), None);
     }
 
     #[test]
