@@ -5,7 +5,8 @@
 //! ```
 //!
 //! are forty cars of each of two vehicle files, sampled within the whole error budget, twenty repetitions of `drives/city.toml` (an hour), counted
-//! after each half; without names, all shipped cars with a whole gearbox. With zero cars the car is that of the file. Each line has, for each part
+//! after each half; without names, all shipped cars with a whole gearbox. With zero cars the car is that of the file. A name that ends with `.toml` is
+//! another drive, as in `-- 40 2 2 eight_speed drives/wltc_3b.toml`, two repetitions of which are an hour. Each line has, for each part
 //! of the drive, mean and root mean square of the errors, the mean of the stated standard deviations, and the fraction of the true values
 //! within 1.96 of them.
 
@@ -25,11 +26,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let mut number = |default: u32| arguments.next().map_or(Ok(default), |text| text.parse::<u32>());
     let (cars, repetitions, parts) = (number(40)?, number(20)?, number(2)? as usize);
-    let names: Vec<String> = arguments.collect();
+    let (drives, names): (Vec<String>, Vec<String>) = arguments.partition(|name| name.ends_with(".toml"));
     let names = if names.is_empty() { CARS.map(str::to_owned).to_vec() } else { names };
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let sensors = config::read_sensors(&root.join("experiments/bench.toml"))?.ok_or("the bench has no sensors")?;
-    let drive = Drive { repetitions, ..DriveFile::read(&root.join("drives/city.toml"))?.drive };
+    let drive = Drive {
+        repetitions,
+        ..DriveFile::read(&root.join(drives.first().map_or("drives/city.toml", String::as_str)))?.drive
+    };
     let what = if cars == 0 { Sampled::Nothing } else { Sampled::Budget };
     for name in names {
         let car = CarFile::read(&root.join(format!("vehicles/{name}.toml")))?;
