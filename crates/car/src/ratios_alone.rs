@@ -22,7 +22,7 @@ pub fn assume_masses(gearbox: &mut Gearbox, engine: &Engine<f64>) -> Option<f64>
     let middle = 2.0 * minimum * maximum / (minimum + maximum);
     let mass_kg_m2 =
         [[middle, COUPLING_KG_M2], [COUPLING_KG_M2, OUTPUT_KG_M2]].map(|row| row.map(|entry| size * entry));
-    let ratios: Vec<f64> = gearbox.gears.iter().map(|gear| gear.ratio).collect();
+    let ratios = gearbox.ratios();
     let slip = |gear: usize| [1.0, -ratios[gear]];
     let mut is_assumed = false;
     for shift in gearbox.shifts.iter_mut().filter(|shift| shift.reduced.is_none()) {

@@ -176,7 +176,7 @@ fn name(path: &Path, time_s: f64) -> String {
 /// The shifts of a log, and what is to be said about its channels.
 fn find(log: &mut Log, map: &ChannelMap, is_stopped: &dyn Fn() -> bool) -> Result<(Vec<Shift>, Vec<String>), FitError> {
     let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
-    let mut readings = Readings::new(log, map)?;
+    let mut readings = Readings::new(log, map)?.of_gearbox(&map.gearbox.ratios);
     let mut resets = 0;
     while let Some(reading) = readings.next_or_refused() {
         let reading = reading?;
@@ -216,7 +216,7 @@ fn read(
     };
     let mut records: Vec<ShiftRecord> = shifts.iter().map(record).collect();
     let windows = Windows::of(shifts);
-    for reading in Readings::new(&mut log, map)? {
+    for reading in Readings::new(&mut log, map)?.of_gearbox(&map.gearbox.ratios) {
         let reading = reading?;
         if (source.is_stopped)() {
             return Err(FitError::Stopped);

@@ -104,6 +104,11 @@ impl Gearbox {
         self.elements.is_empty()
     }
 
+    /// Turbine over output speed in each gear, negative in reverse.
+    pub fn ratios(&self) -> Vec<f64> {
+        self.gears.iter().map(|gear| gear.ratio).collect()
+    }
+
     /// The forward gears from the largest ratio to the smallest. Of gears with one ratio, as one for engine braking, that of a
     /// one-way clutch, or the first of the table.
     pub fn forward_gears(&self) -> Vec<usize> {

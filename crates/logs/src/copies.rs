@@ -4,8 +4,11 @@
 //! sensors of two shafts agree to the last digit where the shafts turn together, as behind a lock-up clutch, and then their speeds came together by
 //! and by. A channel is a copy where three things hold. Both speeds agree to the last digit for [`SAMPLES`] samples. Before that they differed, and a
 //! line through the last two differences does not reach zero: it misses it by [`SUDDEN`] times the usual error of such a line. And one of both speeds
-//! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. A copy that begins while both shafts turn together, as in the direct
-//! gear, is not found.
+//! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. Where the difference has a noise much larger than its resolution
+//! ([`FINE`]), two sensors never agree to the last digit, also while a clutch makes their shafts one: then it is enough that one of both leaves the line
+//! through its own last values by [`SUDDEN`] times its usual error, and the other one by less than half of that. Of turbine and output, which turn
+//! together in the direct gear, the one is a copy that the wheels contradict: the output if it has left their speed by [`TIED`], else the turbine. Of
+//! engine and turbine a copy that begins while they turn together, as behind a lock-up clutch, is not found: a control unit may send one for both.
 
 use crate::Role;
 use crate::speed_faults::LONGEST_S;
@@ -17,6 +20,13 @@ const SUDDEN: (f64, f64) = (8.0, 1.0);
 /// Samples in which the usual error is learnt, and weight of one in its mean.
 const LEARNT: u32 = 20;
 const LATEST: f64 = 0.125;
+/// Samples after which a noise is known, and how many times the smallest change of the difference that was seen it is \[chosen\].
+const MANY: u32 = 100;
+const FINE: f64 = 20.0;
+/// So many equal samples of noisy speeds show a copy without a jump.
+const SURE: u32 = 5;
+/// By this fraction output and wheel speed part while their shafts twist, at most \[chosen\].
+const TIED: f64 = 0.04;
 /// In slower samples a shift passes between two of them, s: an inertia phase takes longer.
 const SLOWEST_S: f64 = 0.05;
 /// Below this a shaft stands, rad/s.
@@ -34,15 +44,29 @@ const PAIRS: [[usize; 2]; 6] = [
     [Role::EngineSpeed as usize, Role::WheelSpeed as usize],
 ];
 
-/// Those whose shafts a clutch makes one while one of both fails: what is refused for another reason is not compared.
-const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[1], PAIRS[2]];
+/// Turbine and output of the pairs.
+const TURBINE_AND_OUTPUT: usize = 1;
+
+/// Those whose shafts a clutch makes one while one of both fails: what is refused for another reason is not compared, but for noisy ones.
+const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[TURBINE_AND_OUTPUT], PAIRS[2]];
 
 /// A reading: its value, rad/s, and its time, s.
 pub(crate) type Stamped = [f64; 2];
 
 /// Watches the speeds of the four shafts.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Copies([Pair; PAIRS.len()]);
+pub(crate) struct Copies {
+    pairs: [Pair; PAIRS.len()],
+    wheels: Wheels,
+}
+
+/// Output over wheel speed.
+#[derive(Debug, Clone, Copy)]
+struct Wheels {
+    newest_rad_s: f64,
+    /// Its mean while turbine and output differed; not a number before.
+    ratio: f64,
+}
 
 /// Two speeds.
 #[derive(Debug, Clone, Copy)]
@@ -56,8 +80,11 @@ struct Pair {
     /// Change of the difference in the last sample, rad/s, and how many changes there were.
     change: f64,
     changes: u32,
-    /// By how much a change differs from the one before: its mean, and the last one, rad/s.
+    /// By how much a change differs from the one before: its mean, the last one, and the smallest that was not zero, rad/s.
     error: [f64; 2],
+    finest: f64,
+    /// The same of each speed: its last change, and the mean by which a change differs from the one before, rad/s.
+    own: [[f64; 2]; 2],
     /// Samples in which they are equal, and which of both jumped to the other, if one did.
     equal: u32,
     jumped: Option<usize>,
@@ -72,10 +99,12 @@ impl Copies {
             change: 0.0,
             changes: 0,
             error: [0.0; 2],
+            finest: f64::INFINITY,
+            own: [[0.0; 2]; 2],
             equal: 0,
             jumped: None,
         };
-        Self([pair; PAIRS.len()])
+        Self { pairs: [pair; PAIRS.len()], wheels: Wheels { newest_rad_s: f64::NAN, ratio: f64::NAN } }
     }
 
     /// Takes a reading, and whether it is refused for another reason. Returns the speed whose channel shows another one, with its last
@@ -83,21 +112,27 @@ impl Copies {
     pub(crate) fn push(&mut self, role: Role, reading: Stamped, is_fault: bool) -> Option<(Role, Stamped)> {
         let at = role as usize;
         let mut found = None;
-        for (pair, of) in self.0.iter_mut().zip(PAIRS) {
+        if !is_fault {
+            self.wheels.take(role, reading[0], self.pairs[TURBINE_AND_OUTPUT].equal > 0);
+        }
+        let wheels = self.wheels;
+        for (pair, of) in self.pairs.iter_mut().zip(PAIRS) {
             let Some(which) = of.iter().position(|speed| *speed == at) else { continue };
-            if is_fault && MAY_JOIN.contains(&of) {
+            if is_fault && MAY_JOIN.contains(&of) && !pair.is_fine() {
                 continue;
             }
             pair.is_fault |= is_fault;
             pair.newest[which] = Some(reading);
             if let [Some(one), Some(other)] = pair.newest {
                 pair.newest = [None; 2];
-                let copy = pair.compare([one, other]);
+                let newest = [one, other];
+                let is_tied = of == PAIRS[TURBINE_AND_OUTPUT];
+                let copy = pair.compare(newest).or_else(|| pair.contradicted(newest, wheels).filter(|_| is_tied));
                 found = found.or(copy.map(|(which, before)| (Role::SPEEDS[of[which]], before, of)));
             }
         }
         let (copied, before, by) = found?;
-        for (pair, of) in self.0.iter_mut().zip(PAIRS) {
+        for (pair, of) in self.pairs.iter_mut().zip(PAIRS) {
             if of != by && of.contains(&(copied as usize)) {
                 pair.before = None;
             }
@@ -106,7 +141,37 @@ impl Copies {
     }
 }
 
+impl Wheels {
+    /// Takes a reading of output or wheel. An output that may be a copy does not count in the mean.
+    fn take(&mut self, role: Role, rad_s: f64, may_be_copy: bool) {
+        match role {
+            Role::WheelSpeed => self.newest_rad_s = rad_s,
+            Role::OutputSpeed
+                if !may_be_copy && rad_s.abs() > STANDS_RAD_S && self.newest_rad_s.abs() > STANDS_RAD_S =>
+            {
+                let ratio = rad_s / self.newest_rad_s;
+                let mean = if self.ratio.is_nan() { ratio } else { self.ratio };
+                self.ratio = mean + LATEST * (ratio - mean);
+            }
+            _ => {}
+        }
+    }
+
+    /// The fraction by which an output has left the speed of the wheels; none where that is not known.
+    fn parted(self, output_rad_s: f64) -> Option<f64> {
+        Some((output_rad_s / (self.newest_rad_s * self.ratio) - 1.0).abs()).filter(|parted| parted.is_finite())
+    }
+}
+
 impl Pair {
+    /// Which of turbine and output, noisy and equal for long, the wheels contradict, with its last reading that is right.
+    fn contradicted(&self, newest: [Stamped; 2], wheels: Wheels) -> Option<(usize, Stamped)> {
+        let before = self.before.filter(|_| self.equal >= SURE && self.is_fine())?;
+        let which = usize::from(wheels.parted(newest[1][0])? > TIED);
+        let is_short = newest[which][1] - before[which][1] <= LONGEST_S;
+        is_short.then_some((which, before[which]))
+    }
+
     /// Which of both is the other's value, with its last reading that is right.
     fn compare(&mut self, newest: [Stamped; 2]) -> Option<(usize, Stamped)> {
         let is_fault = std::mem::take(&mut self.is_fault);
@@ -122,7 +187,7 @@ impl Pair {
         }
         let before = self.before?;
         if self.equal == 0 {
-            self.jumped = self.jump(before, newest);
+            self.jumped = self.jump(before, newest).or_else(|| self.leaves(before, newest));
         }
         self.equal = self.equal.saturating_add(1);
         let which = self.jumped.filter(|_| self.equal >= SAMPLES)?;
@@ -137,9 +202,30 @@ impl Pair {
             let error = (change - self.change).abs();
             self.change = change;
             self.error = [self.error[0] + LATEST * (error - self.error[0]), error];
+            self.finest = if error > 0.0 { self.finest.min(error) } else { self.finest };
+            for ([change, mean], which) in self.own.iter_mut().zip(0..) {
+                let now = newest[which][0] - before[which][0];
+                *mean += LATEST * ((now - *change).abs() - *mean);
+                *change = now;
+            }
             self.changes = self.changes.saturating_add(1);
         }
         (self.before, self.equal, self.jumped) = (Some(newest), 0, None);
+    }
+
+    /// Whether two sensors never agree to the last digit: their noise is known, and far larger than their resolution.
+    fn is_fine(&self) -> bool {
+        self.changes >= MANY && self.error[0] > FINE * self.finest
+    }
+
+    /// Which of two noisy speeds left its own way to the other.
+    fn leaves(&self, before: [Stamped; 2], newest: [Stamped; 2]) -> Option<usize> {
+        let (times, _) = SUDDEN;
+        let by = [0, 1].map(|which| (newest[which][0] - before[which][0] - self.own[which][0]).abs());
+        let which = usize::from(by[1] > by[0]);
+        let passed_s = newest[which][1] - before[which][1];
+        let is_clear = by[which] > times * self.own[which][1] && by[which] > 2.0 * by[1 - which];
+        (self.is_fine() && is_clear && (0.0..=SLOWEST_S).contains(&passed_s)).then_some(which)
     }
 
     /// Which of both jumped to the other, where the difference closed at once: it was to be expected on its side of zero. What a clutch takes
@@ -241,6 +327,38 @@ mod tests {
             };
             assert_eq!(found(grips), [], "{per_row}");
         }
+    }
+
+    #[test]
+    fn of_turbine_and_output_that_begin_to_agree_in_the_direct_gear_the_wheels_show_which_is_the_copy() {
+        // Out of the direct gear from 2.5 s on; from 2.1 s to 3.1 s one of both shows the other. Without noise, and without wheels, nothing shows it.
+        let noise = |row: u32, factor: u32| f64::from(row * row * factor % 1009) / 5045.0 - 0.1;
+        let copies = |is_turbine: bool, noisy: f64, has_wheels: bool| {
+            let mut copies = Copies::new();
+            let mut rows = Vec::new();
+            for row in 0..400_u32 {
+                let time_s = 0.01 * f64::from(row);
+                let output = 200.0 + noisy * noise(row, 7);
+                let turbine = 200.0 + 2.0 * f64::from(row.clamp(250, 290) - 250) + noisy * noise(row, 11);
+                let (turbine, output) = match (210..310).contains(&row) {
+                    true if is_turbine => (output, output),
+                    true => (turbine, turbine),
+                    false => (turbine, output),
+                };
+                let wheel = 60.0 + 0.2 * noisy * noise(row, 13);
+                let speeds = [(Role::TurbineSpeed, turbine), (Role::OutputSpeed, output), (Role::WheelSpeed, wheel)];
+                for (role, speed) in speeds.into_iter().take(if has_wheels { 3 } else { 2 }) {
+                    let found = copies.push(role, [speed, time_s], false);
+                    rows.extend(found.map(|(role, _)| (row, role)));
+                }
+            }
+            rows
+        };
+        let found = |is_turbine: bool| copies(is_turbine, 1.0, true);
+        assert_eq!(found(true), (214..310).map(|row| (row, Role::TurbineSpeed)).collect::<Vec<_>>());
+        let wrong = found(false).into_iter().filter(|(row, _)| *row >= 258).collect::<Vec<_>>();
+        assert_eq!(wrong, (258..310).map(|row| (row, Role::OutputSpeed)).collect::<Vec<_>>());
+        assert_eq!([copies(true, 0.0, true), copies(true, 1.0, false)], [vec![], vec![]]);
     }
 
     #[test]

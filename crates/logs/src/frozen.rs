@@ -6,7 +6,8 @@
 //! smallest change that was seen of it; before it has changed, [`FROZEN_FROM_START_S`] and [`FROZEN_CHANGE_FROM_START`] count. One that
 //! changed by [`FROZEN_QUANTA`] of its quanta from sample to sample stands for [`STOPPED_S`] and [`STOPPED_SAMPLES`] only, and the other
 //! changes by those quanta. Where a speed that changed by more than one of its quanta never had one value twice in a row, in [`MANY_CHANGES`]
-//! changes, no other one has to show it.
+//! changes, no other one has to show it; nor where a speed is noisy, one in [`NOISY`] of so many changes turns back, by [`FROZEN_QUANTA`] of its quanta
+//! of late, and stands for three times as long as ever before, at rest too: noise does not stop.
 //! Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from a turbine that is nearly as fast
 //! or faster: below that the idle control may hold the engine while the car comes to rest. An engine that is faster than any idle control
 //! holds it, [`IDLE_RAD_S`], parts from the turbine by the slip of the converter, but does not stand still to the last digit while the turbine
@@ -46,6 +47,10 @@ pub const STOPPED_SAMPLES: u32 = 5;
 /// Changes after which a speed is known never to have one value twice in a row \[chosen\].
 pub const MANY_CHANGES: u32 = 200;
 
+/// At least one in so many changes of a noisy speed goes in the other direction than the one before \[chosen\]: vibrations of a driveline turn more
+/// slowly than its speed is read.
+pub const NOISY: u32 = 5;
+
 /// Below this a shaft stands, rad/s.
 const STANDS_RAD_S: f64 = 1.0;
 
@@ -65,12 +70,16 @@ pub struct FrozenSpeed {
     still: Option<Still>,
     /// Samples of the longest time so far in which the speed stood still and was not frozen: coarse signals do so often.
     longest_still: u32,
+    /// The same with those at rest, but for a shaft that stands.
+    longest_turning: u32,
     /// The smallest change so far.
     quantum: f64,
     /// Mean change from sample to sample, of late.
     moves: f64,
-    /// How often it has changed.
+    /// How often it has changed, and how often in the other direction than before.
     changes: u32,
+    turns: u32,
+    is_rising: bool,
 }
 
 /// A speed that stands still.
@@ -87,7 +96,17 @@ struct Still {
 impl FrozenSpeed {
     /// Watches the speed of this role.
     pub fn new(role: Role) -> Self {
-        Self { role, still: None, longest_still: 0, quantum: f64::INFINITY, moves: 0.0, changes: 0 }
+        Self {
+            role,
+            still: None,
+            longest_still: 0,
+            longest_turning: 0,
+            quantum: f64::INFINITY,
+            moves: 0.0,
+            changes: 0,
+            turns: 0,
+            is_rising: false,
+        }
     }
 
     /// Whether the speed is known to be frozen since an earlier value.
@@ -108,6 +127,11 @@ impl FrozenSpeed {
                 self.quantum = self.quantum.min(change);
                 self.moves += LATEST * (change / f64::from(before.samples) - self.moves);
                 self.changes = self.changes.saturating_add(1);
+                let was_rising = core::mem::replace(&mut self.is_rising, value > before.value);
+                self.turns = self.turns.saturating_add(u32::from(was_rising != self.is_rising));
+                if !before.frozen && before.value.abs() > STANDS_RAD_S {
+                    self.longest_turning = self.longest_turning.max(before.samples);
+                }
                 if !before.frozen && before.value.abs() > rests_rad_s(self.role) {
                     self.longest_still = self.longest_still.max(before.samples);
                 }
@@ -135,8 +159,14 @@ impl FrozenSpeed {
             && self.changes >= MANY_CHANGES
             && self.quantum.is_finite()
             && self.moves > self.quantum;
-        let rests_rad_s = rests_rad_s(self.role);
-        if !still.frozen && never_stood && value.abs() > rests_rad_s {
+        let is_noisy = self.changes >= MANY_CHANGES && self.turns >= self.changes / NOISY;
+        let noise_stopped = is_noisy
+            && self.longest_turning > 0
+            && self.moves > quantum
+            && still.samples >= STOPPED_SAMPLES.max(3 * self.longest_turning)
+            && time_s - still.since_s >= STOPPED_S
+            && value.abs() > STANDS_RAD_S;
+        if noise_stopped || never_stood && value.abs() > rests_rad_s(self.role) {
             still.frozen = true;
         }
         if !still.frozen && value != 0.0 && (long || stopped) {

@@ -154,6 +154,12 @@ impl<'a> Readings<'a> {
         })
     }
 
+    /// Readings of a gearbox with gears of these ratios, turbine over output speed; without any they are not known.
+    #[must_use]
+    pub fn of_gearbox(self, ratios: &[f64]) -> Self {
+        Self { speeds: SpeedWatch::of_gearbox(ratios), ..self }
+    }
+
     /// What came of the samples so far.
     pub fn summary(&self) -> Vec<RoleSummary> {
         let summary = |channels: &Channels| RoleSummary {

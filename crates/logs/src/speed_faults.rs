@@ -10,8 +10,8 @@
 //!
 //! A fault lasts until the readings are those of the shaft again, and for [`LONGEST_S`] at most: what lasts longer is how the log goes on,
 //! as where two recordings are joined. A turbine that shows the output speed is believed again as soon as a shift into the direct gear may have
-//! brought it there. Only a zero stays a fault for as long as the other speeds contradict it. The accelerations are bounds
-//! for every car, and a fall at low speed, where sensors of toothed wheels rightly read zero, is none.
+//! brought it there, in a gearbox that has one and from a ratio next to it. Only a zero stays a fault for as long as the other speeds contradict
+//! it. The accelerations are bounds for every car, and a fall at low speed, where sensors of toothed wheels rightly read zero, is none.
 
 use crate::Role;
 
@@ -40,8 +40,12 @@ const TO_ANOTHER: (f64, f64) = (1000.0, 5.0);
 /// and the engine goes along by this fraction at least \[chosen\].
 const SHIFTS_RAD_S2: f64 = 300.0;
 const GOES_ALONG: f64 = 0.25;
+/// By this fraction the ratio of two readings may differ from that of the gear: noise, and shafts that twist.
+const BESIDE_GEAR: f64 = 0.02;
 /// Factors beyond which output over wheel speed has parted from what it was: readings that are 50 ms apart differ by less.
 const PARTED: std::ops::Range<f64> = 0.6..1.6;
+/// The ratio of both is remembered so often, s: more rarely than readings are withdrawn afterwards.
+const RATIO_S: f64 = 0.6;
 /// Faster than any shaft of a car, rad/s: not taken as a speed at all.
 const MAX_RAD_S: f64 = 1500.0;
 /// How long another speed contradicts one that stands at zero before it is a fault, s, and by how many times the speed up to which a sensor may
@@ -68,10 +72,50 @@ pub struct SpeedFaults {
     faults: [Option<Fault>; WATCHED],
     /// Output over wheel speed when both were last believed; not a number before.
     output_over_wheel: f64,
+    /// The same at two earlier times.
+    ratios: [Ratio; 2],
     /// When engine and turbine had the same speed last, s.
     together_s: f64,
     /// Since when a speed stands at zero against the others, s.
     stands_since_s: [Option<f64>; WATCHED],
+    into_direct: IntoDirect,
+}
+
+/// The ratios of turbine over output speed that a shift into the direct gear passes: those between the gears next to it. Empty in a gearbox
+/// without a direct gear.
+#[derive(Debug, Clone, Copy)]
+struct IntoDirect {
+    from: f64,
+    to: f64,
+}
+
+impl IntoDirect {
+    /// Of a gearbox whose gears are not known.
+    const ANY: Self = Self { from: 0.0, to: f64::INFINITY };
+
+    /// Of a gearbox with gears of these ratios; without any they are not known.
+    fn of(ratios: &[f64]) -> Self {
+        if ratios.is_empty() {
+            return Self::ANY;
+        }
+        if !ratios.iter().any(|ratio| is_direct(*ratio)) {
+            return Self { from: f64::INFINITY, to: 0.0 };
+        }
+        let others = || ratios.iter().copied().filter(|ratio| *ratio > 0.0 && !is_direct(*ratio));
+        let below = others().filter(|ratio| *ratio < 1.0).fold(Self::ANY.from, f64::max);
+        let above = others().filter(|ratio| *ratio > 1.0).fold(Self::ANY.to, f64::min);
+        Self { from: below * (1.0 - BESIDE_GEAR), to: above * (1.0 + BESIDE_GEAR) }
+    }
+
+    /// Whether a shift at this ratio may go there.
+    fn contains(self, ratio: f64) -> bool {
+        (self.from..=self.to).contains(&ratio)
+    }
+}
+
+/// Whether turbine and output have one speed in a gear, as far as two readings tell.
+fn is_direct(ratio: f64) -> bool {
+    (ratio - 1.0).abs() <= STILL_ANOTHER * ANOTHER
 }
 
 /// A fault of a speed.
@@ -82,6 +126,15 @@ struct Fault {
     another: Option<usize>,
     /// The engine speed then, rad/s.
     engine_rad_s: Option<f64>,
+    /// The last speed that was believed over the first reading that was not.
+    ratio: f64,
+}
+
+/// Output over wheel speed, and when it was read, s.
+#[derive(Debug, Clone, Copy)]
+struct Ratio {
+    value: f64,
+    time_s: f64,
 }
 
 /// The last reading of a speed that was believed.
@@ -94,14 +147,25 @@ struct Believed {
 }
 
 impl SpeedFaults {
-    /// Before the first readings.
+    /// Before the first readings, of a gearbox whose gears are not known.
     pub fn new() -> Self {
+        Self::with(IntoDirect::ANY)
+    }
+
+    /// Before the first readings, of a gearbox with gears of these ratios, turbine over output speed; without any they are not known.
+    pub fn of_gearbox(ratios: &[f64]) -> Self {
+        Self::with(IntoDirect::of(ratios))
+    }
+
+    fn with(into_direct: IntoDirect) -> Self {
         Self {
             believed: [None; WATCHED],
             faults: [None; WATCHED],
             output_over_wheel: f64::NAN,
+            ratios: [Ratio { value: f64::NAN, time_s: f64::NEG_INFINITY }; 2],
             together_s: f64::NEG_INFINITY,
             stands_since_s: [None; WATCHED],
+            into_direct,
         }
     }
 
@@ -114,7 +178,7 @@ impl SpeedFaults {
         }
         if self.believed.iter().flatten().any(|believed| time_s < believed.time_s - FRESH_S) {
             // The clock began anew.
-            *self = Self::new();
+            *self = Self::with(self.into_direct);
         }
         let stands = self.stands(at, rad_s, time_s);
         let is_fault = self.believed[at].is_some_and(|before| match self.faults[at] {
@@ -125,7 +189,8 @@ impl SpeedFaults {
         if is_fault {
             let another = self.another(at, rad_s, time_s);
             let engine_rad_s = self.turning(ENGINE, time_s);
-            self.faults[at].get_or_insert(Fault { since_s: time_s, another, engine_rad_s });
+            let ratio = self.believed[at].map_or(f64::NAN, |before| before.rad_s / rad_s);
+            self.faults[at].get_or_insert(Fault { since_s: time_s, another, engine_rad_s, ratio });
         } else {
             self.believe(at, rad_s, time_s);
         }
@@ -137,6 +202,14 @@ impl SpeedFaults {
         if let Some(believed) = self.believed.get_mut(role as usize) {
             *believed = Some(Believed { rad_s, time_s, first_s: time_s });
             self.faults[role as usize] = None;
+        }
+        if matches!(role, Role::OutputSpeed | Role::WheelSpeed) {
+            // The ratio of both may be that of a wrong reading.
+            let [before, latest] = &mut self.ratios;
+            if latest.time_s > time_s {
+                *latest = *before;
+            }
+            self.output_over_wheel = latest.value;
         }
     }
 
@@ -152,7 +225,11 @@ impl SpeedFaults {
         if let (OUTPUT | WHEEL, Some(output), Some(wheel)) =
             (at, self.turning(OUTPUT, time_s), self.turning(WHEEL, time_s))
         {
-            self.output_over_wheel = output / wheel;
+            let value = output / wheel;
+            self.output_over_wheel = value;
+            if time_s - self.ratios[1].time_s > RATIO_S {
+                self.ratios = [self.ratios[1], Ratio { value, time_s }];
+            }
         }
     }
 
@@ -182,12 +259,13 @@ impl SpeedFaults {
         (is_short && is_wrong()) || is_dead()
     }
 
-    /// Whether a shift may have brought the turbine to this speed since it was believed last: there was time for it, and the engine went along.
+    /// Whether a shift may have brought the turbine to this speed since it was believed last: it was on the way to the direct gear, there was time
+    /// for it, and the engine went along.
     fn may_have_shifted(&self, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
         let change = rad_s - before.rad_s;
         let engine = fault.engine_rad_s.zip(self.turning(ENGINE, time_s)).map(|(then, now)| now - then);
         let goes_along = engine.is_some_and(|engine| engine * change.signum() > GOES_ALONG * change.abs());
-        goes_along && SHIFTS_RAD_S2 * (time_s - before.time_s) > change.abs()
+        self.into_direct.contains(fault.ratio) && goes_along && SHIFTS_RAD_S2 * (time_s - before.time_s) > change.abs()
     }
 
     /// Whether a reading is zero, as those before it, while the others have shown for some time that the shaft turns.
@@ -438,6 +516,29 @@ mod tests {
         // No shift: the engine does not go along.
         let [_, turbine, ..] = shift(5.0, 5.5);
         assert!((48..=50).contains(&turbine.len()), "{turbine:?}");
+    }
+
+    #[test]
+    fn a_turbine_that_shows_the_output_in_a_shift_is_believed_again_only_where_the_shift_goes_to_the_direct_gear() {
+        // The engine goes along, and the shift is over before the turbine is right again.
+        let rows = |ratios: &[f64], [before, after]: [f64; 2]| {
+            let mut watch = SpeedFaults::of_gearbox(ratios);
+            let is_fault = |row: u32| {
+                let time_s = 0.01 * f64::from(row);
+                let output = 100.0 + 5.0 * time_s;
+                let shifted = ((time_s - 1.0) / 0.5).clamp(0.0, 1.0);
+                let turbine = output * (before + (after - before) * shifted);
+                let shown = if time_s > 1.05 && time_s < 3.0 { output } else { turbine };
+                let speeds = ROLES.into_iter().zip([turbine + 20.0, shown, output, output / 3.5]);
+                speeds.filter(|(role, speed)| watch.is_fault(*role, *speed, time_s)).count()
+            };
+            (0..500).map(is_fault).sum::<usize>()
+        };
+        let (without, with) = ([4.17, 2.34, 1.52, 1.14, 0.87, 0.69], [4.7, 3.13, 2.1, 1.67, 1.28, 1.0, 0.84, 0.67]);
+        assert_eq!(rows(&without, [2.34, 1.52]), 194);
+        assert_eq!(rows(&with, [2.1, 1.67]), 194);
+        assert!(rows(&with, [1.28, 1.0]) < 60);
+        assert!(rows(&[], [2.34, 1.52]) < 194);
     }
 
     #[test]

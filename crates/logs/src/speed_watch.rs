@@ -39,11 +39,20 @@ pub struct SpeedWatch {
 }
 
 impl SpeedWatch {
-    /// Before the first readings.
+    /// Before the first readings, of a gearbox whose gears are not known.
     pub fn new() -> Self {
+        Self::with(SpeedFaults::new())
+    }
+
+    /// Before the first readings, of a gearbox with gears of these ratios, turbine over output speed; without any they are not known.
+    pub fn of_gearbox(ratios: &[f64]) -> Self {
+        Self::with(SpeedFaults::of_gearbox(ratios))
+    }
+
+    fn with(faults: SpeedFaults) -> Self {
         Self {
             speeds: Role::SPEEDS.map(|role| (FrozenSpeed::new(role), HeldSpeed::new())),
-            faults: SpeedFaults::new(),
+            faults,
             copies: Copies::new(),
             newest: NO_SPEEDS,
         }

@@ -135,6 +135,26 @@ fn an_engine_at_idle_speed_is_not_frozen_while_the_car_comes_to_rest() {
 }
 
 #[test]
+fn a_noisy_speed_that_stops_is_frozen_whether_another_one_moves_or_not() {
+    // An engine that idles in a car that stands: with noise of this amplitude in rpm until 4 s, and from then on with this one.
+    let frozen = |resolution: f64, [before, after]: [f64; 2]| {
+        let mut text = "time_s,e_rpm\n".to_owned();
+        for i in 0..600 {
+            let amplitude = if i < 400 { before } else { after };
+            let engine = 800.0 + amplitude * (f64::from(i * i % 613) / 306.0 - 1.0);
+            writeln!(text, "{},{}", f64::from(i) * 0.01, (engine / resolution).round() * resolution).unwrap();
+        }
+        let (_, summary, _) = readings(&text, &map(&["engine_speed=e_rpm"])).unwrap();
+        count(&summary, Quality::Frozen)
+    };
+    assert!((195..=199).contains(&frozen(0.01, [5.0, 0.0])), "{}", frozen(0.01, [5.0, 0.0]));
+    assert!((190..=199).contains(&frozen(0.25, [5.0, 0.0])), "{}", frozen(0.25, [5.0, 0.0]));
+    // Coarse readings of it stand now and then, and so do those of a noise that is small.
+    assert_eq!([0.25, 1.0, 5.0].map(|resolution| frozen(resolution, [5.0, 5.0])), [0; 3]);
+    assert_eq!([0.25, 1.0].map(|resolution| frozen(resolution, [0.3, 0.0])), [0; 2]);
+}
+
+#[test]
 fn scale_offset_delay_and_range_of_the_map_count_in_this_order() {
     let folder = Folder::new("map");
     let text = "[channel.engine_speed]\nname = \"raw\"\nunit = \"rpm\"\nscale = 0.25\noffset = -10\ndelay_s = 0.02\nvalid_range = [0, 8000]\n";

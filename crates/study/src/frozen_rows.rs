@@ -50,9 +50,15 @@ const WATCHED: [Role; 4] = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputS
 const SAME_S: f64 = 1e-6;
 
 impl FrozenRows {
+    /// Of a gearbox whose gears are not known.
     pub(crate) fn new() -> Self {
+        Self::of_gearbox(&[])
+    }
+
+    /// Of a gearbox with gears of these ratios, turbine over output speed.
+    pub(crate) fn of_gearbox(ratios: &[f64]) -> Self {
         Self {
-            speeds: SpeedWatch::new(),
+            speeds: SpeedWatch::of_gearbox(ratios),
             newest_s: [(f64::NEG_INFINITY, None); WATCHED.len()],
             counts: [Counts::default(); WATCHED.len()],
         }

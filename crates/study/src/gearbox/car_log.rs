@@ -135,7 +135,8 @@ impl<'c> CarLog<'c> {
         let rows = rows.with_wheel_radius(car.road.wheel_radius_m)?;
         refuse_misnamed_engine(&rows)?;
         let columns = Columns::of(&rows, car, tables)?;
-        let (clock, frozen, samples) = (RowClock::default(), FrozenRows::new(), RowSamples::new(&rows));
+        let (clock, frozen, samples) =
+            (RowClock::default(), FrozenRows::of_gearbox(&car.gearbox.ratios()), RowSamples::new(&rows));
         let gears = Gears::new([signal::GEAR, signal::TARGET_GEAR]);
         Ok(Self { car, columns, rows, clock, frozen, samples, gears, ahead: LookAhead::new(LOOK_AHEAD_S) })
     }

@@ -92,7 +92,7 @@ impl<'a> CarChannels<'a> {
         }
         let speed_delays_s = SPEEDS
             .map(|role| map.channels.iter().find(|mapped| mapped.role == role).map_or(0.0, |mapped| mapped.delay_s));
-        let readings = Readings::new(log, map)?;
+        let readings = Readings::new(log, map)?.of_gearbox(&car.gearbox.ratios());
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
         let gears = Gears::new([Role::Gear, Role::TargetGear].map(Role::name));
         let (lock_up_applied, pedal, vehicle_m_s, oil_degc) = (false, f64::NAN, None, None);

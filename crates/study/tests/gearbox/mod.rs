@@ -23,6 +23,7 @@ mod ratios_alone;
 mod road_cars;
 mod sensitivity;
 mod shift_bars;
+mod speed_faults;
 mod strokes;
 mod valve_timing;
 mod wheel;

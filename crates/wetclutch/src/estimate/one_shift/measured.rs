@@ -239,7 +239,7 @@ impl<'a> Measured<'a> {
         let finder = ShiftFinder::new(&gearbox, |role| map.has(role))?;
         let look = if is_followed { FOLLOWED_LOOK } else { FIRST_LOOK };
         let mut channels = Channels {
-            steps: Steps::new(Readings::new(log, &map)?),
+            steps: Steps::new(Readings::new(log, &map)?.of_gearbox(&map.gearbox.ratios)),
             asked_of: (command == asked).then_some((vehicle.oncoming.valve, vehicle.error_bounds.pressure_max_pa)),
             looked_at: VecDeque::new(),
             median_step_s: f64::NAN,

@@ -1,0 +1,183 @@
+//! Speeds that fail in a shift: which wrong readings are believed, and which right ones are refused.
+
+use car::{Car, ErrorBudget};
+use logs::{LOOK_AHEAD_S, Quality, Role, SpeedReading, SpeedWatch};
+use observer::gearbox::ShiftInput;
+use observer::{Reading, ShiftTables};
+use plant::car::CarShift;
+use study::gearbox::matrix::{Random, drawn_car, neighbouring_shifts};
+use study::gearbox::{inputs, simulated};
+
+use super::cars::{cars, sensors};
+
+const SPEEDS: [Role; 4] = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
+
+/// A wrong reading nearer to the right one is none, rad/s: what a sensor may err by.
+const NEAR_RAD_S: f64 = 2.0;
+
+/// Two speeds that are further apart do not turn together, rad/s.
+const APART_RAD_S: f64 = 8.0;
+
+/// A wheel sensor rightly reads zero while the output is slower than this, rad/s.
+const CRAWLS_RAD_S: f64 = 10.0;
+
+/// The shift is requested once a sensor is known, s.
+const REQUEST_S: f64 = 4.0;
+
+/// The readings of the four speeds in a row, each with its time, s.
+type Row = [Option<[f64; 2]>; 4];
+
+/// What a channel gives while it fails.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    Zero,
+    Stuck,
+    Shows(usize),
+}
+
+/// Wrong readings that were believed and all of them, and right ones that were refused and all of them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Counts {
+    believed: [u64; 2],
+    refused: [u64; 2],
+}
+
+impl Counts {
+    fn add(&mut self, other: &Self) {
+        for (sum, count) in [(&mut self.believed, other.believed), (&mut self.refused, other.refused)] {
+            *sum = [sum[0] + count[0], sum[1] + count[1]];
+        }
+    }
+}
+
+fn rows(inputs: &[(usize, ShiftInput<f64>)]) -> Vec<Row> {
+    let mut time_s = 0.0;
+    let row = |(_, input): &(usize, ShiftInput<f64>)| {
+        time_s += input.dt_s;
+        let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
+        readings.map(|reading| reading.map(|Reading { value, age_s }| [value, time_s - age_s]))
+    };
+    inputs.iter().map(row).collect()
+}
+
+/// The rows with a fault of a speed from one time to another, s.
+fn failing(right: &[Row], at: usize, fault: Fault, [from_s, to_s]: [f64; 2]) -> Vec<Row> {
+    let mut newest = 0.0;
+    let mut shown = right.to_vec();
+    for (row, right) in shown.iter_mut().zip(right) {
+        let Some([value, time_s]) = &mut row[at] else { continue };
+        if *time_s <= from_s || *time_s > to_s {
+            newest = *value;
+            continue;
+        }
+        *value = match fault {
+            Fault::Zero => 0.0,
+            Fault::Stuck => newest,
+            Fault::Shows(other) => right[other].map_or(*value, |[other, _]| other),
+        };
+    }
+    shown
+}
+
+/// Which readings are refused, at last.
+fn refused(ratios: &[f64], rows: &[Row]) -> Vec<[bool; 4]> {
+    let mut watch = SpeedWatch::of_gearbox(ratios);
+    let mut all = vec![[false; 4]; rows.len()];
+    for (n, row) in rows.iter().enumerate() {
+        for (at, reading) in row.iter().enumerate() {
+            let Some([value, time_s]) = *reading else { continue };
+            let reading = SpeedReading { role: SPEEDS[at], value, time_s, may_be_held: false };
+            let (quality, withdrawn) = watch.judge(reading);
+            all[n][at] = matches!(quality, Quality::Impossible | Quality::Frozen);
+            let Some(withdrawn) = withdrawn else { continue };
+            let of = withdrawn.role as usize;
+            for (refused, row) in all.iter_mut().zip(rows).take(n + 1).rev() {
+                match row[of] {
+                    Some([_, then_s]) if then_s > withdrawn.after_s && time_s - then_s <= LOOK_AHEAD_S => {
+                        refused[of] = true;
+                    }
+                    Some([_, then_s]) if time_s - then_s > LOOK_AHEAD_S => break,
+                    _ => {}
+                }
+            }
+        }
+    }
+    all
+}
+
+fn count(ratios: &[f64], right: &[Row], shown: &[Row], at: usize) -> Counts {
+    let mut counts = Counts::default();
+    for ((right, shown), refused) in right.iter().zip(shown).zip(refused(ratios, shown)) {
+        let crawls = right[2].is_some_and(|[output, _]| output.abs() < CRAWLS_RAD_S);
+        for speed in 0..4 {
+            let (Some([right, _]), Some([value, _])) = (right[speed], shown[speed]) else { continue };
+            if speed == at && (value - right).abs() > NEAR_RAD_S {
+                if crawls {
+                    continue;
+                }
+                counts.believed[0] += u64::from(!refused[speed]);
+                counts.believed[1] += 1;
+            } else if value == right {
+                counts.refused[0] += u64::from(refused[speed]);
+                counts.refused[1] += 1;
+            }
+        }
+    }
+    counts
+}
+
+/// Of every neighbouring shift of a car, each speed with each fault of each length at random times: those that begin between two speeds that are
+/// apart, and the others.
+fn of_car(known: &Car) -> Vec<(usize, Fault, [Counts; 2])> {
+    let sensors = sensors();
+    let budget = ErrorBudget::of_car(known).read_by(known, Some(&sensors));
+    let tables = ShiftTables::of_car(known, &budget).unwrap();
+    let ratios = known.gearbox.ratios();
+    let mut random = Random(1);
+    let mut all: Vec<(usize, Fault, [Counts; 2])> = (0..4)
+        .flat_map(|at| {
+            let others = (0..4).filter(move |other| *other != at).map(Fault::Shows);
+            [Fault::Zero, Fault::Stuck].into_iter().chain(others).map(move |fault| (at, fault, Default::default()))
+        })
+        .collect();
+    for shift in neighbouring_shifts(known, &tables).0 {
+        let truth = drawn_car(known, shift.from, shift.to, 1);
+        let usual = CarShift::usual(known, shift.from, shift.to, shift.throttle());
+        let settled = CarShift { request_s: REQUEST_S, duration_s: REQUEST_S + 4.0, ..usual };
+        let samples = simulated(known, &truth, &settled).unwrap();
+        let right = rows(&inputs(known, &tables, &samples, &sensors, shift.noise(1)));
+        assert!(refused(&ratios, &right).iter().flatten().all(|refused| !refused), "{shift:?}");
+        for (at, fault, counts) in &mut all {
+            for length_s in [0.1, 0.5, 1.0, 2.0] {
+                let from_s = REQUEST_S - 0.5 + 3.0 * random.uniform();
+                let shown = failing(&right, *at, *fault, [from_s, from_s + length_s]);
+                let together = begins_together(&right, *at, *fault, from_s);
+                counts[usize::from(together)].add(&count(&ratios, &right, &shown, *at));
+            }
+        }
+    }
+    all
+}
+
+/// Whether the fault begins between two speeds that turn together: it shows in nothing but what comes later.
+fn begins_together(right: &[Row], at: usize, fault: Fault, from_s: f64) -> bool {
+    let Fault::Shows(other) = fault else { return false };
+    let begins = right.iter().find(|row| row[at].is_some_and(|[_, time_s]| time_s > from_s));
+    let speeds = begins.and_then(|row| row[at].zip(row[other]));
+    speeds.is_some_and(|([one, _], [other, _])| (one - other).abs() < APART_RAD_S)
+}
+
+#[test]
+fn a_speed_that_fails_in_a_shift_is_refused() {
+    for (n, known) in cars().iter().enumerate() {
+        let mut together = Counts::default();
+        for (at, fault, [apart, near]) in of_car(known) {
+            together.add(&near);
+            let name = SPEEDS[at].name();
+            assert_eq!(apart.believed[0], 0, "car {n}, {name} {fault:?}: {apart:?}");
+            assert!(apart.refused[0] * 2000 <= apart.refused[1], "car {n}, {name} {fault:?}: {apart:?}");
+        }
+        assert!(together.believed[0] * 10 <= together.believed[1], "car {n}: {together:?}");
+        println!("car {n}, copies that begin while both speeds turn together: {together:?}");
+    }
+}
