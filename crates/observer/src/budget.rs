@@ -30,7 +30,7 @@ pub struct Budget<T> {
     pub fill: Option<FillBudget<T>>,
     /// Minimum and maximum factor on the clutch's friction.
     pub friction_factor: [T; 2],
-    /// Maximum peak of the drag of its open plates, N m ([`drag_torque`]).
+    /// Maximum peak of the drag of its open plates, N m ([`drivetrain::clutch::drag_torque`]).
     pub drag_n_m: T,
     /// Error of a reading of the slip, rad/s.
     pub slip_rad_s: T,

@@ -4,6 +4,7 @@
 //! Between two messages it may have changed and come back, and the range allows for no more than what lies between both.
 
 use car::Car;
+use drivetrain::Real;
 use observer::Reading;
 use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
@@ -195,7 +196,7 @@ impl CommandTimes {
         // How far the times are from multiples, in classes: a message may come in the row before or after.
         let off = classes.iter().map(beyond).max().filter(|off| *off <= 1)?;
         let others = i32::try_from(classes.len() - 1).unwrap_or(i32::MAX);
-        let by_chance = ((1 + 2 * off) as f64 / period as f64).min(1.0).powi(others);
+        let by_chance = Real::powi(((1 + 2 * off) as f64 / period as f64).min(1.0), others);
         (by_chance <= PERIOD_BY_CHANCE).then_some(period as f64 * CLASS_S)
     }
 
