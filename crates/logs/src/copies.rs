@@ -6,11 +6,11 @@
 //! line through the last two differences does not reach zero: it misses it by [`SUDDEN`] times the usual error of such a line. And one of both speeds
 //! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. Where the difference has a noise much larger than its resolution
 //! ([`FINE`]), two sensors never agree to the last digit, also while a clutch makes their shafts one: then it is enough that one of both leaves the line
-//! through its own last values by [`SUDDEN`] times its usual error, and the other one by less than half of that. Of turbine and output, which turn
-//! together in the direct gear, the one is a copy that the wheels contradict: the output if it has left their speed by [`TIED`], else the turbine. Of
-//! engine and turbine a copy that begins while they turn together, as behind a lock-up clutch, is not found: a control unit may send one for both.
+//! through its own last values by [`SUDDEN`] times its usual error, and the other one by less than half of that. A copy that begins while both
+//! shafts turn together, as in the direct gear or behind a lock-up clutch, is not found: a control unit may send one for both.
 
 use crate::Role;
+use crate::frozen::NOISE_RAD_S;
 use crate::speed_faults::LONGEST_S;
 
 /// So many equal samples show it.
@@ -23,10 +23,8 @@ const LATEST: f64 = 0.125;
 /// Samples after which a noise is known, and how many times the smallest change of the difference that was seen it is \[chosen\].
 const MANY: u32 = 100;
 const FINE: f64 = 20.0;
-/// So many equal samples of noisy speeds show a copy without a jump.
-const SURE: u32 = 5;
-/// By this fraction output and wheel speed part while their shafts twist, at most \[chosen\].
-const TIED: f64 = 0.04;
+/// Of the changes of a noise one in so many at least turns the difference the other way than the one before, by more than [`NOISE_RAD_S`] \[chosen\].
+const TURNS: u32 = 3;
 /// In slower samples a shift passes between two of them, s: an inertia phase takes longer.
 const SLOWEST_S: f64 = 0.05;
 /// Below this a shaft stands, rad/s.
@@ -44,29 +42,15 @@ const PAIRS: [[usize; 2]; 6] = [
     [Role::EngineSpeed as usize, Role::WheelSpeed as usize],
 ];
 
-/// Turbine and output of the pairs.
-const TURBINE_AND_OUTPUT: usize = 1;
-
 /// Those whose shafts a clutch makes one while one of both fails: what is refused for another reason is not compared, but for noisy ones.
-const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[TURBINE_AND_OUTPUT], PAIRS[2]];
+const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[1], PAIRS[2]];
 
 /// A reading: its value, rad/s, and its time, s.
 pub(crate) type Stamped = [f64; 2];
 
 /// Watches the speeds of the four shafts.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Copies {
-    pairs: [Pair; PAIRS.len()],
-    wheels: Wheels,
-}
-
-/// Output over wheel speed.
-#[derive(Debug, Clone, Copy)]
-struct Wheels {
-    newest_rad_s: f64,
-    /// Its mean while turbine and output differed; not a number before.
-    ratio: f64,
-}
+pub(crate) struct Copies([Pair; PAIRS.len()]);
 
 /// Two speeds.
 #[derive(Debug, Clone, Copy)]
@@ -83,6 +67,9 @@ struct Pair {
     /// By how much a change differs from the one before: its mean, the last one, and the smallest that was not zero, rad/s.
     error: [f64; 2],
     finest: f64,
+    /// How often it turned to the other side, and where it went last.
+    turns: u32,
+    is_more: bool,
     /// The same of each speed: its last change, and the mean by which a change differs from the one before, rad/s.
     own: [[f64; 2]; 2],
     /// Samples in which they are equal, and which of both jumped to the other, if one did.
@@ -100,11 +87,13 @@ impl Copies {
             changes: 0,
             error: [0.0; 2],
             finest: f64::INFINITY,
+            turns: 0,
+            is_more: false,
             own: [[0.0; 2]; 2],
             equal: 0,
             jumped: None,
         };
-        Self { pairs: [pair; PAIRS.len()], wheels: Wheels { newest_rad_s: f64::NAN, ratio: f64::NAN } }
+        Self([pair; PAIRS.len()])
     }
 
     /// Takes a reading, and whether it is refused for another reason. Returns the speed whose channel shows another one, with its last
@@ -112,11 +101,7 @@ impl Copies {
     pub(crate) fn push(&mut self, role: Role, reading: Stamped, is_fault: bool) -> Option<(Role, Stamped)> {
         let at = role as usize;
         let mut found = None;
-        if !is_fault {
-            self.wheels.take(role, reading[0], self.pairs[TURBINE_AND_OUTPUT].equal > 0);
-        }
-        let wheels = self.wheels;
-        for (pair, of) in self.pairs.iter_mut().zip(PAIRS) {
+        for (pair, of) in self.0.iter_mut().zip(PAIRS) {
             let Some(which) = of.iter().position(|speed| *speed == at) else { continue };
             if is_fault && MAY_JOIN.contains(&of) && !pair.is_fine() {
                 continue;
@@ -125,14 +110,12 @@ impl Copies {
             pair.newest[which] = Some(reading);
             if let [Some(one), Some(other)] = pair.newest {
                 pair.newest = [None; 2];
-                let newest = [one, other];
-                let is_tied = of == PAIRS[TURBINE_AND_OUTPUT];
-                let copy = pair.compare(newest).or_else(|| pair.contradicted(newest, wheels).filter(|_| is_tied));
+                let copy = pair.compare([one, other]);
                 found = found.or(copy.map(|(which, before)| (Role::SPEEDS[of[which]], before, of)));
             }
         }
         let (copied, before, by) = found?;
-        for (pair, of) in self.pairs.iter_mut().zip(PAIRS) {
+        for (pair, of) in self.0.iter_mut().zip(PAIRS) {
             if of != by && of.contains(&(copied as usize)) {
                 pair.before = None;
             }
@@ -141,37 +124,7 @@ impl Copies {
     }
 }
 
-impl Wheels {
-    /// Takes a reading of output or wheel. An output that may be a copy does not count in the mean.
-    fn take(&mut self, role: Role, rad_s: f64, may_be_copy: bool) {
-        match role {
-            Role::WheelSpeed => self.newest_rad_s = rad_s,
-            Role::OutputSpeed
-                if !may_be_copy && rad_s.abs() > STANDS_RAD_S && self.newest_rad_s.abs() > STANDS_RAD_S =>
-            {
-                let ratio = rad_s / self.newest_rad_s;
-                let mean = if self.ratio.is_nan() { ratio } else { self.ratio };
-                self.ratio = mean + LATEST * (ratio - mean);
-            }
-            _ => {}
-        }
-    }
-
-    /// The fraction by which an output has left the speed of the wheels; none where that is not known.
-    fn parted(self, output_rad_s: f64) -> Option<f64> {
-        Some((output_rad_s / (self.newest_rad_s * self.ratio) - 1.0).abs()).filter(|parted| parted.is_finite())
-    }
-}
-
 impl Pair {
-    /// Which of turbine and output, noisy and equal for long, the wheels contradict, with its last reading that is right.
-    fn contradicted(&self, newest: [Stamped; 2], wheels: Wheels) -> Option<(usize, Stamped)> {
-        let before = self.before.filter(|_| self.equal >= SURE && self.is_fine())?;
-        let which = usize::from(wheels.parted(newest[1][0])? > TIED);
-        let is_short = newest[which][1] - before[which][1] <= LONGEST_S;
-        is_short.then_some((which, before[which]))
-    }
-
     /// Which of both is the other's value, with its last reading that is right.
     fn compare(&mut self, newest: [Stamped; 2]) -> Option<(usize, Stamped)> {
         let is_fault = std::mem::take(&mut self.is_fault);
@@ -199,7 +152,12 @@ impl Pair {
         let difference = |[[one, _], [other, _]]: [Stamped; 2]| one - other;
         if let Some(before) = self.before.filter(|_| self.equal == 0) {
             let change = difference(newest) - difference(before);
-            let error = (change - self.change).abs();
+            let turn = change - self.change;
+            let error = turn.abs();
+            if error > NOISE_RAD_S {
+                let was_more = core::mem::replace(&mut self.is_more, turn > 0.0);
+                self.turns = self.turns.saturating_add(u32::from(was_more != self.is_more));
+            }
             self.change = change;
             self.error = [self.error[0] + LATEST * (error - self.error[0]), error];
             self.finest = if error > 0.0 { self.finest.min(error) } else { self.finest };
@@ -215,7 +173,7 @@ impl Pair {
 
     /// Whether two sensors never agree to the last digit: their noise is known, and far larger than their resolution.
     fn is_fine(&self) -> bool {
-        self.changes >= MANY && self.error[0] > FINE * self.finest
+        self.changes >= MANY && self.turns >= self.changes / TURNS && self.error[0] > FINE * self.finest
     }
 
     /// Which of two noisy speeds left its own way to the other.
@@ -327,38 +285,6 @@ mod tests {
             };
             assert_eq!(found(grips), [], "{per_row}");
         }
-    }
-
-    #[test]
-    fn of_turbine_and_output_that_begin_to_agree_in_the_direct_gear_the_wheels_show_which_is_the_copy() {
-        // Out of the direct gear from 2.5 s on; from 2.1 s to 3.1 s one of both shows the other. Without noise, and without wheels, nothing shows it.
-        let noise = |row: u32, factor: u32| f64::from(row * row * factor % 1009) / 5045.0 - 0.1;
-        let copies = |is_turbine: bool, noisy: f64, has_wheels: bool| {
-            let mut copies = Copies::new();
-            let mut rows = Vec::new();
-            for row in 0..400_u32 {
-                let time_s = 0.01 * f64::from(row);
-                let output = 200.0 + noisy * noise(row, 7);
-                let turbine = 200.0 + 2.0 * f64::from(row.clamp(250, 290) - 250) + noisy * noise(row, 11);
-                let (turbine, output) = match (210..310).contains(&row) {
-                    true if is_turbine => (output, output),
-                    true => (turbine, turbine),
-                    false => (turbine, output),
-                };
-                let wheel = 60.0 + 0.2 * noisy * noise(row, 13);
-                let speeds = [(Role::TurbineSpeed, turbine), (Role::OutputSpeed, output), (Role::WheelSpeed, wheel)];
-                for (role, speed) in speeds.into_iter().take(if has_wheels { 3 } else { 2 }) {
-                    let found = copies.push(role, [speed, time_s], false);
-                    rows.extend(found.map(|(role, _)| (row, role)));
-                }
-            }
-            rows
-        };
-        let found = |is_turbine: bool| copies(is_turbine, 1.0, true);
-        assert_eq!(found(true), (214..310).map(|row| (row, Role::TurbineSpeed)).collect::<Vec<_>>());
-        let wrong = found(false).into_iter().filter(|(row, _)| *row >= 258).collect::<Vec<_>>();
-        assert_eq!(wrong, (258..310).map(|row| (row, Role::OutputSpeed)).collect::<Vec<_>>());
-        assert_eq!([copies(true, 0.0, true), copies(true, 1.0, false)], [vec![], vec![]]);
     }
 
     #[test]

@@ -51,6 +51,9 @@ pub const MANY_CHANGES: u32 = 200;
 /// slowly than its speed is read.
 pub const NOISY: u32 = 5;
 
+/// A smaller change is no noise, rad/s or m/s \[chosen\]: it may be the tolerance of a simulation.
+pub const NOISE_RAD_S: f64 = 0.01;
+
 /// Below this a shaft stands, rad/s.
 const STANDS_RAD_S: f64 = 1.0;
 
@@ -127,8 +130,10 @@ impl FrozenSpeed {
                 self.quantum = self.quantum.min(change);
                 self.moves += LATEST * (change / f64::from(before.samples) - self.moves);
                 self.changes = self.changes.saturating_add(1);
-                let was_rising = core::mem::replace(&mut self.is_rising, value > before.value);
-                self.turns = self.turns.saturating_add(u32::from(was_rising != self.is_rising));
+                if change > NOISE_RAD_S {
+                    let was_rising = core::mem::replace(&mut self.is_rising, value > before.value);
+                    self.turns = self.turns.saturating_add(u32::from(was_rising != self.is_rising));
+                }
                 if !before.frozen && before.value.abs() > STANDS_RAD_S {
                     self.longest_turning = self.longest_turning.max(before.samples);
                 }

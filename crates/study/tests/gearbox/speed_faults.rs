@@ -177,7 +177,7 @@ fn a_speed_that_fails_in_a_shift_is_refused() {
             assert_eq!(apart.believed[0], 0, "car {n}, {name} {fault:?}: {apart:?}");
             assert!(apart.refused[0] * 2000 <= apart.refused[1], "car {n}, {name} {fault:?}: {apart:?}");
         }
-        assert!(together.believed[0] * 10 <= together.believed[1], "car {n}: {together:?}");
+        assert!(together.believed[0] * 2 <= together.believed[1], "car {n}: {together:?}");
         println!("car {n}, copies that begin while both speeds turn together: {together:?}");
     }
 }
