@@ -4,8 +4,8 @@
 //! sensors of two shafts agree to the last digit where the shafts turn together, as behind a lock-up clutch, and then their speeds came together by
 //! and by. A channel is a copy where three things hold. Both speeds agree to the last digit for [`SAMPLES`] samples. Before that they differed, and a
 //! line through the last two differences does not reach zero: it misses it by [`SUDDEN`] times the usual error of such a line. And one of both speeds
-//! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. Where the difference has a noise much larger than its resolution
-//! ([`FINE`]), two sensors never agree to the last digit, also while a clutch makes their shafts one: then it is enough that one of both leaves the line
+//! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. Where the difference has a noise much larger than its resolution,
+//! two sensors never agree to the last digit, also while a clutch makes their shafts one: then it is enough that one of both leaves the line
 //! through its own last values by [`SUDDEN`] times its usual error, and the other one by less than half of that. A copy that begins while both
 //! shafts turn together, as in the direct gear or behind a lock-up clutch, is not found: a control unit may send one for both.
 
@@ -20,9 +20,13 @@ const SUDDEN: (f64, f64) = (8.0, 1.0);
 /// Samples in which the usual error is learnt, and weight of one in its mean.
 const LEARNT: u32 = 20;
 const LATEST: f64 = 0.125;
-/// Samples after which a noise is known, and how many times the smallest change of the difference that was seen it is \[chosen\].
-const MANY: u32 = 100;
-const FINE: f64 = 20.0;
+/// Samples after which a noise is known, and after which two equal ones are no chance \[chosen\].
+const MANY: u32 = 200;
+const SURE: u32 = 5;
+/// Of the changes of the difference of two fine speeds one in so many at most is that before, within this fraction of the speeds \[chosen\]: coarse
+/// ones often are.
+const FINE: u32 = 500;
+const ALIKE: f64 = 1e-6;
 /// Of the changes of a noise one in so many at least turns the difference the other way than the one before, by more than [`NOISE_RAD_S`] \[chosen\].
 const TURNS: u32 = 3;
 /// In slower samples a shift passes between two of them, s: an inertia phase takes longer.
@@ -64,9 +68,9 @@ struct Pair {
     /// Change of the difference in the last sample, rad/s, and how many changes there were.
     change: f64,
     changes: u32,
-    /// By how much a change differs from the one before: its mean, the last one, and the smallest that was not zero, rad/s.
+    /// By how much a change differs from the one before: its mean and the last one, rad/s; and how often it did not.
     error: [f64; 2],
-    finest: f64,
+    alike: u32,
     /// How often it turned to the other side, and where it went last.
     turns: u32,
     is_more: bool,
@@ -75,6 +79,8 @@ struct Pair {
     /// Samples in which they are equal, and which of both jumped to the other, if one did.
     equal: u32,
     jumped: Option<usize>,
+    /// Samples in which they are to be equal until it is believed.
+    needed: u32,
 }
 
 impl Copies {
@@ -86,12 +92,13 @@ impl Copies {
             change: 0.0,
             changes: 0,
             error: [0.0; 2],
-            finest: f64::INFINITY,
+            alike: 0,
             turns: 0,
             is_more: false,
             own: [[0.0; 2]; 2],
             equal: 0,
             jumped: None,
+            needed: SAMPLES,
         };
         Self([pair; PAIRS.len()])
     }
@@ -140,10 +147,12 @@ impl Pair {
         }
         let before = self.before?;
         if self.equal == 0 {
-            self.jumped = self.jump(before, newest).or_else(|| self.leaves(before, newest));
+            let jumped = self.jump(before, newest);
+            self.needed = if jumped.is_some() { SAMPLES } else { SURE };
+            self.jumped = jumped.or_else(|| self.leaves(before, newest));
         }
         self.equal = self.equal.saturating_add(1);
-        let which = self.jumped.filter(|_| self.equal >= SAMPLES)?;
+        let which = self.jumped.filter(|_| self.equal >= self.needed)?;
         let is_short = newest[which][1] - before[which][1] <= LONGEST_S;
         is_short.then_some((which, before[which]))
     }
@@ -160,7 +169,8 @@ impl Pair {
             }
             self.change = change;
             self.error = [self.error[0] + LATEST * (error - self.error[0]), error];
-            self.finest = if error > 0.0 { self.finest.min(error) } else { self.finest };
+            let size = newest[0][0].abs().max(newest[1][0].abs());
+            self.alike = self.alike.saturating_add(u32::from(error <= ALIKE * size));
             for ([change, mean], which) in self.own.iter_mut().zip(0..) {
                 let now = newest[which][0] - before[which][0];
                 *mean += LATEST * ((now - *change).abs() - *mean);
@@ -173,7 +183,7 @@ impl Pair {
 
     /// Whether two sensors never agree to the last digit: their noise is known, and far larger than their resolution.
     fn is_fine(&self) -> bool {
-        self.changes >= MANY && self.turns >= self.changes / TURNS && self.error[0] > FINE * self.finest
+        self.changes >= MANY && self.turns >= self.changes / TURNS && self.alike <= 1 + self.changes / FINE
     }
 
     /// Which of two noisy speeds left its own way to the other.
@@ -284,6 +294,21 @@ mod tests {
                 [engine, engine - (100.0 - per_row * time - 0.3 * time * time).max(0.0)]
             };
             assert_eq!(found(grips), [], "{per_row}");
+        }
+    }
+
+    #[test]
+    fn coarse_readings_of_two_noisy_speeds_agree_by_chance() {
+        let noise = |row: u32, factor: u32| f64::from(row * row % 1009 * factor % 1009) / 1009.0 - 0.5;
+        for resolution in [0.026, 0.1, 0.5] {
+            let coarse = |speed: f64| (speed / resolution).round() * resolution;
+            let speeds = |row: u32| {
+                // They come together and part every 40 rows.
+                let slip = if row / 40 % 2 == 0 { 0.0 } else { 6.0 };
+                let engine = 200.0 + 0.02 * f64::from(row) + noise(row, 7);
+                [coarse(engine), coarse(200.0 - slip + 0.02 * f64::from(row) + noise(row, 11))]
+            };
+            assert!(found(speeds).len() <= 3, "{resolution}: {:?}", found(speeds));
         }
     }
 
