@@ -259,41 +259,45 @@ impl<'a, T: Real> GearboxTables<'a, T> {
 
     /// A shift out of a gear: in the gear its balance of the turbine holds with the offgoing clutch alone.
     pub(super) fn out_of(&self, gear: Gear) -> Option<&ShiftRow<T>> {
-        self.shifts.iter().find(|shift| shift.command().from == gear)
+        let gear = gear.place()?;
+        self.shifts.iter().find(|shift| shift.from == gear)
     }
 
     /// Mass of turbine and output speed in a gear or in a shift, kg m^2.
     pub(super) fn mass(&self, command: ShiftCommand) -> Option<&[[T; 2]; 2]> {
-        let of_shift = |row: &&ShiftRow<T>| row.command() == command;
+        let [from, to] = [command.from.place()?, command.to.place()?];
+        let of_shift = |row: &&ShiftRow<T>| row.from == from && row.to == to;
         let row = if command.is_steady() { self.out_of(command.from) } else { self.shifts.iter().find(of_shift) };
         row.map(|row| &row.mass_kg_m2)
     }
 
     /// Whether a one-way clutch holds a gear.
     pub(super) fn is_one_way(&self, gear: Gear) -> bool {
-        let holds = |row: &ShiftRow<T>| {
-            let ([off, on], ShiftCommand { from, to }) = (&row.clutches, row.command());
-            (from == gear && off.is_one_way()) || (to == gear && on.is_one_way())
+        let holds = |gear| {
+            self.shifts.iter().any(|row| {
+                let [off, on] = &row.clutches;
+                (row.from == gear && off.is_one_way()) || (row.to == gear && on.is_one_way())
+            })
         };
-        self.shifts.iter().any(holds)
+        gear.place().is_some_and(holds)
     }
 
     /// The shift between two gears, if it is one between two known elements.
     pub fn shift(&self, from: usize, to: usize) -> Option<&ShiftRow<T>> {
-        self.commanded(ShiftCommand::between(from, to))
+        let elements = self.elements.len().min(MAX_ELEMENTS);
+        let is_known = |clutch: &ShiftClutch<T>| {
+            clutch.is_one_way() || clutch.element.place().is_some_and(|place| place < elements)
+        };
+        let known = |row: &&ShiftRow<T>| row.from == from && row.to == to && row.clutches.iter().all(is_known);
+        self.shifts.iter().find(known)
     }
 
     /// The shift that is commanded, if it is one between two known elements; `None` in a gear.
     pub fn commanded(&self, command: ShiftCommand) -> Option<&ShiftRow<T>> {
-        let elements = self.elements.len().min(MAX_ELEMENTS);
-        let known = |row: &&ShiftRow<T>| {
-            row.command() == command
-                && row
-                    .clutches
-                    .iter()
-                    .all(|clutch| clutch.is_one_way() || clutch.element.place().is_some_and(|place| place < elements))
-        };
-        self.shifts.iter().find(known)
+        if command.is_steady() {
+            return None;
+        }
+        self.shift(command.from.place()?, command.to.place()?)
     }
 }
 

@@ -1,4 +1,4 @@
-"""Measures the package: size, import, a step of the observer, a million rows. `python python/bars.py` with the package installed.
+"""Measures the package: size, import, a step of the observer, a million rows. `python python/tests/bars.py` with the package installed.
 
 With the command's path in the variable WETCLUTCH the same log is estimated by the command, too.
 """
@@ -19,7 +19,7 @@ import polars as pl
 
 import wetclutch as wc
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 ROWS = 1_000_000
 
 
