@@ -304,7 +304,7 @@ mod tests {
             let coarse = |speed: f64| (speed / resolution).round() * resolution;
             let speeds = |row: u32| {
                 // They come together and part every 40 rows.
-                let slip = if row / 40 % 2 == 0 { 0.0 } else { 6.0 };
+                let slip = if (row / 40).is_multiple_of(2) { 0.0 } else { 6.0 };
                 let engine = 200.0 + 0.02 * f64::from(row) + noise(row, 7);
                 [coarse(engine), coarse(200.0 - slip + 0.02 * f64::from(row) + noise(row, 11))]
             };
