@@ -5,7 +5,7 @@
 //! and by. A channel is a copy where three things hold. Both speeds agree to the last digit for [`SAMPLES`] samples. Before that they differed, and a
 //! line through the last two differences does not reach zero: it misses it by [`SUDDEN`] times the usual error of such a line. And one of both speeds
 //! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. Where the difference has a noise much larger than its resolution,
-//! two sensors never agree to the last digit, also while a clutch makes their shafts one: then it is enough that one of both leaves the line
+//! two sensors hardly agree to the last digit, also while a clutch makes their shafts one: then it is enough that one of both leaves the line
 //! through its own last values by [`SUDDEN`] times its usual error, and the other one by less than half of that. A copy that begins while both
 //! shafts turn together, as in the direct gear or behind a lock-up clutch, is not found: a control unit may send one for both.
 
@@ -20,7 +20,7 @@ const SUDDEN: (f64, f64) = (8.0, 1.0);
 /// Samples in which the usual error is learnt, and weight of one in its mean.
 const LEARNT: u32 = 20;
 const LATEST: f64 = 0.125;
-/// Samples after which a noise is known, and after which two equal ones are no chance \[chosen\].
+/// Samples after which a noise is known, and after which equal ones are hardly a chance \[chosen\].
 const MANY: u32 = 200;
 const SURE: u32 = 5;
 /// Of the changes of the difference of two fine speeds one in so many at most is that before, within this fraction of the speeds \[chosen\]: coarse
@@ -181,7 +181,7 @@ impl Pair {
         (self.before, self.equal, self.jumped) = (Some(newest), 0, None);
     }
 
-    /// Whether two sensors never agree to the last digit: their noise is known, and far larger than their resolution.
+    /// Whether two sensors hardly agree to the last digit by chance: their noise is known, and far larger than their resolution.
     fn is_fine(&self) -> bool {
         self.changes >= MANY && self.turns >= self.changes / TURNS && self.alike <= 1 + self.changes / FINE
     }
