@@ -9,6 +9,7 @@ use wetclutch::estimate::{GearPair, ShiftChoice};
 use wetclutch::{Error, EstimateOptions, InMemory, LogInput, VehicleFile};
 
 use crate::car::parsed;
+use crate::file::GivenFile;
 use crate::error::exception;
 use crate::table::Table;
 use crate::work;
@@ -19,7 +20,7 @@ use crate::work;
 struct Given {
     observer: Option<String>,
     method: Option<String>,
-    sensors: Option<PathBuf>,
+    sensors: Option<GivenFile>,
     columns: Vec<String>,
     shift: Option<usize>,
     shifts: Vec<String>,
@@ -67,7 +68,7 @@ impl Given {
         Ok(EstimateOptions {
             observer: self.observer.as_deref().map(wetclutch::observer_named).transpose()?,
             method: self.method.as_deref().map(wetclutch::method_named).transpose()?,
-            sensors: self.sensors.as_deref().map(wetclutch::read_sensors).transpose()?,
+            sensors: self.sensors.map(GivenFile::sensors).transpose()?,
             columns: self.columns,
             shifts,
             learnt: self.learnt.as_deref().map(|text| vehicle.learnt_of(text)).transpose()?,

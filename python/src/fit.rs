@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use wetclutch::{Error, FitOptions, Fitted, InMemory, LogInput};
 
 use crate::car::{Described, described, parsed};
+use crate::file::GivenFile;
 use crate::estimate::Mapping;
 use crate::table::Table;
 use crate::work::{self, Report};
@@ -26,7 +27,7 @@ pub(crate) fn fit(
     py: Python<'_>,
     car: (String, String, Option<String>),
     logs: Vec<Given>,
-    sensors: Option<PathBuf>,
+    sensors: Option<GivenFile>,
     with_page: bool,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Found> {
@@ -43,7 +44,7 @@ pub(crate) fn fit(
         let inputs =
             mapped.iter().map(|(path, table, map)| LogInput { path, memory: table.as_ref().map(InMemory::Table), map });
         let inputs: Vec<LogInput<'_>> = inputs.collect();
-        let sensors = sensors.as_deref().map(wetclutch::read_sensors).transpose()?;
+        let sensors = sensors.map(GivenFile::sensors).transpose()?;
         let options = FitOptions { sensors, output: None, with_page, interrupt: Some(work.stop()) };
         let mut notes = Vec::new();
         let found = wetclutch::fit(

@@ -8,6 +8,7 @@ mod design;
 mod error;
 mod estimate;
 mod fit;
+mod file;
 mod hidden;
 mod observer;
 mod simulate;
@@ -35,6 +36,7 @@ fn _wetclutch(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(car::gearboxes, module)?)?;
     module.add_function(wrap_pyfunction!(check::errors_of_file, module)?)?;
     module.add_function(wrap_pyfunction!(contents::log_channels, module)?)?;
+    module.add_function(wrap_pyfunction!(check::errors_of_texts, module)?)?;
     module.add_function(wrap_pyfunction!(contents::log_map, module)?)?;
     module.add_function(wrap_pyfunction!(contents::shifts_of_log, module)?)?;
     module.add_function(wrap_pyfunction!(design::design, module)?)?;
@@ -42,6 +44,8 @@ fn _wetclutch(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
     module.add_function(wrap_pyfunction!(simulate::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(study::study_files, module)?)?;
+    module.add_function(wrap_pyfunction!(simulate::check_drive, module)?)?;
+    module.add_function(wrap_pyfunction!(simulate::check_sensors, module)?)?;
     module.add_function(wrap_pyfunction!(study::study_rows, module)?)?;
     module.add_function(wrap_pyfunction!(study::study_table, module)?)?;
     Ok(())

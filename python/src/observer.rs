@@ -1,6 +1,5 @@
 //! The gearbox filter step by step.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
@@ -9,6 +8,7 @@ use wetclutch::{ElementId, Error, Estimator, Gear, GearId, Reading, ShiftCommand
 
 use crate::car::parsed;
 use crate::error::exception;
+use crate::file::GivenFile;
 use crate::step::{NEUTRAL, Names, StepEstimate};
 
 /// A reading: its value, or a pair of value and age, s.
@@ -54,7 +54,7 @@ type Pickled<'py> = (Bound<'py, PyAny>, (Texts, Bound<'py, PyBytes>));
 /// Args:
 ///     car: A car with a gearbox.
 ///     shift: Shift that is commanded in the steps without `gear`, such as "1-2".
-///     sensors: File whose table `sensors` describes the sensors.
+///     sensors: `Sensors`, or a file whose table `sensors` describes them.
 ///     learnt: What was learnt of the car before: `Estimates.learnt`, or `learnt` of another observer.
 ///
 /// Raises:
@@ -78,13 +78,13 @@ impl Observer {
     fn new(
         car: &Bound<'_, PyAny>,
         shift: Option<&str>,
-        sensors: Option<PathBuf>,
+        sensors: Option<GivenFile>,
         learnt: Option<&str>,
     ) -> PyResult<Self> {
         let py = car.py();
         let (name, text, gearbox): (String, String, Option<String>) = car.getattr("_native")?.extract()?;
         let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
-        let sensors = sensors.as_deref().map(Source::read).transpose().map_err(|error| exception(py, &error.into()))?;
+        let sensors = sensors.map(GivenFile::source).transpose().map_err(|error| exception(py, &error))?;
         let made_with = MadeWith { shift: shift.map(str::to_owned), sensors };
         Self::made(vehicle, made_with, learnt).map_err(|error| exception(py, &error))
     }

@@ -1,23 +1,49 @@
 //! Simulated drives.
 
 use std::cell::Cell;
-use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use wetclutch::{Error, VehicleFile};
 
 use crate::car::parsed;
 use crate::error::exception;
+use crate::file::GivenFile;
 use crate::table::Table;
 use crate::work::{self, Report};
 
-/// Drives a car through a drive file: every signal, what the car measures, and distance in m, shifts and maximum speed in m/s.
+/// Checks a drive file: its text, its name and its length, s.
 #[pyfunction]
-#[pyo3(signature = (car, drive, seed, progress))]
+pub(crate) fn check_drive(py: Python<'_>, drive: GivenFile) -> PyResult<(String, String, f64)> {
+    let checked = || -> Result<_, Error> {
+        let source = drive.source()?;
+        let text = source.text.clone();
+        let drive = wetclutch::drive_of(source)?;
+        let duration_s = drive.duration_s();
+        Ok((text, drive.name, duration_s))
+    };
+    checked().map_err(|error| exception(py, &error))
+}
+
+/// Checks a file with the table of sensors: its text.
+#[pyfunction]
+pub(crate) fn check_sensors(py: Python<'_>, sensors: GivenFile) -> PyResult<String> {
+    let checked = || -> Result<_, Error> {
+        let source = sensors.source()?;
+        wetclutch::sensors_of(&source)?;
+        Ok(source.text)
+    };
+    checked().map_err(|error| exception(py, &error))
+}
+
+/// Drives a car through a drive file, with these sensors in place of those of the file if they are given: every signal, what the car measures,
+/// and distance in m, shifts and maximum speed in m/s.
+#[pyfunction]
+#[pyo3(signature = (car, drive, sensors, seed, progress))]
 pub(crate) fn simulate(
     py: Python<'_>,
     car: (String, String, Option<String>),
-    drive: PathBuf,
+    drive: GivenFile,
+    sensors: Option<GivenFile>,
     seed: Option<u64>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<(Table, Table, (f64, usize, f64))> {
@@ -27,7 +53,13 @@ pub(crate) fn simulate(
         return Err(exception(py, &Error::Input(message)));
     };
     let run = work::done(py, progress.as_ref(), move |work| {
-        let drive = wetclutch::read_drive(&drive, seed)?;
+        let mut drive = wetclutch::drive_of(drive.source()?)?;
+        if let Some(sensors) = sensors {
+            drive.sensors = Some(wetclutch::simulated_sensors_of(&sensors.source()?)?);
+        }
+        if let (Some(sensors), Some(seed)) = (&mut drive.sensors, seed) {
+            sensors.seed = seed;
+        }
         let duration_s = drive.duration_s();
         let whole_s = Cell::new(-1.0);
         let is_stopped = |time_s: f64| {

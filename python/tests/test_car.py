@@ -4,6 +4,7 @@ import copy
 import pickle
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import wetclutch as wc
@@ -81,3 +82,47 @@ def test_arguments_that_cannot_be_right_are_named() -> None:
         assert wc.Car.template("8hp", mass_kg=mass_kg, engine_torque_n_m=300.0).gears
     with pytest.raises(TypeError):
         wc.Car.template("8hp")  # type: ignore[call-arg]
+
+
+def test_all_errors_of_texts_are_raised_together() -> None:
+    car = wc.Car.template("8hp", mass_kg=1900.0)
+    with pytest.raises(wc.InputErrors) as of_keys:
+        car.replace(vehicle__mass_kg=-1.0, vehicle__mas=3.0)
+    assert len(of_keys.value.exceptions) == 2 and all(error.line for error in of_keys.value.exceptions)
+    text, gearbox = car.to_toml(), car.gearbox_toml()
+    assert gearbox is not None
+    with pytest.raises(wc.InputErrors) as of_gearbox:
+        wc.Car(text, gearbox.replace("inertia_kg_m2 = 0", "inertia_kg_m2 = -9"))
+    assert len(of_gearbox.value.exceptions) > 1
+    with pytest.raises(wc.InputErrors):
+        wc.Car(wc.Car.read(ROOT / "vehicles" / "two_speed_at.toml").replace().to_toml().replace("mass_kg = ", "mass_kg = -").replace("drag_", "drg_"))
+
+
+def test_numbers_of_numpy_and_any_letter_can_be_values() -> None:
+    car = wc.Car.template("8hp", mass_kg=1900.0)
+    assert car.replace(vehicle__mass_kg=np.float64(2000.0)) == car.replace(vehicle__mass_kg=2000.0)
+    assert car.replace(vehicle__mass_kg=np.int32(2000)) == car.replace(vehicle__mass_kg=2000)
+    name = 'a "b" \\ \U000e0001 \u00f6'
+    assert car.replace(name=name).name == name
+
+
+def test_the_budget_of_a_car_has_the_bounds_that_its_file_states() -> None:
+    car = wc.Car.template("8hp", mass_kg=1900.0)
+    assert car.budget == {}
+    bounded = car.replace({"error_bounds.engine_torque_share": 0.05, "clutch.A.error_bounds.friction_factor": [0.7, 1.3]})
+    assert bounded.budget == {"error_bounds.engine_torque_share": 0.05, "clutch.A.error_bounds.friction_factor": [0.7, 1.3]}
+
+
+def test_a_budget_takes_the_place_of_that_of_the_car(car: wc.Car, measured: wc.Table) -> None:
+    plain = wc.estimate(car, measured)
+    bounded = car.replace({"clutch.C.error_bounds.friction_factor": [0.6, 1.4]})
+    wider = wc.estimate(bounded, measured)
+    assert wider != plain and wc.estimate(bounded, measured, budget=bounded.budget) == wider
+    assert wc.estimate(bounded, measured, budget={}) == plain
+    assert wc.estimate(car, measured, budget=bounded.budget) == wider
+    assert wc.estimate(car, [measured], budget=bounded.budget) == (wider,)
+    with pytest.raises(wc.InputError, match="no bound on an error") as raised:
+        wc.estimate(car, measured, budget={"vehicle.mass_kg": 1900.0})
+    assert raised.value.key == "vehicle.mass_kg" and raised.value.hint
+    with pytest.raises(wc.InputError, match="expected"):
+        wc.estimate(car, measured, budget={"clutch.C.error_bounds.friction_factor": [-1.0, 2.0]})

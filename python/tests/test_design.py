@@ -41,6 +41,8 @@ def test_certificates_have_bounds_and_vertices() -> None:
         assert phase is not None and 0.0 < phase.bound_pa <= phase.open_loop_bound_pa
         assert phase.vertices and all(margin >= 0.0 for _, margin in phase.vertices)
         assert 0.01 <= phase.longest_step_s
+        assert certificate.offset_pa is not None and certificate.offset_pa >= phase.bound_pa
+    assert wc.design(wc.Car.read(EIGHT_SPEED), shift="1-2", observer="sliding")[1].offset_pa is None
     exact = gains.to_hex()["inertia_phase"]["gains"][0]["normalised"]
     rows = gains.inertia_phase["gains"][0]["normalised"]
     assert [[float.fromhex(x) for x in row] for row in exact] == rows

@@ -12,15 +12,26 @@ import pytest
 
 import wetclutch._car
 import wetclutch._design
+import wetclutch._drive
 import wetclutch._estimate
+import wetclutch._sensors
 import wetclutch._table
 
 from conftest import ROOT
 
 
-@pytest.mark.parametrize(
-    "module", [wetclutch, wetclutch._car, wetclutch._design, wetclutch._estimate, wetclutch._table], ids=lambda m: m.__name__
-)
+MODULES = [
+    wetclutch,
+    wetclutch._car,
+    wetclutch._design,
+    wetclutch._drive,
+    wetclutch._estimate,
+    wetclutch._sensors,
+    wetclutch._table,
+]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda m: m.__name__)
 def test_the_examples_of_the_docstrings_run(module: object) -> None:
     failed, tried = doctest.testmod(module)  # type: ignore[arg-type]
     assert tried and not failed

@@ -13,9 +13,11 @@ from __future__ import annotations
 from ._car import Car, gearboxes
 from ._check import check
 from ._design import Certificate, ErrorSystem, Gains, PhaseCertificate, design
+from ._drive import Drive
 from ._errors import InputError, InputErrors, WetclutchError, WorkError
 from ._estimate import Estimates, Log, estimate, read
 from ._fit import Fit, fit
+from ._sensors import Sensors
 from ._simulate import Simulation, simulate
 from ._study import Study, study
 from ._table import Table
@@ -25,6 +27,7 @@ __all__ = [
     "Car",
     "Certificate",
     "ClutchStep",
+    "Drive",
     "ErrorSystem",
     "Estimates",
     "Fit",
@@ -34,6 +37,7 @@ __all__ = [
     "Log",
     "Observer",
     "PhaseCertificate",
+    "Sensors",
     "Simulation",
     "StepEstimate",
     "Study",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any, Self
 
 from . import _wetclutch as native
-from ._errors import InputError, check_range, of_files
+from ._errors import InputError, check_range, of_files, of_texts
+from ._toml import leaves, replaced, toml, without
 
 
 def gearboxes() -> tuple[str, ...]:
@@ -44,8 +46,10 @@ class Car:
 
         Raises:
             InputError: Something in them is wrong; the error has line and key.
+            InputErrors: Several things in them are wrong.
         """
-        self._take(native.check_car("car.toml", text, gearbox))
+        with of_texts("car.toml", text, gearbox):
+            self._take(native.check_car("car.toml", text, gearbox))
 
     def _take(self, described: tuple[str, str, str, str | None, list[str], list[str]]) -> None:
         self.name, self.kind, self._text, self._gearbox, gears, elements = described
@@ -145,23 +149,36 @@ class Car:
 
         Raises:
             InputError: There is no such key, or a value cannot be right.
+            InputErrors: This is so of several.
 
         >>> car = Car.template("8hp", mass_kg=1900.0)
         >>> car.replace(vehicle__mass_kg=2000.0) == car
         False
         """
+        return type(self)(replaced(self._text, values, keys), self._gearbox)
+
+    @property
+    def budget(self) -> dict[str, Any]:
+        """The bounds on errors that the vehicle file states, by their keys; all others have their defaults.
+
+        >>> car = Car.template("8hp", mass_kg=1900.0).replace(error_bounds__engine_torque_share=0.05)
+        >>> car.budget
+        {'error_bounds.engine_torque_share': 0.05}
+        """
         import tomllib
 
-        table = tomllib.loads(self._text)
-        for key, value in {**(values or {}), **{key.replace("__", "."): value for key, value in keys.items()}}.items():
-            parts = key.split(".")
-            at = table
-            for part in parts[:-1]:
-                at = at.setdefault(part, {})
-                if not isinstance(at, dict):
-                    raise InputError(f"`{key}`: `{part}` is no table of the file", key=key)
-            at[parts[-1]] = value
-        return type(self)(_toml(table), self._gearbox)
+        return {key: value for key, value in leaves(tomllib.loads(self._text)) if _is_bound(key)}
+
+    def _with_budget(self, budget: Mapping[str, Any]) -> Self:
+        """The same car with these bounds on errors in place of those of its file."""
+        import tomllib
+
+        for key in budget:
+            if not _is_bound(key):
+                hint = "a bound is a key below `error_bounds`, as in car.budget"
+                raise InputError(f"budget: `{key}` is no bound on an error", hint=hint, key=key)
+        others = toml(without(_BOUNDS, tomllib.loads(self._text)))
+        return type(self)(replaced(others, budget, {}), self._gearbox)
 
     @property
     def _native(self) -> tuple[str, str, str | None]:
@@ -185,45 +202,16 @@ class Car:
         return f"Car({self.name!r}, {len(forward)} forward gears)"
 
 
+#: The tables of bounds on errors.
+_BOUNDS = "error_bounds"
+
+
+def _is_bound(key: str) -> bool:
+    return _BOUNDS in key.split(".")[:-1]
+
+
 def _write_whole(path: str, text: str) -> None:
     partial = f"{path}.partial"
     with open(partial, "w", encoding="utf-8", newline="\n") as file:
         file.write(text)
     os.replace(partial, path)
-
-
-def _key(key: str) -> str:
-    is_plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-    return key if is_plain else _value(key)
-
-
-def _value(value: Any) -> str:
-    match value:
-        case bool():
-            return "true" if value else "false"
-        case int():
-            return str(value)
-        case float():
-            return repr(value)
-        case str():
-            escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-            return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
-        case list() | tuple():
-            return "[" + ", ".join(_value(item) for item in value) + "]"
-        case dict():
-            return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
-        case _ if hasattr(value, "item"):
-            return _value(value.item())
-        case _:
-            raise InputError(f"a {type(value).__name__} is no value of a vehicle file")
-
-
-def _toml(table: dict[str, Any], path: str = "") -> str:
-    plain = {key: value for key, value in table.items() if not isinstance(value, dict)}
-    lines = [f"{_key(key)} = {_value(value)}\n" for key, value in plain.items()]
-    if path and (lines or not table):
-        lines.insert(0, f"\n[{path}]\n")
-    for key, value in table.items():
-        if isinstance(value, dict):
-            lines.append(_toml(value, f"{path}.{_key(key)}" if path else _key(key)))
-    return "".join(lines)

@@ -47,6 +47,12 @@ class Certificate:
     not_met: tuple[str, ...]
     text: str
 
+    @property
+    def offset_pa(self) -> float | None:
+        """The largest offset of the estimate in both phases, Pa: the larger one of their steady-state bounds; None of the sliding-mode observer."""
+        bounds = [phase.bound_pa for phase in (self.torque_phase, self.inertia_phase) if phase is not None]
+        return max(bounds, default=None)
+
     def __repr__(self) -> str:
         phases = {"torque phase": self.torque_phase, "inertia phase": self.inertia_phase}
         bounds = [f"{name} {phase.bound_pa:.0f} Pa" for name, phase in phases.items() if phase is not None]

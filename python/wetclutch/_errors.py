@@ -92,17 +92,31 @@ def check_range(name: str, value: float | None, low: float, high: float) -> None
 
 
 @contextmanager
-def of_files(*paths: str | os.PathLike[str] | None) -> Iterator[None]:
-    """Raises all errors of these files where one of them has several, in place of the first."""
+def of_files(*paths: object) -> Iterator[None]:
+    """Raises all errors of these files where one of them has several, in place of the first; what is no path is passed over."""
     try:
         yield
     except InputErrors:
         raise
     except InputError as error:
-        for path in (os.fspath(path) for path in paths if path is not None):
+        for path in (os.fspath(path) for path in paths if isinstance(path, (str, os.PathLike))):
             group = grouped(path)
             if group is not None and len(group.exceptions) > 1 and any(error.file == one.file for one in group.exceptions):
                 raise group from None
+        raise
+
+
+@contextmanager
+def of_texts(name: str, text: str, gearbox: str | None = None) -> Iterator[None]:
+    """Raises all errors of the text of a file, and of its gearbox file, where there are several, in place of the first."""
+    from . import _wetclutch as native
+
+    try:
+        yield
+    except InputError:
+        errors = native.errors_of_texts(name, text, gearbox)
+        if len(errors) > 1:
+            raise InputErrors(f"{name}: {len(errors)} errors", errors) from None
         raise
 
 

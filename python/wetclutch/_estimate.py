@@ -13,6 +13,7 @@ from ._car import Car
 from ._errors import check_range, of_files
 from ._executor import each
 from ._progress import Progress, Report, reported
+from ._sensors import Sensors, file_or_sensors
 from ._table import Table
 
 
@@ -152,7 +153,8 @@ class _Options(TypedDict, total=False):
 
     observer: str | None
     method: str | None
-    sensors: str | os.PathLike[str] | None
+    sensors: Sensors | str | os.PathLike[str] | None
+    budget: Mapping[str, Any] | None
     columns: Sequence[str]
     shift: int | None
     shifts: Sequence[str]
@@ -180,7 +182,8 @@ def estimate(
     *,
     observer: str | None = None,
     method: str | None = None,
-    sensors: str | os.PathLike[str] | None = None,
+    sensors: Sensors | str | os.PathLike[str] | None = None,
+    budget: Mapping[str, Any] | None = None,
     columns: Sequence[str] = (),
     shift: int | None = None,
     shifts: Sequence[str] = (),
@@ -199,7 +202,9 @@ def estimate(
         log: A :class:`Log`, or what :func:`read` makes one of; or a list or tuple of them, each estimated alone.
         observer: Observer of a car of one shift, such as ``"kalman"``; the best for the log if none is given.
         method: Design method of its gains, such as ``"peak-to-peak"``, of the observers rigid and compliant.
-        sensors: File whose table ``sensors`` describes the sensors of the log.
+        sensors: The sensors of the log: :class:`Sensors`, or a file whose table ``sensors`` describes them.
+        budget: Bounds on errors by their keys, such as ``car.budget | {"error_bounds.engine_torque_share": 0.05}``, in place of all of
+            ``car.budget``.
         columns: Columns of the rows, in this order; all of them if empty. The time is always the first.
         shift: The shift with this number alone, from 1.
         shifts: Shifts between these gears alone, such as ``["1-2", "2-3"]``.
@@ -222,7 +227,7 @@ def estimate(
     options = {
         "observer": observer,
         "method": method,
-        "sensors": None if sensors is None else os.fspath(sensors),
+        "sensors": file_or_sensors(sensors),
         "columns": list(columns),
         "shift": shift,
         "shifts": list(shifts),
@@ -230,6 +235,8 @@ def estimate(
         "threads": threads,
         "with_page": page,
     }
+    if budget is not None:
+        car = car._with_budget(budget)
     if isinstance(log, (list, tuple)):
         logs = [one if isinstance(one, Log) else read(one) for one in log]
         return each(executor, partial(_estimated, car, options), logs, progress, "logs")

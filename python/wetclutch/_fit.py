@@ -14,6 +14,7 @@ from ._errors import of_files
 from ._estimate import Log, framed, read
 from ._executor import each
 from ._progress import Progress, Report, reported
+from ._sensors import Sensors, file_or_sensors
 from ._table import Table
 
 
@@ -70,7 +71,7 @@ def fit(
     car: Car,
     logs: Any,
     *,
-    sensors: str | os.PathLike[str] | None = None,
+    sensors: Sensors | str | os.PathLike[str] | None = None,
     page: bool = False,
     progress: Progress = False,
     executor: None = None,
@@ -80,7 +81,7 @@ def fit(
     car: Sequence[Car],
     logs: Sequence[Any],
     *,
-    sensors: str | os.PathLike[str] | None = None,
+    sensors: Sensors | str | os.PathLike[str] | None = None,
     page: bool = False,
     progress: Progress = False,
     executor: Any = None,
@@ -89,7 +90,7 @@ def fit(
     car: Car | Sequence[Car],
     logs: Any,
     *,
-    sensors: str | os.PathLike[str] | None = None,
+    sensors: Sensors | str | os.PathLike[str] | None = None,
     page: bool = False,
     progress: Progress = False,
     executor: Any = None,
@@ -101,7 +102,7 @@ def fit(
     Args:
         car: The car to start from; its error budget says how far off its values may be. Or many cars.
         logs: A log, or a list or tuple of logs: each a :class:`Log`, or what :func:`read` makes one of. Of many cars, these of each.
-        sensors: File whose table ``sensors`` describes the sensors of the logs.
+        sensors: The sensors of the logs: :class:`Sensors`, or a file whose table ``sensors`` describes them.
         page: Whether to make the page of the fit.
         progress: True for a bar, or a function that takes words and the done fraction or None, at most ten times a second.
         executor: Where many cars are fitted: any ``concurrent.futures.Executor``, or a ``dask.distributed.Client``; in this process if it
@@ -114,16 +115,16 @@ def fit(
         InputError: A log cannot be read or is not of this car, or no shift can be fitted.
         WorkError: A fit found no minimum, or workers died again and again at the same car.
     """
-    path = None if sensors is None else os.fspath(sensors)
+    read_by = file_or_sensors(sensors)
     if not isinstance(car, Car):
         if len(car) != len(logs):
             raise ValueError(f"there are {len(car)} cars and logs of {len(logs)}, expected logs for each car")
         pairs = [(one, _logs(of)) for one, of in zip(car, logs, strict=True)]
-        return each(executor, partial(_fitted, path, page), pairs, progress, "cars")
+        return each(executor, partial(_fitted, read_by, page), pairs, progress, "cars")
     if executor is not None:
         raise ValueError("executor is for many cars: give a list of them, and one of the logs of each")
     with reported(progress) as report:
-        return _fitted(path, page, (car, _logs(logs)), report)
+        return _fitted(read_by, page, (car, _logs(logs)), report)
 
 
 def _logs(logs: Any) -> list[Log]:
@@ -131,7 +132,7 @@ def _logs(logs: Any) -> list[Log]:
     return [log if isinstance(log, Log) else read(log) for log in many]
 
 
-def _fitted(sensors: str | None, page: bool, of: tuple[Car, list[Log]], report: Report | None = None) -> Fit:
+def _fitted(sensors: Sensors | str | None, page: bool, of: tuple[Car, list[Log]], report: Report | None = None) -> Fit:
     car, logs = of
     with of_files(sensors, *(log.map for log in logs)):
         fitted, (intervals, channel_map), not_identifiable, statements, findings, shifts, kept, html = native.fit(

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 from . import _wetclutch as native
 from ._car import Car
+from ._drive import Drive
 from ._errors import check_range, of_files
 from ._progress import Progress, reported
+from ._sensors import Sensors, file_or_sensors
 from ._table import Table
 
 
@@ -37,24 +39,31 @@ class Simulation:
 
 
 def simulate(
-    car: Car, drive: str | os.PathLike[str], *, seed: int | None = None, progress: Progress = False
+    car: Car,
+    drive: Drive | str | os.PathLike[str],
+    *,
+    sensors: Sensors | str | os.PathLike[str] | None = None,
+    seed: int | None = None,
+    progress: Progress = False,
 ) -> Simulation:
-    """Drives a car through a drive file. The same car, file and seed give the same tables.
+    """Drives a car. The same car, drive, sensors and seed give the same tables.
 
     Ends within some milliseconds of Ctrl-C; other threads of Python run meanwhile.
 
     Args:
         car: A car with a gearbox.
-        drive: A drive file, such as ``drives/city.toml``.
-        seed: Seed of the noise of its sensors, in place of that of the file.
+        drive: A :class:`Drive`, or a drive file, such as ``drives/city.toml``.
+        sensors: Sensors in place of those of the drive: :class:`Sensors`, or a file whose table ``sensors`` describes them.
+        seed: Seed of the noise of the sensors, in place of theirs.
         progress: True for a bar, or a function that takes words and the done fraction, at most ten times a second.
 
     Raises:
-        InputError: The file is wrong, or the car is one of a single shift.
+        InputError: A file is wrong, or the car is one of a single shift.
         WorkError: The simulation failed.
     """
     check_range("seed", seed, 0, 2**64 - 1)
-    with of_files(drive), reported(progress) as report:
-        truth, measured, summary = native.simulate(car._native, os.fspath(drive), seed, report)
+    path = drive if isinstance(drive, Drive) else os.fspath(drive)
+    with of_files(path, sensors), reported(progress) as report:
+        truth, measured, summary = native.simulate(car._native, path, file_or_sensors(sensors), seed, report)
     distance_m, shifts, speed_max_m_s = summary
     return Simulation(Table(truth), Table(measured), distance_m, shifts, speed_max_m_s)

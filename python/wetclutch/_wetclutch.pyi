@@ -3,7 +3,9 @@ from os import PathLike
 from typing import Any, TypeAlias, final
 
 from ._car import Car
+from ._drive import Drive
 from ._errors import InputError
+from ._sensors import Sensors
 
 __all__ = [
     "ClutchStep",
@@ -13,8 +15,11 @@ __all__ = [
     "Table",
     "__version__",
     "check_car",
+    "check_drive",
+    "check_sensors",
     "design",
     "errors_of_file",
+    "errors_of_texts",
     "estimate",
     "fit",
     "gearboxes",
@@ -63,7 +68,7 @@ class Observer:
         car: Car,
         *,
         shift: str | None = None,
-        sensors: str | PathLike[str] | None = None,
+        sensors: Sensors | str | PathLike[str] | None = None,
         learnt: str | None = None,
     ) -> Observer: ...
     def step(
@@ -156,9 +161,12 @@ def template_car(
     has_stroke: bool,
 ) -> tuple[str, str, str, str | None, list[str], list[str]]: ...
 def gearboxes() -> list[str]: ...
+def check_drive(drive: Drive | str) -> tuple[str, str, float]: ...
+def check_sensors(sensors: Sensors | str) -> str: ...
 def simulate(
     car: tuple[str, str, str | None],
-    drive: str,
+    drive: Drive | str,
+    sensors: Sensors | str | None,
     seed: int | None,
     progress: Callable[[str, float | None], object] | None,
 ) -> tuple[Table, Table, tuple[float, int, float]]: ...
@@ -176,7 +184,7 @@ def estimate(
 def fit(
     car: tuple[str, str, str | None],
     logs: Sequence[tuple[str, Table | None, Mapping[str, Any]]],
-    sensors: str | None,
+    sensors: Sensors | str | None,
     with_page: bool,
     progress: Callable[[str, float | None], object] | None,
 ) -> tuple[
@@ -196,6 +204,7 @@ def log_channels(log: tuple[str, Table | None, Mapping[str, Any]]) -> Table: ...
 def log_map(log: tuple[str, Table | None, Mapping[str, Any]]) -> str: ...
 def shifts_of_log(log: tuple[str, Table | None, Mapping[str, Any]], ratios: Sequence[float]) -> Table: ...
 def errors_of_file(path: str) -> list[InputError]: ...
+def errors_of_texts(name: str, text: str, gearbox: str | None = None) -> list[InputError]: ...
 def restored_observer(
     texts: tuple[str, str, str | None, str | None, tuple[str, str] | None], memory: bytes
 ) -> Observer: ...

@@ -29,7 +29,7 @@ pub use check::significant;
 pub use drive::DriveFile;
 pub use error::ConfigError;
 pub use excerpt::Excerpt;
-pub use experiment::{ExperimentFile, read_sensors, sensors_of};
+pub use experiment::{ExperimentFile, read_sensors, sensors_of, simulated_sensors_of};
 pub use gearbox::GearboxFile;
 pub use learnt::{check_learnt, read_learnt, write_learnt};
 pub use source::{Kind, Source};

@@ -10,6 +10,7 @@ use logs::ChannelMap;
 use trace::ShownPath as _;
 
 use crate::Error;
+use crate::vehicle::gearbox_source;
 
 /// All errors of a file of any kind, and of those that it names; none if all of them can be used.
 ///
@@ -22,6 +23,23 @@ pub fn check(path: &Path) -> Result<Vec<Error>, Error> {
 /// All errors of a file and of those that it names.
 pub fn errors_of(source: &Source) -> Vec<ConfigError> {
     all_errors(source, &|source| read(source.kind()?, source))
+}
+
+/// All errors of the text of a file, and of the text of its gearbox file where it is one of a car whose gearbox file is given; `name` is what
+/// messages call it. Those of the car are not looked for in a wrong gearbox.
+pub fn errors_of_texts(name: &str, text: &str, gearbox: Option<&str>) -> Vec<Error> {
+    let source = Source::built_in(name, text);
+    let errors = match gearbox.map(|text| gearbox_source(name, text)) {
+        None => errors_of(&source),
+        Some(gearbox) => match errors_of(&gearbox) {
+            errors if errors.is_empty() => all_errors(&source, &|draft| match draft.kind()? {
+                Kind::Car => CarFile::from_sources(draft, gearbox.clone()).map(drop),
+                kind => read(kind, draft),
+            }),
+            errors => errors,
+        },
+    };
+    errors.into_iter().map(Error::from).collect()
 }
 
 /// Reads a file of a kind, and the files that it names.

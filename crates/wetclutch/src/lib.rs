@@ -39,8 +39,8 @@ pub use studies::StudyRuns;
 pub use table::{Column, Table, Values, Words};
 pub use text::{grouped, shell_quoted};
 pub use vehicle::{
-    TemplateNumbers, VehicleFile, gearboxes, learnt_without_effect, method_named, observer_named, read_drive,
-    read_sensors, sensors_of,
+    TemplateNumbers, VehicleFile, drive_of, gearboxes, learnt_without_effect, method_named, observer_named, read_drive,
+    read_sensors, sensors_of, simulated_sensors_of,
 };
 
 /// Takes a sentence for the user as it comes. It may have several lines; one that begins with `hint: ` says what to do.

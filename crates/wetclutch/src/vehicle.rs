@@ -83,8 +83,7 @@ impl VehicleFile {
         match (source.kind()?, gearbox) {
             (Kind::Car, None) => Ok(Self::Gearbox(Box::new(CarFile::from_source(source)?))),
             (Kind::Car, Some(gearbox)) => {
-                let gearbox = Source::built_in(&format!("gearbox of {name}"), gearbox);
-                Ok(Self::Gearbox(Box::new(CarFile::from_sources(source, gearbox)?)))
+                Ok(Self::Gearbox(Box::new(CarFile::from_sources(source, gearbox_source(name, gearbox))?)))
             }
             _ => Ok(Self::OneShift(Box::new(config::VehicleFile::from_source(source)?))),
         }
@@ -183,6 +182,11 @@ impl VehicleFile {
     }
 }
 
+/// The text of a gearbox file, as messages call it beside the vehicle file of this name.
+pub(crate) fn gearbox_source(name: &str, text: &str) -> Source {
+    Source::built_in(&format!("gearbox of {name}"), text)
+}
+
 /// The sensors that a file describes.
 ///
 /// # Errors
@@ -196,10 +200,20 @@ pub fn read_sensors(path: &Path) -> Result<Sensors, Error> {
 /// # Errors
 /// It has no such table, or a value cannot be right.
 pub fn sensors_of(source: &Source) -> Result<Sensors, Error> {
-    config::sensors_of(source)?.ok_or_else(|| {
-        let path = source.path.shown();
-        Error::Input(format!("{path}: there is no [sensors] table\nhint: add one, as in experiments/bench.toml"))
-    })
+    config::sensors_of(source)?.ok_or_else(|| without_sensors(source))
+}
+
+/// The same with the errors of the readings, for a simulation.
+///
+/// # Errors
+/// See [`sensors_of`].
+pub fn simulated_sensors_of(source: &Source) -> Result<Sensors, Error> {
+    config::simulated_sensors_of(source)?.ok_or_else(|| without_sensors(source))
+}
+
+fn without_sensors(source: &Source) -> Error {
+    let path = source.path.shown();
+    Error::Input(format!("{path}: there is no [sensors] table\nhint: add one, as in experiments/bench.toml"))
 }
 
 /// The drive that a file describes, its sensors with this seed in place of that of the file, if one is given.
@@ -207,11 +221,19 @@ pub fn sensors_of(source: &Source) -> Result<Sensors, Error> {
 /// # Errors
 /// The file cannot be read, or something in it is wrong.
 pub fn read_drive(path: &Path, seed: Option<u64>) -> Result<Drive, Error> {
-    let mut drive = DriveFile::read(path)?.drive;
+    let mut drive = drive_of(Source::read(path)?)?;
     if let (Some(sensors), Some(seed)) = (&mut drive.sensors, seed) {
         sensors.seed = seed;
     }
     Ok(drive)
+}
+
+/// The drive that the text of a file describes.
+///
+/// # Errors
+/// Something in it is wrong, or the file of speeds that it names cannot be read.
+pub fn drive_of(source: Source) -> Result<Drive, Error> {
+    Ok(DriveFile::from_source(source)?.drive)
 }
 
 /// The observer of this name.

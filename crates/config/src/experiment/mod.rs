@@ -15,7 +15,7 @@ use crate::{ConfigError, Kind, Source, VehicleFile, file_of};
 use off_nominal::off_nominal;
 use raw::{RawExperiment, RawFill, RawScenario, RawShift};
 
-pub use sensors::{read_sensors, sensors_of};
+pub use sensors::{read_sensors, sensors_of, simulated_sensors_of};
 
 /// Most samples of a drive whose signals are held in memory.
 const MAX_SAMPLES: f64 = 5e6;

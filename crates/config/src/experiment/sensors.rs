@@ -29,9 +29,16 @@ pub fn read_sensors(path: &Path) -> Result<Option<Sensors>, ConfigError> {
 /// # Errors
 /// A value cannot be right.
 pub fn sensors_of(source: &Source) -> Result<Option<Sensors>, ConfigError> {
+    Ok(simulated_sensors_of(source)?.map(Sensors::without_errors))
+}
+
+/// The same with the errors of the readings, which a simulation makes.
+///
+/// # Errors
+/// A value cannot be right.
+pub fn simulated_sensors_of(source: &Source) -> Result<Option<Sensors>, ConfigError> {
     let raw: RawSensorsFile = source.parse()?;
-    let sensors = raw.sensors.as_ref().map(|raw| sensors(&Check::of(source), "sensors", raw, None)).transpose()?;
-    Ok(sensors.map(Sensors::without_errors))
+    raw.sensors.as_ref().map(|raw| sensors(&Check::of(source), "sensors", raw, None)).transpose()
 }
 
 /// The numbers of one table. What the table leaves out is as in the sensors that it changes.
