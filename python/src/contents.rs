@@ -1,7 +1,6 @@
 //! What is in a log.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use pyo3::prelude::*;
 use wetclutch::contents::{channels, log_shifts, suggested_map};
@@ -38,12 +37,12 @@ fn of_log<T: Send + 'static>(
     ratios: Vec<f64>,
     find: impl FnOnce(LogInput<'_>) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
-    let table = table.map(|table| Arc::clone(&table.get().table));
+    let rows = table.map(|table| table.get().rows());
     work::done(py, None, move |_| {
         let mut map = mapping.read(None)?;
         if !ratios.is_empty() {
             map.gearbox.ratios = ratios;
         }
-        find(LogInput { path: &path, memory: table.as_ref().map(InMemory::Table), map: &map })
+        find(LogInput { path: &path, memory: rows.as_ref().map(InMemory::Rows), map: &map })
     })
 }

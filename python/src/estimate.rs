@@ -1,7 +1,6 @@
 //! Estimates of logs.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use logs::ChannelMap;
 use pyo3::prelude::*;
@@ -9,8 +8,8 @@ use wetclutch::estimate::{GearPair, ShiftChoice};
 use wetclutch::{Error, EstimateOptions, InMemory, LogInput, VehicleFile};
 
 use crate::car::parsed;
-use crate::file::GivenFile;
 use crate::error::exception;
+use crate::file::GivenFile;
 use crate::table::Table;
 use crate::work;
 
@@ -97,13 +96,13 @@ pub(crate) fn estimate(
     let (name, text, gearbox) = car;
     let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
     let given: Given = given.extract()?;
-    let table = table.map(|table| Arc::clone(&table.get().table));
+    let rows = table.map(|table| table.get().rows());
     let (vehicle, found) = work::done(py, progress.as_ref(), move |work| {
         let map = mapping.read(Some(&vehicle))?;
         let options =
             EstimateOptions { interrupt: Some(work.stop()), rows_done: Some(work.rows()), ..given.options(&vehicle)? };
         let path: &Path = &path;
-        let memory = table.as_ref().map(InMemory::Table);
+        let memory = rows.as_ref().map(InMemory::Rows);
         let found = wetclutch::estimate(&vehicle, LogInput { path, memory, map: &map }, &options)?;
         Ok((vehicle, found))
     })?;

@@ -1,15 +1,14 @@
 //! Fits of cars to logs.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use logs::ChannelMap;
 use pyo3::prelude::*;
 use wetclutch::{Error, FitOptions, Fitted, InMemory, LogInput};
 
 use crate::car::{Described, described, parsed};
-use crate::file::GivenFile;
 use crate::estimate::Mapping;
+use crate::file::GivenFile;
 use crate::table::Table;
 use crate::work::{self, Report};
 
@@ -34,15 +33,15 @@ pub(crate) fn fit(
     let (name, text, gearbox) = car;
     let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
     let logs = logs.into_iter().map(|(path, table, mapping)| {
-        let table = table.map(|table| Arc::clone(&table.get().table));
-        (path, table, mapping)
+        let rows = table.map(|table| table.get().rows());
+        (path, rows, mapping)
     });
     let logs: Vec<_> = logs.collect();
     let (found, notes) = work::done(py, progress.as_ref(), move |work| {
-        let mapped = logs.into_iter().map(|(path, table, mapping)| Ok((path, table, mapping.read(Some(&vehicle))?)));
+        let mapped = logs.into_iter().map(|(path, rows, mapping)| Ok((path, rows, mapping.read(Some(&vehicle))?)));
         let mapped: Vec<(PathBuf, _, ChannelMap)> = mapped.collect::<Result<_, Error>>()?;
         let inputs =
-            mapped.iter().map(|(path, table, map)| LogInput { path, memory: table.as_ref().map(InMemory::Table), map });
+            mapped.iter().map(|(path, rows, map)| LogInput { path, memory: rows.as_ref().map(InMemory::Rows), map });
         let inputs: Vec<LogInput<'_>> = inputs.collect();
         let sensors = sensors.map(GivenFile::sensors).transpose()?;
         let options = FitOptions { sensors, output: None, with_page, interrupt: Some(work.stop()) };

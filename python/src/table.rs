@@ -1,25 +1,33 @@
 //! Tables between Python and the library.
 
 use std::ffi::{CStr, c_int, c_void};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use pyo3::exceptions::{PyBufferError, PyKeyError, PyTypeError, PyValueError};
 use pyo3::ffi;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PyList, PyTuple};
-use wetclutch::{Column, Values, Words};
+use wetclutch::{Column, TableRows, Values, Words};
 
 use crate::arrow;
+use crate::arrow_rows::ArrowRows;
 
 /// Columns of the same length.
 #[pyclass(module = "wetclutch._wetclutch", frozen)]
 pub(crate) struct Table {
-    pub(crate) table: Arc<wetclutch::Table>,
+    rows: Rows,
+}
+
+/// Where the rows of a table stand.
+enum Rows {
+    Own(Arc<wetclutch::Table>),
+    /// With Arrow, and as columns of our own once one of them was asked for.
+    Arrow(Arc<ArrowRows>, OnceLock<Arc<wetclutch::Table>>),
 }
 
 impl From<wetclutch::Table> for Table {
     fn from(table: wetclutch::Table) -> Self {
-        Self { table: Arc::new(table) }
+        Self { rows: Rows::Own(Arc::new(table)) }
     }
 }
 
@@ -28,7 +36,7 @@ impl Table {
     /// From an object with Arrow data: one that has `__arrow_c_stream__` or `__arrow_c_array__`.
     #[staticmethod]
     fn from_arrow(object: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(arrow::imported(object)?.into())
+        Ok(Self { rows: Rows::Arrow(Arc::new(arrow::imported(object)?), OnceLock::new()) })
     }
 
     /// From columns by their names: buffers of 64-bit floats, or lists of numbers and `None`, or of words and `None`.
@@ -55,29 +63,33 @@ impl Table {
     /// Names of the columns.
     #[getter]
     fn names(&self) -> Vec<&str> {
-        self.table.columns.iter().map(|column| column.name.as_str()).collect()
+        match &self.rows {
+            Rows::Own(table) => table.names(),
+            Rows::Arrow(rows, _) => rows.names(),
+        }
     }
 
     /// Units of the columns, `None` of words and of numbers without one.
     #[getter]
     fn units(&self) -> Vec<Option<&'static str>> {
-        self.table.columns.iter().map(Column::unit).collect()
+        self.table().columns.iter().map(Column::unit).collect()
     }
 
     fn __len__(&self) -> usize {
-        self.table.len()
+        self.rows().rows()
     }
 
     /// The numbers of a column as a buffer of 64-bit floats, without a copy; `None` of words.
     fn numbers(&self, name: &str) -> PyResult<Option<Numbers>> {
         let column = self.place(name)?;
-        let is_numbers = matches!(self.table.columns[column].values, Values::Numbers(_));
-        Ok(is_numbers.then(|| Numbers { table: Arc::clone(&self.table), column }))
+        let table = self.table();
+        let is_numbers = matches!(table.columns[column].values, Values::Numbers(_));
+        Ok(is_numbers.then(|| Numbers { table: Arc::clone(table), column }))
     }
 
     /// The words of a column.
     fn words<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyList>> {
-        match &self.table.columns[self.place(name)?].values {
+        match &self.table().columns[self.place(name)?].values {
             Values::Words(words) => {
                 PyList::new(py, (0..words.codes.len()).map(|row| words.get(row).unwrap_or_default()))
             }
@@ -93,13 +105,29 @@ impl Table {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         // The request is a wish, which may be left unfulfilled.
         drop(requested_schema);
-        arrow::exported(py, &self.table)
+        arrow::exported(py, self.table())
     }
 }
 
 impl Table {
+    /// Its rows, to be read one after the other.
+    pub(crate) fn rows(&self) -> Arc<dyn TableRows> {
+        match &self.rows {
+            Rows::Own(table) => Arc::clone(table) as _,
+            Rows::Arrow(rows, _) => Arc::clone(rows) as _,
+        }
+    }
+
+    /// Its columns.
+    fn table(&self) -> &Arc<wetclutch::Table> {
+        match &self.rows {
+            Rows::Own(table) => table,
+            Rows::Arrow(rows, table) => table.get_or_init(|| Arc::new(rows.to_table())),
+        }
+    }
+
     fn place(&self, name: &str) -> PyResult<usize> {
-        let place = self.table.columns.iter().position(|column| column.name == name);
+        let place = self.names().iter().position(|column| *column == name);
         place.ok_or_else(|| PyKeyError::new_err(name.to_owned()))
     }
 }

@@ -221,3 +221,17 @@ def test_a_drive_is_drawn(car: wc.Car, measured: wc.Table) -> None:
     assert len(axes[0].patches) == found.shifts.rows and len(axes[2].lines) == 5
     with pytest.raises(KeyError, match="a plot of the drive needs"):
         wc.estimate(car, measured, columns=["health"]).plot(shift=None)
+
+
+def test_a_frame_of_any_layout_is_estimated_where_it_stands(car: wc.Car, measured: wc.Table) -> None:
+    expected = wc.estimate(car, measured)
+    frame = measured.to_polars()
+    words = pl.selectors.categorical()
+    chunked = pl.concat([frame[:5000], frame[5000:]], rechunk=False)
+    narrow = chunked.with_columns(pl.col("lock_up_applied").cast(pl.Boolean), pl.col("gear").cast(pl.String).cast(pl.Int8))
+    for given in (frame, chunked, chunked.with_columns(words.cast(pl.String)), narrow, frame.to_arrow(), measured.to_pandas()):
+        assert wc.estimate(car, given).rows == expected.rows
+    is_lost = pl.int_range(pl.len()) == 7000
+    with_gap = chunked.with_columns(pl.when(is_lost).then(None).otherwise(pl.col("time_s")).alias("time_s"))
+    with pytest.raises(wc.InputError, match="the table:7002: the time is missing"):
+        wc.estimate(car, with_gap)

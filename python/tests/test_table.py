@@ -117,3 +117,32 @@ def test_numbers_and_words_come_back_as_they_were(numbers: list[float], words: l
     assert again == table
     if count:
         assert table["word"] == [word or "" for word in words[:count]]
+
+
+def address(column: Any) -> int:
+    return int(np.asarray(column).__array_interface__["data"][0])
+
+
+def test_numbers_leave_without_a_copy() -> None:
+    table = wc.Table({"time_s": np.arange(1000.0), "gear": ["1"] * 1000})
+    own = address(table["time_s"])
+    arrow, polars = pa.table(table), pl.DataFrame(table)
+    assert own == arrow["time_s"].chunk(0).buffers()[1].address == address(polars["time_s"].to_numpy())
+    del table
+    assert arrow["time_s"][999].as_py() == polars["time_s"][999] == 999.0
+
+
+def test_a_table_of_a_frame_lives_as_long_as_it_is_needed() -> None:
+    data = pl.concat([pl.DataFrame(frame()), pl.DataFrame(frame())], rechunk=False)
+    table, whole = wc.Table(data), wc.Table(data.rechunk())
+    del data
+    assert table.rows == 6 and table == whole and table["gear"][3:] == ["1", "", "N"]
+
+
+def test_a_table_has_its_columns_as_a_dict() -> None:
+    table = wc.Table(frame())
+    assert table.keys() == list(table) == list(dict(table)) and "gear" in table and 3 not in table
+    assert [name for name, _ in table.items()] == list(table) and len(list(table.values())) == len(table) == 3
+    assert table.get("gear") == ["1", "", "N"] and table.get("none") is None and table.get("none", 1) == 1
+    with pytest.raises(KeyError):
+        table["none"]

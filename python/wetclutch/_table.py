@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from . import _wetclutch as native
 
 
-class Table(Mapping[str, Any]):
-    """Columns of the same length, by their names.
+class Table:
+    """Columns of the same length, by their names, as in a dict.
 
     Any library that reads Arrow data takes it without more: ``polars.DataFrame(table)``, ``pyarrow.table(table)``,
     ``pandas.DataFrame.from_arrow(table)``; units are in the metadata of the fields. ``table["time_s"]`` is a column: numbers as a
@@ -21,6 +21,7 @@ class Table(Mapping[str, Any]):
     (['time_s', 'gear'], 's')
     """
 
+    # No Mapping: polars would take the columns of one by its own copies, and words as objects of Python, and not as Arrow data.
     __slots__ = ("_table",)
 
     _table: native.Table
@@ -79,6 +80,25 @@ class Table(Mapping[str, Any]):
             return memoryview(numbers)
         return np.frombuffer(numbers, dtype=np.float64)
 
+    def get(self, name: str, default: Any = None) -> Any:
+        """A column, or the default where there is none of this name."""
+        return self[name] if name in self else default
+
+    def keys(self) -> list[str]:
+        """Names of the columns."""
+        return self._table.names
+
+    def values(self) -> Iterator[Any]:
+        """The columns."""
+        return (self[name] for name in self)
+
+    def items(self) -> Iterator[tuple[str, Any]]:
+        """Names and columns."""
+        return ((name, self[name]) for name in self)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._table.names
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._table.names)
 
@@ -93,7 +113,7 @@ class Table(Mapping[str, Any]):
             return NotImplemented
         return list(self) == list(other) and all(_bytes(self, name) == _bytes(other, name) for name in self)
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__: ClassVar[None] = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
         columns = {name: _plain(self, name) for name in self}

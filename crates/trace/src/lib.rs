@@ -25,6 +25,7 @@ pub mod signal;
 #[cfg(test)]
 mod slow;
 pub mod table;
+pub mod table_rows;
 pub mod text;
 pub mod text_file;
 pub mod units;
@@ -46,6 +47,7 @@ pub use parquet_file::{ParquetWriter, write_parquet};
 pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
 pub use shown::{ShownPath, is_unprintable, printable, toml_number, toml_string};
 pub use table::{ColumnKind, TableFormat, TableWriter};
+pub use table_rows::TableRows;
 pub use text_file::{read_small, read_text};
 pub use units::{Quantity, Unit};
 pub use watch::{FileUse, file_used, watch_files};

@@ -21,6 +21,7 @@ mod table;
 mod table_text;
 mod text;
 mod vehicle;
+mod words;
 
 pub use ::export::{ExportOptions, ExportedFile};
 pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors, ShiftCommand, ShiftId, Step};
@@ -36,12 +37,14 @@ pub use observer::gearbox::{ClutchEstimate, ShiftElement, ShiftEstimate, ShiftPh
 pub use score::{PhaseScore, Scores, score};
 pub use simulate::{Simulation, simulate};
 pub use studies::StudyRuns;
-pub use table::{Column, Table, Values, Words};
+pub use table::{Column, Table, Values};
 pub use text::{grouped, shell_quoted};
+pub use trace::{Cell, TableRows};
 pub use vehicle::{
     TemplateNumbers, VehicleFile, drive_of, gearboxes, learnt_without_effect, method_named, observer_named, read_drive,
     read_sensors, sensors_of, simulated_sensors_of,
 };
+pub use words::{Codes, Words};
 
 /// Takes a sentence for the user as it comes. It may have several lines; one that begins with `hint: ` says what to do.
 pub type Notes<'a> = &'a mut dyn FnMut(&str);

@@ -1,13 +1,12 @@
 //! Tables in memory: columns of numbers and of words.
 
-use std::collections::HashMap;
 use std::io::Read as _;
 use std::sync::Arc;
 
-use trace::{Cell, ColumnKind, Unit, signal};
+use trace::{Cell, ColumnKind, TableRows, Unit, signal};
 
-use crate::Error;
 use crate::table_text::TableText;
+use crate::{Error, Words};
 
 /// Columns of the same length.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -32,56 +31,6 @@ pub enum Values {
     Numbers(Vec<f64>),
     /// Words, such as phases.
     Words(Words),
-}
-
-/// Words that repeat: each is stored once.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Words {
-    /// Of each row, the place of its word in [`Self::words`].
-    pub codes: Vec<u32>,
-    /// The different words, in the order in which they came first.
-    pub words: Vec<String>,
-    places: HashMap<String, u32>,
-}
-
-impl Words {
-    /// The word of a row.
-    pub fn get(&self, row: usize) -> Option<&str> {
-        let code = *self.codes.get(row)?;
-        self.words.get(code as usize).map(String::as_str)
-    }
-
-    fn push(&mut self, word: &str) {
-        // Mostly it is the word of the row before.
-        if let Some(last) = self.codes.last().copied().filter(|last| self.words[*last as usize] == word) {
-            return self.codes.push(last);
-        }
-        let code = match self.places.get(word) {
-            Some(code) => *code,
-            None => {
-                let code = u32::try_from(self.words.len()).unwrap_or(u32::MAX);
-                self.words.push(word.to_owned());
-                self.places.insert(word.to_owned(), code);
-                code
-            }
-        };
-        self.codes.push(code);
-    }
-
-    fn repeat(&mut self) {
-        match self.codes.last() {
-            Some(last) => self.codes.push(*last),
-            None => self.push(""),
-        }
-    }
-}
-
-impl<'a> FromIterator<&'a str> for Words {
-    fn from_iter<I: IntoIterator<Item = &'a str>>(words: I) -> Self {
-        let mut all = Self::default();
-        words.into_iter().for_each(|word| all.push(word));
-        all
-    }
 }
 
 impl Column {
@@ -126,6 +75,14 @@ impl Table {
             table.columns.iter_mut().zip(row).for_each(|(column, (_, cell))| column.values.push(cell));
         }
         table
+    }
+
+    /// Makes room for rows that are known to come.
+    pub(crate) fn reserve(&mut self, rows: usize) {
+        self.columns.iter_mut().for_each(|column| match &mut column.values {
+            Values::Numbers(numbers) => numbers.reserve_exact(rows),
+            Values::Words(words) => words.codes.reserve(rows),
+        });
     }
 
     /// Appends a row.
@@ -191,6 +148,23 @@ impl Table {
     }
 }
 
+impl TableRows for Table {
+    fn names(&self) -> Vec<&str> {
+        self.columns.iter().map(|column| column.name.as_str()).collect()
+    }
+
+    fn rows(&self) -> usize {
+        self.len()
+    }
+
+    fn cell(&self, row: usize, column: usize) -> Cell<'_> {
+        match &self.columns[column].values {
+            Values::Numbers(numbers) => Cell::Number(numbers.get(row).copied().unwrap_or(f64::NAN)),
+            Values::Words(words) => Cell::Word(words.get(row).unwrap_or_default()),
+        }
+    }
+}
+
 impl Values {
     /// How many there are.
     pub fn len(&self) -> usize {
@@ -239,7 +213,7 @@ mod tests {
             ["fill", "fill", "torque phase", "torque phase", "fill"]
         );
         assert_eq!(phases.words.len(), 2);
-        assert_eq!(table.words("health").unwrap().codes, [0; 5]);
+        assert_eq!(table.words("health").unwrap().words, ["good"]);
         assert_eq!(table.column("turbine_speed_rad_s").and_then(Column::unit), Some("rad/s"));
         assert_eq!(table.column("phase").and_then(Column::unit), None);
     }

@@ -5,16 +5,15 @@ use std::io::{self, Read, Write};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use trace::{Cell, CsvWriter};
-
-use crate::{Table, Values};
+use trace::{CsvWriter, TableRows};
 
 /// Rows that are made at a time.
 const ROWS: usize = 256;
 
 /// The text of a table, a piece at a time.
 pub(crate) struct TableText {
-    table: Arc<Table>,
+    table: Arc<dyn TableRows>,
+    columns: usize,
     writer: CsvWriter<Piece>,
     piece: Piece,
     /// The next row.
@@ -39,20 +38,16 @@ impl Write for Piece {
 }
 
 impl TableText {
-    pub(crate) fn new(table: Arc<Table>) -> io::Result<Self> {
-        let piece = Piece::default();
-        let writer = CsvWriter::without_time(piece.clone(), table.columns.iter().map(|column| column.name.as_str()))?;
-        Ok(Self { table, writer, piece, row: 0, read: 0 })
+    pub(crate) fn new(table: Arc<dyn TableRows>) -> io::Result<Self> {
+        let (piece, names) = (Piece::default(), table.names());
+        let (columns, writer) = (names.len(), CsvWriter::without_time(piece.clone(), names)?);
+        Ok(Self { table, columns, writer, piece, row: 0, read: 0 })
     }
 
     fn write_rows(&mut self) -> io::Result<()> {
-        let end = self.table.len().min(self.row + ROWS);
+        let end = self.table.rows().min(self.row + ROWS);
         for row in self.row..end {
-            let cells = self.table.columns.iter().map(|column| match &column.values {
-                Values::Numbers(numbers) => Cell::Number(numbers.get(row).copied().unwrap_or(f64::NAN)),
-                Values::Words(words) => Cell::Word(words.get(row).unwrap_or_default()),
-            });
-            self.writer.cells(cells)?;
+            self.writer.cells((0..self.columns).map(|column| self.table.cell(row, column)))?;
         }
         self.row = end;
         self.writer.flush()
@@ -78,7 +73,7 @@ impl Read for TableText {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Column, Words};
+    use crate::{Column, Table, Values, Words};
 
     #[test]
     fn the_text_of_a_table_has_every_row_and_its_numbers_exactly() {

@@ -275,10 +275,10 @@ impl<'c> CarLog<'c> {
             }
             let gears = &self.car.gearbox.gears;
             // A logger may write the gear as a number with decimals.
-            let whole = text.parse::<f64>().ok().map(|number| format!("{number}"));
+            let whole = || text.parse::<f64>().ok().map(|number| format!("{number}"));
             let named = |name: &str| gears.iter().position(|gear| gear.name == name).map(Gear::at);
             let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(Gear::Neutral);
-            let found = named(&text).or(neutral).or_else(|| named(&whole?));
+            let found = named(&text).or(neutral).or_else(|| named(&whole()?));
             self.gears.take(which, found, || text.escape_debug().to_string());
         }
     }

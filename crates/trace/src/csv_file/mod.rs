@@ -5,6 +5,7 @@
 mod decimal;
 mod records;
 mod rows;
+mod source;
 #[cfg(test)]
 mod tests;
 mod writer;

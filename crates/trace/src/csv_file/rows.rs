@@ -1,4 +1,4 @@
-//! Comma-separated files, read row by row.
+//! Comma-separated files and tables in memory, read row by row.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -6,17 +6,19 @@ use std::collections::hash_map::Entry;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::decimal;
 use super::records::{LONGEST_ROW, RecordError, Records};
+use super::source::{Source, TableSource};
 use crate::error::TIME_BY_MAP;
-use crate::{TraceError, signal, text, units};
+use crate::{TableRows, TraceError, signal, text, units};
 
-/// A comma-separated file that is read row by row. The first row names the columns; `time_s` (or `time_ms`) must be among
+/// A comma-separated file, or a table in memory, that is read row by row. The first row of a file names the columns; `time_s` (or `time_ms`) must be among
 /// them and rise. An empty cell, or `nan`, is a reading that did not come, and becomes NaN. A column without a name is passed over.
 pub struct CsvRows {
     path: PathBuf,
-    records: Records,
+    source: Source,
     /// Name in SI, and the factor that brings the cells there.
     pub(super) columns: Vec<(String, f64)>,
     pub(super) time_at: usize,
@@ -45,16 +47,26 @@ impl CsvRows {
         Ok(Self { may_be_cut: true, ..Self::of(path, input)? })
     }
 
+    /// A table in memory, whose numbers are read where they stand; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    pub fn of_table(path: &Path, table: Arc<dyn TableRows>) -> Result<Self, TraceError> {
+        Self::from_source(path, Source::Table(TableSource::new(table)))
+    }
+
     fn of(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
         let input = text::as_utf8(input).map_err(|source| TraceError::Io { path: path.to_owned(), source })?;
-        let records = Records::new(input, b',');
+        Self::from_source(path, Source::Text(Box::new(Records::new(input, b','))))
+    }
+
+    fn from_source(path: &Path, source: Source) -> Result<Self, TraceError> {
         let (path, columns) = (path.to_owned(), Vec::new());
-        let mut rows = Self { path, records, columns, time_at: 0, time_s: None, may_be_cut: false, cut: None };
-        if !rows.read_row()? {
+        let mut rows = Self { path, source, columns, time_at: 0, time_s: None, may_be_cut: false, cut: None };
+        let names = rows.source.names().map_err(|error| rows.unread(error))?;
+        if names.is_empty() {
             return Err(TraceError::Table { path: rows.path, message: "the file is empty".to_owned() });
         }
-        let names: Vec<String> =
-            rows.records.cells().map(|name| String::from_utf8_lossy(name).trim().to_owned()).collect();
         rows.columns = names.iter().map(|name| units::to_si(name)).collect();
         rows.refuse_twins(&names)?;
         rows.time_at = rows.require(signal::TIME)?;
@@ -126,14 +138,15 @@ impl CsvRows {
     /// # Errors
     /// See [`Self::advance`].
     pub fn advance_in_any_order(&mut self) -> Result<bool, TraceError> {
-        if !self.read_row()? || self.records.has_no_end() && self.is_left_out() {
+        let is_row = self.source.advance().map_err(|error| self.unread(error))?;
+        if !is_row || self.source.cut().is_some() && self.is_left_out() {
             return match self.time_s {
                 Some(_) => Ok(false),
                 None => Err(TraceError::Table { path: self.path.clone(), message: "there are no rows".to_owned() }),
             };
         }
-        if self.records.len() != self.columns.len() {
-            let (cells, names) = (self.records.len(), self.columns.len());
+        if self.source.len() != self.columns.len() {
+            let (cells, names) = (self.source.len(), self.columns.len());
             return Err(self.wrong(format!("the row has {cells} cells, but the first line names {names} columns")));
         }
         let time_s = self.number(self.time_at)?;
@@ -150,7 +163,7 @@ impl CsvRows {
     /// Takes what may be cut out of a row without an end; whether nothing of it is left.
     #[cold]
     fn is_left_out(&mut self) -> bool {
-        let (cells, names) = (self.records.len(), self.columns.len());
+        let (cells, names) = (self.source.len(), self.columns.len());
         if !self.may_be_cut || cells > names {
             return false;
         }
@@ -158,7 +171,9 @@ impl CsvRows {
             self.cut = Some("the last line has no end and is left out");
             return true;
         }
-        self.records.empty_last();
+        if let Some(records) = self.source.cut() {
+            records.empty_last();
+        }
         self.cut = Some("the last line has no end: its last cell, of which digits may be missing, is not used");
         false
     }
@@ -201,7 +216,7 @@ impl CsvRows {
     /// The cell holds something else.
     #[inline]
     pub fn number(&self, column: usize) -> Result<f64, TraceError> {
-        match number(self.cell(column)) {
+        match self.source.number(column) {
             None => Err(self.not_a_number(column)),
             Some(number) => Ok(number * self.columns[column].1),
         }
@@ -210,7 +225,7 @@ impl CsvRows {
     /// The same, and none where the cell holds something else.
     #[inline]
     pub fn number_or_none(&self, column: usize) -> Option<f64> {
-        number(self.cell(column)).map(|number| number * self.columns[column].1)
+        self.source.number(column).map(|number| number * self.columns[column].1)
     }
 
     /// Names of the columns, in SI.
@@ -227,29 +242,25 @@ impl CsvRows {
         self.wrong(format!("column `{name}` contains `{text}`, which is not a number\nhint: {hint}"))
     }
 
-    #[inline]
-    fn cell(&self, column: usize) -> &[u8] {
-        self.records.cell(column).unwrap_or_default()
-    }
-
     /// The text in a column of this row.
     pub fn text(&self, column: usize) -> Cow<'_, str> {
-        String::from_utf8_lossy(self.cell(column).trim_ascii())
+        self.source.text(column)
     }
 
-    fn read_row(&mut self) -> Result<bool, TraceError> {
-        self.records.advance().map_err(|error| match error {
+    #[cold]
+    fn unread(&self, error: RecordError) -> TraceError {
+        match error {
             RecordError::Io(source) => TraceError::Io { path: self.path.clone(), source },
             RecordError::TooLong => TraceError::Row {
                 path: self.path.clone(),
-                line: self.records.line(),
+                line: self.source.line(),
                 message: format!(
                     "the row that begins here is longer than {} MiB\nhint: the file has no line breaks, or a quotation mark is not \
                      closed",
                     LONGEST_ROW >> 20
                 ),
             },
-        })
+        }
     }
 
     /// The table cannot be used.
@@ -259,7 +270,7 @@ impl CsvRows {
 
     /// An error in this row.
     pub fn wrong(&self, message: String) -> TraceError {
-        TraceError::Row { path: self.path.clone(), line: self.records.line(), message }
+        TraceError::Row { path: self.path.clone(), line: self.source.line(), message }
     }
 }
 

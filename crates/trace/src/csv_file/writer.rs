@@ -175,7 +175,7 @@ struct Text {
 }
 
 /// Room that each cell finds behind the text: of a comma, and of a number without an exponent that is not odd.
-const ROOM: usize = 32;
+pub(super) const ROOM: usize = 32;
 
 impl Text {
     fn push_all(&mut self, text: &[u8]) {

@@ -9,8 +9,9 @@ use std::sync::{Arc, LazyLock};
 use car::{GainMethod, ObserverKind, Sensors};
 use logs::{ChannelMap, Log, LogError};
 use observer::gearbox::Learnt;
-use trace::Following;
+use trace::{CsvRows, Following, TableRows};
 
+use super::log_checks::other_delimiter;
 use super::selection::ShiftChoice;
 use crate::table_text::TableText;
 use crate::{Error, Notes, Table};
@@ -64,6 +65,8 @@ impl EstimateOptions {
 pub enum InMemory<'a> {
     /// A table.
     Table(&'a Arc<Table>),
+    /// A table of another kind, which is read where it stands.
+    Rows(&'a Arc<dyn TableRows>),
     /// The text of a file.
     Text(&'a Arc<[u8]>),
 }
@@ -88,13 +91,37 @@ impl<'a> LogInput<'a> {
 }
 
 impl LogInput<'_> {
+    /// The table in memory, if it is one.
+    pub(crate) fn table(&self) -> Option<Arc<dyn TableRows>> {
+        match self.memory? {
+            InMemory::Table(table) => Some(Arc::clone(table) as Arc<dyn TableRows>),
+            InMemory::Rows(table) => Some(Arc::clone(table)),
+            InMemory::Text(_) => None,
+        }
+    }
+
+    /// How many rows an estimate of it has, as far as that is known before it is read.
+    pub(crate) fn known_rows(&self, shifts: &ShiftChoice) -> usize {
+        let rows = self.table().map_or(0, |table| table.rows());
+        if *shifts == ShiftChoice::All { rows } else { 0 }
+    }
+
     /// The text of the log in memory, if it is there.
     pub(crate) fn text(&self) -> io::Result<Option<Box<dyn Read>>> {
-        Ok(match self.memory {
-            None => None,
-            Some(InMemory::Text(text)) => Some(Box::new(Cursor::new(Arc::clone(text)))),
-            Some(InMemory::Table(table)) => Some(Box::new(TableText::new(Arc::clone(table))?)),
+        Ok(match (self.table(), self.memory) {
+            (Some(table), _) => Some(Box::new(TableText::new(table)?)),
+            (None, Some(InMemory::Text(text))) => Some(Box::new(Cursor::new(Arc::clone(text)))),
+            _ => None,
         })
+    }
+
+    /// Its rows, where it is a table with the names of the program.
+    pub(crate) fn rows(&self, stop: Option<&Arc<AtomicBool>>) -> Result<CsvRows, Error> {
+        let rows = match self.table() {
+            Some(table) => CsvRows::of_table(self.path, table),
+            None => CsvRows::of_log(self.path, self.reader(stop)?),
+        };
+        rows.map_err(|error| other_delimiter(self.path, error))
     }
 
     /// Whether its text comes from a pipe or from memory, and not from a file.
@@ -103,7 +130,7 @@ impl LogInput<'_> {
     }
 
     /// Opens its text.
-    pub(crate) fn reader(&self, stop: Option<&Arc<AtomicBool>>) -> Result<Box<dyn Read>, Error> {
+    fn reader(&self, stop: Option<&Arc<AtomicBool>>) -> Result<Box<dyn Read>, Error> {
         let opening = |source| LogError::Io { path: self.path.to_owned(), source };
         Ok(match (self.text().map_err(opening)?, stop) {
             (Some(text), _) => text,

@@ -51,6 +51,13 @@ impl Output {
         }
     }
 
+    /// Makes room for as many rows as are known to come, where they stay in memory.
+    pub(crate) fn reserve(&mut self, rows: usize) {
+        if let Self::Memory(table) = self {
+            table.reserve(rows);
+        }
+    }
+
     pub(crate) fn cells<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> Result<(), Error> {
         match self {
             Self::File(writer, path) => writer.row(time_s, cells).map_err(|error| Error::writing(path, &error)),

@@ -136,6 +136,7 @@ pub fn estimate(
     let (before_readings, mut said) = (before_readings(&columns), None);
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(destination, named)?;
+    table.reserve(log.known_rows(&options.shifts));
     let mut passing = Passing::new(Selection::of(&options.shifts));
     let mut checks = source.columns(car, tables);
     let mut times = RowTimes::default();

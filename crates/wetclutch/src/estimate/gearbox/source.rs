@@ -11,11 +11,11 @@ use observer::gearbox::MAX_ELEMENTS;
 use study::gearbox::car_log::{CarLog, LogStep};
 use study::gearbox::channels::{CarChannels, own_map};
 use study::log::FIRST_LOOK;
-use trace::{CsvRows, ShownPath as _};
+use trace::ShownPath as _;
 
 use super::checks::Columns;
 use crate::estimate::input::LogInput;
-use crate::estimate::log_checks::{other_delimiter, report_readings, sent_on_change, warn_of_dbc};
+use crate::estimate::log_checks::{report_readings, sent_on_change, warn_of_dbc};
 use crate::{Error, Notes};
 
 /// How a log of a car is read.
@@ -69,8 +69,7 @@ impl<'a> CarSource<'a> {
         let is_followed = stop.is_some();
         if map.channels.is_empty() && (log.is_stream() || !logs::needs_map(path)?) {
             warn_of_dbc(map, say);
-            let rows = CsvRows::of_log(path, log.reader(stop)?).map_err(|error| other_delimiter(path, error))?;
-            let rows = CarLog::of(rows, car, tables)?;
+            let rows = CarLog::of(log.rows(stop)?, car, tables)?;
             let kind = SourceKind::Rows(Box::new(if is_followed { rows.following() } else { rows }));
             return Self::looking_ahead(kind, [OnChange::default(); MAX_ELEMENTS], reading, is_followed);
         }

@@ -15,7 +15,7 @@ use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use trace::{CsvRows, ShownPath as _, signal};
 
 use crate::estimate::input::LogInput;
-use crate::estimate::log_checks::{check_step, other_delimiter, report_readings, sent_on_change};
+use crate::estimate::log_checks::{check_step, report_readings, sent_on_change};
 use crate::estimate::watched::{WatchedColumn, WatchedColumns};
 use crate::{Error, Notes, grouped};
 
@@ -179,7 +179,7 @@ impl<'a> Measured<'a> {
             )));
         }
         let look = if stop.is_some() { FOLLOWED_LOOK } else { FIRST_LOOK };
-        let rows = CsvRows::of_log(path, input.reader(stop)?).map_err(|error| other_delimiter(path, error))?;
+        let rows = input.rows(stop)?;
         let mut watched = watched(&rows, vehicle, look);
         let open = if stop.is_some() { study::log::Log::following } else { study::log::Log::of };
         let log = open(rows, vehicle, look)?;

@@ -1,0 +1,192 @@
+//! Arrow data as the rows of a log, read where they stand.
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
+    UInt32Type, UInt64Type,
+};
+use arrow_array::{
+    Array, ArrayRef, ArrowPrimitiveType, BooleanArray, LargeStringArray, PrimitiveArray, StringArray, StringViewArray,
+};
+use arrow_schema::{DataType, Field, TimeUnit};
+use pyo3::PyErr;
+use pyo3::exceptions::PyTypeError;
+use wetclutch::{Cell, Codes, Column, Table, TableRows, Values};
+
+/// Columns of Arrow data in batches.
+#[derive(Debug)]
+pub(crate) struct ArrowRows {
+    names: Vec<String>,
+    /// Whether each has words.
+    is_words: Vec<bool>,
+    /// The columns of each batch.
+    batches: Vec<Vec<Cells>>,
+    /// The row behind each batch.
+    ends: Vec<usize>,
+}
+
+impl ArrowRows {
+    /// Columns without a batch.
+    pub(crate) fn of_fields<'a>(fields: impl Iterator<Item = &'a Field>) -> Self {
+        let (names, is_words) = fields.map(|field| (field.name().clone(), has_words(field.data_type()))).unzip();
+        Self { names, is_words, batches: Vec::new(), ends: Vec::new() }
+    }
+
+    /// Takes the next batch.
+    ///
+    /// # Errors
+    /// A column is neither of numbers, times nor words.
+    pub(crate) fn push(&mut self, columns: &[ArrayRef], rows: usize) -> Result<(), PyErr> {
+        let cells = columns.iter().zip(&self.names).map(|(array, name)| {
+            Cells::of(array).ok_or_else(|| {
+                let kind = array.data_type();
+                PyTypeError::new_err(format!(
+                    "column `{name}` is of Arrow's type {kind}, expected numbers, times or text"
+                ))
+            })
+        });
+        self.batches.push(cells.collect::<Result<_, _>>()?);
+        self.ends.push(self.rows() + rows);
+        Ok(())
+    }
+
+    /// The same as a table that owns its columns.
+    pub(crate) fn to_table(&self) -> Table {
+        let column = |at: usize| Column { name: self.names[at].clone(), values: self.values(at) };
+        Table { columns: (0..self.names.len()).map(column).collect() }
+    }
+
+    fn values(&self, column: usize) -> Values {
+        let cells = (0..self.rows()).map(|row| self.cell(row, column));
+        match self.is_words[column] {
+            true => Values::Words(cells.map(|cell| if let Cell::Word(word) = cell { word } else { "" }).collect()),
+            false => Values::Numbers(
+                cells.map(|cell| if let Cell::Number(number) = cell { number } else { f64::NAN }).collect(),
+            ),
+        }
+    }
+}
+
+impl TableRows for ArrowRows {
+    fn names(&self) -> Vec<&str> {
+        self.names.iter().map(String::as_str).collect()
+    }
+
+    fn rows(&self) -> usize {
+        self.ends.last().copied().unwrap_or(0)
+    }
+
+    fn cell(&self, row: usize, column: usize) -> Cell<'_> {
+        let batch = self.ends.partition_point(|end| *end <= row);
+        let begin = batch.checked_sub(1).map_or(0, |before| self.ends[before]);
+        self.batches[batch][column].get(row - begin)
+    }
+}
+
+fn has_words(kind: &DataType) -> bool {
+    match kind {
+        DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => true,
+        DataType::Dictionary(_, values) => has_words(values),
+        _ => false,
+    }
+}
+
+/// The cells of a column in a batch.
+#[derive(Debug)]
+enum Cells {
+    Float64(PrimitiveArray<Float64Type>),
+    Float32(PrimitiveArray<Float32Type>),
+    Float16(PrimitiveArray<Float16Type>),
+    Int8(PrimitiveArray<Int8Type>),
+    Int16(PrimitiveArray<Int16Type>),
+    Int32(PrimitiveArray<Int32Type>),
+    Int64(PrimitiveArray<Int64Type>),
+    UInt8(PrimitiveArray<UInt8Type>),
+    UInt16(PrimitiveArray<UInt16Type>),
+    UInt32(PrimitiveArray<UInt32Type>),
+    UInt64(PrimitiveArray<UInt64Type>),
+    Boolean(BooleanArray),
+    /// Times in ticks, and how many of them make a second.
+    Ticks(PrimitiveArray<Int64Type>, f64),
+    Null,
+    Utf8(StringArray),
+    LargeUtf8(LargeStringArray),
+    Utf8View(StringViewArray),
+    /// Words of a dictionary: the place of each in it.
+    Dictionary(ArrayRef, Codes, Box<Cells>),
+}
+
+impl Cells {
+    /// The cells of an array; none of a kind that has neither numbers, times nor words.
+    fn of(array: &ArrayRef) -> Option<Self> {
+        Some(match array.data_type() {
+            DataType::Float64 => Self::Float64(array.as_primitive_opt()?.clone()),
+            DataType::Float32 => Self::Float32(array.as_primitive_opt()?.clone()),
+            DataType::Float16 => Self::Float16(array.as_primitive_opt()?.clone()),
+            DataType::Int8 => Self::Int8(array.as_primitive_opt()?.clone()),
+            DataType::Int16 => Self::Int16(array.as_primitive_opt()?.clone()),
+            DataType::Int32 => Self::Int32(array.as_primitive_opt()?.clone()),
+            DataType::Int64 => Self::Int64(array.as_primitive_opt()?.clone()),
+            DataType::UInt8 => Self::UInt8(array.as_primitive_opt()?.clone()),
+            DataType::UInt16 => Self::UInt16(array.as_primitive_opt()?.clone()),
+            DataType::UInt32 => Self::UInt32(array.as_primitive_opt()?.clone()),
+            DataType::UInt64 => Self::UInt64(array.as_primitive_opt()?.clone()),
+            DataType::Boolean => Self::Boolean(array.as_boolean_opt()?.clone()),
+            DataType::Timestamp(unit, _) | DataType::Duration(unit) => {
+                let ticks = array.to_data().into_builder().data_type(DataType::Int64).build().ok()?;
+                Self::Ticks(ticks.into(), ticks_per_s(*unit))
+            }
+            DataType::Null => Self::Null,
+            DataType::Utf8 => Self::Utf8(array.as_string_opt()?.clone()),
+            DataType::LargeUtf8 => Self::LargeUtf8(array.as_string_opt()?.clone()),
+            DataType::Utf8View => Self::Utf8View(array.as_string_view_opt()?.clone()),
+            DataType::Dictionary(_, values) if has_words(values) => {
+                let dictionary = array.as_any_dictionary_opt()?;
+                let values = dictionary.values();
+                // Without a value there is no place of one.
+                let places = if values.is_empty() { Vec::new() } else { dictionary.normalized_keys() };
+                Self::Dictionary(array.clone(), places.into_iter().collect(), Box::new(Self::of(values)?))
+            }
+            _ => return None,
+        })
+    }
+
+    /// The cell of a row: an empty word or no number where there is none.
+    fn get(&self, row: usize) -> Cell<'_> {
+        match self {
+            Self::Float64(array) => number(array, row, |value| value),
+            Self::Float32(array) => number(array, row, f64::from),
+            Self::Float16(array) => number(array, row, f64::from),
+            Self::Int8(array) => number(array, row, f64::from),
+            Self::Int16(array) => number(array, row, f64::from),
+            Self::Int32(array) => number(array, row, f64::from),
+            Self::Int64(array) => number(array, row, |value| value as f64),
+            Self::UInt8(array) => number(array, row, f64::from),
+            Self::UInt16(array) => number(array, row, f64::from),
+            Self::UInt32(array) => number(array, row, f64::from),
+            Self::UInt64(array) => number(array, row, |value| value as f64),
+            Self::Boolean(array) if array.is_null(row) => Cell::Number(f64::NAN),
+            Self::Boolean(array) => Cell::Number(f64::from(u8::from(array.value(row)))),
+            Self::Ticks(array, per_s) => number(array, row, |ticks| ticks as f64 / per_s),
+            Self::Null => Cell::Number(f64::NAN),
+            Self::Utf8(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
+            Self::LargeUtf8(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
+            Self::Utf8View(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
+            Self::Dictionary(array, ..) if array.is_null(row) => Cell::Word(""),
+            Self::Dictionary(_, places, values) => places.get(row).map_or(Cell::Word(""), |place| values.get(place)),
+        }
+    }
+}
+
+fn number<T: ArrowPrimitiveType>(array: &PrimitiveArray<T>, row: usize, to: impl Fn(T::Native) -> f64) -> Cell<'_> {
+    Cell::Number(if array.is_null(row) { f64::NAN } else { to(array.value(row)) })
+}
+
+fn ticks_per_s(unit: TimeUnit) -> f64 {
+    match unit {
+        TimeUnit::Second => 1.0,
+        TimeUnit::Millisecond => 1e3,
+        TimeUnit::Microsecond => 1e6,
+        TimeUnit::Nanosecond => 1e9,
+    }
+}
