@@ -2,6 +2,7 @@
 
 mod outside;
 mod plot;
+mod shift;
 
 use std::fmt::Write as _;
 use std::hint::black_box;
@@ -15,6 +16,7 @@ use crate::shared::vehicle;
 use crate::{Figure, fastest, time};
 use outside::Outside;
 use plot::{Curve, Panel};
+use shift::Shift;
 
 /// First gear under inputs that stay for a while.
 struct FirstGear<'a> {
@@ -147,10 +149,11 @@ const EQUAL_ERROR: f64 = 1e-4;
 pub(crate) fn check() -> bool {
     let powertrain = Powertrain::new(vehicle());
     let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode();
-    let outside = Outside::new(&powertrain, mode, &problems());
-    let there = [outside.cvode().is_some(), outside.lsoda().is_some()];
-    let needs = ["`cc` with SUNDIALS (Debian: `libsundials-dev`)", "`python3` with `scipy`"];
-    for ((rival, needs), there) in ["CVODE", "SciPy's LSODA"].iter().zip(needs).zip(there) {
+    let shift = Shift::new(&powertrain);
+    let outside = Outside::new(&powertrain, mode, &problems(), &shift.parameters());
+    let there = [outside.cvode().is_some(), outside.lsoda().is_some(), shift.scipy(&outside.parameters).is_some()];
+    let needs = ["`cc` with SUNDIALS (Debian: `libsundials-dev`)", "`python3` with `scipy`", "the same"];
+    for ((rival, needs), there) in ["CVODE", "SciPy's LSODA", "A shift in SciPy"].iter().zip(needs).zip(there) {
         let said = if there { "has our equations".to_owned() } else { format!("is not there: it needs {needs}") };
         println!("{rival} {said}");
     }
@@ -163,7 +166,8 @@ pub(crate) fn integrators(page: &mut String) -> Figure {
     let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode();
     let (methods, problems) = (methods(&powertrain, mode), problems());
     let references = problems.each_ref().map(|problem| ours(&powertrain, problem, 1e-11));
-    let outside = Outside::new(&powertrain, mode, &problems);
+    let shift = Shift::new(&powertrain);
+    let outside = Outside::new(&powertrain, mode, &problems, &shift.parameters());
     let cvode = outside.cvode();
     let panels: Vec<Panel> = (problems.iter().zip(&references).enumerate())
         .map(|(at, (problem, reference))| {
@@ -205,6 +209,8 @@ pub(crate) fn integrators(page: &mut String) -> Figure {
         ),
         None => writeln!(page, "SciPy's LSODA is not measured: there is no python3 with scipy."),
     };
+    page.push('\n');
+    shift.write(page, &outside.parameters);
     ("work_precision.svg", plot::svg(&panels))
 }
 

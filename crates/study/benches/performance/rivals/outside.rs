@@ -15,7 +15,7 @@ use super::{INPUTS, Problem, SPAN_S, START, TOLERANCES, error};
 /// The problems as other programs get them.
 pub(super) struct Outside {
     /// One field in a line: its name and its numbers.
-    parameters: String,
+    pub(super) parameters: String,
     /// Derivative at the start, which their equations must have too.
     slope: [f64; STATES],
 }
@@ -35,15 +35,16 @@ impl Rival {
 }
 
 impl Outside {
-    pub(super) fn new(powertrain: &Powertrain, mode: Mode, problems: &[Problem; 2]) -> Self {
+    /// `shift` are the parameters of the shift.
+    pub(super) fn new(powertrain: &Powertrain, mode: Mode, problems: &[Problem; 2], shift: &str) -> Self {
         let slope = powertrain.derivative(mode, &START.to_array(), &INPUTS);
-        Self { parameters: parameters(powertrain, problems), slope }
+        Self { parameters: parameters(powertrain, problems) + shift, slope }
     }
 
     /// CVODE's methods, where there is a C compiler with the library.
     pub(super) fn cvode(&self) -> Option<[Rival; 2]> {
         let program = compiled()?;
-        let text = self.said(&mut Command::new(program))?;
+        let text = answer(&mut Command::new(program), &self.parameters)?;
         let mut lines = text.lines();
         self.check(&numbers(lines.next()?)?);
         let mut rivals = [("bdf", "CVODE, BDF"), ("adams", "CVODE, Adams")]
@@ -60,21 +61,11 @@ impl Outside {
 
     /// The problem with constant inputs in SciPy: fastest time, s, and end state.
     pub(super) fn lsoda(&self) -> Option<(f64, [f64; STATES])> {
-        let text = self.said(Command::new("python3").arg(folder().join("lsoda.py")))?;
+        let text = answer(Command::new("python3").arg(folder().join("lsoda.py")), &self.parameters)?;
         let mut lines = text.lines();
         self.check(&numbers(lines.next()?)?);
         let (seconds, end) = numbers(lines.next()?)?.split_first().map(|(seconds, end)| (*seconds, end.to_vec()))?;
         Some((seconds, end.try_into().ok()?))
-    }
-
-    /// What a program says to the parameters.
-    fn said(&self, command: &mut Command) -> Option<String> {
-        let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
-        let mut child = command.spawn().ok()?;
-        // A program that ends early reads not all of it.
-        let _ = child.stdin.take()?.write_all(self.parameters.as_bytes());
-        let output = child.wait_with_output().ok()?;
-        output.status.success().then(|| String::from_utf8(output.stdout).ok())?
     }
 
     /// Refuses another program's equations that are not ours.
@@ -86,7 +77,23 @@ impl Outside {
     }
 }
 
-fn folder() -> PathBuf {
+/// What a program says to parameters.
+pub(super) fn answer(command: &mut Command, parameters: &str) -> Option<String> {
+    let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut child = command.spawn().ok()?;
+    // A program that ends early reads not all of it.
+    let _ = child.stdin.take()?.write_all(parameters.as_bytes());
+    let output = child.wait_with_output().ok()?;
+    output.status.success().then(|| String::from_utf8(output.stdout).ok())?
+}
+
+/// A field of the parameters.
+pub(super) fn field(name: &str, values: &[f64]) -> String {
+    let values: String = values.iter().map(|value| format!(" {value:?}")).collect();
+    format!("{name}{values}\n")
+}
+
+pub(super) fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/performance/rivals")
 }
 
@@ -102,7 +109,7 @@ fn compiled() -> Option<PathBuf> {
     done.success().then_some(program)
 }
 
-fn numbers(line: &str) -> Option<Vec<f64>> {
+pub(super) fn numbers(line: &str) -> Option<Vec<f64>> {
     line.split_whitespace().map(|number| number.parse().ok()).collect()
 }
 
@@ -163,9 +170,5 @@ fn parameters(powertrain: &Powertrain, problems: &[Problem; 2]) -> String {
         ("constant", throttle(&problems[0])),
         ("changing", throttle(&problems[1])),
     ];
-    let text = |(name, values): (&str, Vec<f64>)| {
-        let values = values.iter().map(|value| format!(" {value:?}")).collect::<String>();
-        format!("{name}{values}\n")
-    };
-    fields.into_iter().map(text).collect()
+    fields.into_iter().map(|(name, values)| field(name, &values)).collect()
 }
