@@ -6,8 +6,10 @@
 //! line through the last two differences does not reach zero: it misses it by [`SUDDEN`] times the usual error of such a line. And one of both speeds
 //! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. Where the difference has a noise much larger than its resolution,
 //! two sensors hardly agree to the last digit, also while a clutch makes their shafts one: then it is enough that one of both leaves the line
-//! through its own last values by [`SUDDEN`] times its usual error, and the other one by less than half of that. A copy that begins while both
-//! shafts turn together, as in the direct gear or behind a lock-up clutch, is not found: a control unit may send one for both.
+//! through its own last values by [`SUDDEN`] times its usual error, and the other one by less than half of that. In the direct gear
+//! neither leaves its line. There a wheel speed tells: where two such speeds have differed in the gear and then agree to the last digit, the turbine
+//! is the copy as long as the wheels turn with the output, and the output else. A control unit that sends one value for both in the direct gear does so
+//! from its first row on, and is believed. A copy that begins behind a closed lock-up clutch, or without a wheel speed in the direct gear, is not found.
 
 use crate::Role;
 use crate::frozen::NOISE_RAD_S;
@@ -29,6 +31,14 @@ const FINE: u32 = 500;
 const ALIKE: f64 = 1e-6;
 /// Of the changes of a noise one in so many at least turns the difference the other way than the one before, by more than [`NOISE_RAD_S`] \[chosen\].
 const TURNS: u32 = 3;
+/// Two speeds whose difference is at most this fraction of them turn together: noise, and a shaft that twists \[chosen\]. After this time, s, it
+/// is no passage.
+const TOGETHER: f64 = 0.01;
+const SETTLED_S: f64 = 1.0;
+/// By this fraction the wheels may leave the output: slip of the tyres, and a curve \[chosen\].
+const WITH_OUTPUT: f64 = 0.05;
+/// A wheel speed older than this says nothing, s.
+const FRESH_S: f64 = 0.25;
 /// In slower samples a shift passes between two of them, s: an inertia phase takes longer.
 const SLOWEST_S: f64 = 0.05;
 /// Below this a shaft stands, rad/s.
@@ -52,9 +62,25 @@ const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[1], PAIRS[2]];
 /// A reading: its value, rad/s, and its time, s.
 pub(crate) type Stamped = [f64; 2];
 
+/// Those that turn together in the direct gear.
+const DIRECT: [usize; 2] = PAIRS[1];
+const TURBINE: usize = 0;
+const OUTPUT: usize = 1;
+
 /// Watches the speeds of the four shafts.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Copies([Pair; PAIRS.len()]);
+pub(crate) struct Copies {
+    pairs: [Pair; PAIRS.len()],
+    wheels: Wheels,
+}
+
+/// What the wheel speed says of the output speed.
+#[derive(Debug, Clone, Copy)]
+struct Wheels {
+    newest: Option<Stamped>,
+    /// Wheel over output speed while turbine and output differ; not a number before.
+    over_output: f64,
+}
 
 /// Two speeds.
 #[derive(Debug, Clone, Copy)]
@@ -81,6 +107,32 @@ struct Pair {
     jumped: Option<usize>,
     /// Samples in which they are to be equal until it is believed.
     needed: u32,
+    /// Since when they have differed and turned together, s, and whether the equal samples followed that: which is the copy is then for the wheels
+    /// to tell.
+    together_since_s: Option<f64>,
+    is_of_direct: bool,
+}
+
+impl Wheels {
+    /// Takes an output speed that differs from the turbine speed.
+    fn learn(&mut self, [output, time_s]: Stamped) {
+        let ratio =
+            self.newest.filter(|[_, then_s]| (time_s - then_s).abs() <= FRESH_S).map(|[wheel, _]| wheel / output);
+        if let Some(ratio) = ratio.filter(|_| output.abs() > STANDS_RAD_S) {
+            self.over_output =
+                if self.over_output.is_nan() { ratio } else { self.over_output + LATEST * (ratio - self.over_output) };
+        }
+    }
+
+    /// Which of two equal readings of turbine and output is a copy, if a wheel speed says it.
+    fn copy(&self, [output, time_s]: Stamped) -> Option<usize> {
+        let [wheel, then_s] = self.newest?;
+        let by = (wheel - self.over_output * output).abs();
+        if (time_s - then_s).abs() > FRESH_S || by.is_nan() {
+            return None;
+        }
+        Some(if by <= WITH_OUTPUT * wheel.abs() { TURBINE } else { OUTPUT })
+    }
 }
 
 impl Copies {
@@ -99,8 +151,10 @@ impl Copies {
             equal: 0,
             jumped: None,
             needed: SAMPLES,
+            together_since_s: None,
+            is_of_direct: false,
         };
-        Self([pair; PAIRS.len()])
+        Self { pairs: [pair; PAIRS.len()], wheels: Wheels { newest: None, over_output: f64::NAN } }
     }
 
     /// Takes a reading, and whether it is refused for another reason. Returns the speed whose channel shows another one, with its last
@@ -108,7 +162,10 @@ impl Copies {
     pub(crate) fn push(&mut self, role: Role, reading: Stamped, is_fault: bool) -> Option<(Role, Stamped)> {
         let at = role as usize;
         let mut found = None;
-        for (pair, of) in self.0.iter_mut().zip(PAIRS) {
+        if role == Role::WheelSpeed && !is_fault {
+            self.wheels.newest = Some(reading);
+        }
+        for (pair, of) in self.pairs.iter_mut().zip(PAIRS) {
             let Some(which) = of.iter().position(|speed| *speed == at) else { continue };
             if is_fault && MAY_JOIN.contains(&of) && !pair.is_fine() {
                 continue;
@@ -117,12 +174,15 @@ impl Copies {
             pair.newest[which] = Some(reading);
             if let [Some(one), Some(other)] = pair.newest {
                 pair.newest = [None; 2];
-                let copy = pair.compare([one, other]);
+                let mut copy = pair.compare([one, other]);
+                if of == DIRECT {
+                    copy = copy.or_else(|| pair.compare_with_wheels(&mut self.wheels, [one, other]));
+                }
                 found = found.or(copy.map(|(which, before)| (Role::SPEEDS[of[which]], before, of)));
             }
         }
         let (copied, before, by) = found?;
-        for (pair, of) in self.0.iter_mut().zip(PAIRS) {
+        for (pair, of) in self.pairs.iter_mut().zip(PAIRS) {
             if of != by && of.contains(&(copied as usize)) {
                 pair.before = None;
             }
@@ -150,9 +210,23 @@ impl Pair {
             let jumped = self.jump(before, newest);
             self.needed = if jumped.is_some() { SAMPLES } else { SURE };
             self.jumped = jumped.or_else(|| self.leaves(before, newest));
+            let is_settled = self.together_since_s.is_some_and(|since_s| newest[OUTPUT][1] - since_s >= SETTLED_S);
+            self.is_of_direct = self.jumped.is_none() && is_settled && self.is_fine();
         }
         self.equal = self.equal.saturating_add(1);
         let which = self.jumped.filter(|_| self.equal >= self.needed)?;
+        let is_short = newest[which][1] - before[which][1] <= LONGEST_S;
+        is_short.then_some((which, before[which]))
+    }
+
+    /// The same of turbine and output in the direct gear.
+    fn compare_with_wheels(&self, wheels: &mut Wheels, newest: [Stamped; 2]) -> Option<(usize, Stamped)> {
+        if self.equal == 0 {
+            wheels.learn(newest[OUTPUT]);
+            return None;
+        }
+        let before = self.before.filter(|_| self.is_of_direct && self.equal >= SURE)?;
+        let which = wheels.copy(newest[OUTPUT])?;
         let is_short = newest[which][1] - before[which][1] <= LONGEST_S;
         is_short.then_some((which, before[which]))
     }
@@ -178,6 +252,9 @@ impl Pair {
             }
             self.changes = self.changes.saturating_add(1);
         }
+        let [[one, _], [other, time_s]] = newest;
+        let is_together = (one - other).abs() <= TOGETHER * one.abs().max(other.abs());
+        self.together_since_s = is_together.then(|| self.together_since_s.unwrap_or(time_s));
         (self.before, self.equal, self.jumped) = (Some(newest), 0, None);
     }
 
@@ -326,6 +403,49 @@ mod tests {
             }
         }
         assert_eq!(rows, (202..250).map(|row| (row, Role::EngineSpeed)).collect::<Vec<_>>());
+    }
+
+    /// The rows in which turbine or output speed is withdrawn; both turn together until the turbine falls by 1 rad/s a row from row 320 on.
+    fn found_in_direct_gear(shown: impl Fn(u32, [f64; 3]) -> [f64; 3]) -> Vec<(u32, Role)> {
+        let mut copies = Copies::new();
+        let mut all = Vec::new();
+        for row in 0..500_u32 {
+            let noise = |factor: f64| 0.1 * (factor * f64::from(row)).sin();
+            let output = 150.0 + 0.02 * f64::from(row);
+            let turbine = output - f64::from(row.clamp(320, 370) - 320);
+            let speeds = shown(row, [turbine + noise(7.3), output + noise(5.1), 0.3 * output + noise(3.7)]);
+            let roles = [Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
+            for (role, speed) in roles.into_iter().zip(speeds) {
+                all.extend(copies.push(role, [speed, 0.01 * f64::from(row)], false).map(|(role, _)| (row, role)));
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn wheels_tell_which_of_two_equal_speeds_is_a_copy_in_the_direct_gear() {
+        let fails = |row: u32| (300..400).contains(&row);
+        assert_eq!(found_in_direct_gear(|_, right| right), []);
+        // The turbine shows the output: found at the fifth equal reading.
+        let rows = found_in_direct_gear(|row, [t, o, w]| [if fails(row) { o } else { t }, o, w]);
+        assert_eq!(rows, (304..400).map(|row| (row, Role::TurbineSpeed)).collect::<Vec<_>>());
+        // The output shows the turbine: which of both it is shows when they leave the wheels by more than tyres slip.
+        let rows = found_in_direct_gear(|row, [t, o, w]| [t, if fails(row) { t } else { o }, w]);
+        let output =
+            rows.iter().filter(|(_, role)| *role == Role::OutputSpeed).map(|(row, _)| *row).collect::<Vec<_>>();
+        assert_eq!(output, (output[0]..400).collect::<Vec<_>>());
+        assert!((322..332).contains(&output[0]), "{}", output[0]);
+    }
+
+    #[test]
+    fn a_control_unit_may_send_one_value_in_the_direct_gear() {
+        // From the first row in the gear on: what comes before it is a passage.
+        let one =
+            |row: u32, [t, o, w]: [f64; 3]| if row < 60 { [t - 0.5 * f64::from(60 - row), o, w] } else { [o, o, w] };
+        assert_eq!(found_in_direct_gear(one), []);
+        // Without a wheel speed nothing tells which of both is wrong.
+        let copies = |row: u32, [t, o, _]: [f64; 3]| [if row < 300 { t } else { o }, o, f64::NAN];
+        assert_eq!(found_in_direct_gear(copies), []);
     }
 
     #[test]
