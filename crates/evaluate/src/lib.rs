@@ -9,6 +9,7 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod car_beyond_bounds;
 mod carried_pressures;
 pub mod checks;
 pub mod drive;

@@ -8,6 +8,7 @@ use observer::{ShiftTables, gearbox_filter};
 use plant::car::{BeyondGears, CarShiftQuality};
 
 use crate::LogStep;
+use crate::car_beyond_bounds::CarBeyondBounds;
 use crate::carried_pressures::CarriedPressures;
 use crate::checks::{CameSpeed, CheckedRow, Checks, EndedShift, GearSpeeds, Unusable, WrongScale};
 use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift, slips_rad_s};
@@ -37,6 +38,7 @@ pub struct LoggedDrive<'c> {
     beyond: BeyondGears,
     gear_speeds: GearSpeeds<'c>,
     checks: Checks<'c>,
+    beyond_bounds: CarBeyondBounds,
     carried: CarriedPressures,
     jerk: ShiftJerk,
     felt: FeltShift,
@@ -74,6 +76,7 @@ impl<'c> LoggedDrive<'c> {
             beyond: BeyondGears::new(car, ShiftCommand::NEUTRAL, [f64::NAN; 2]),
             gear_speeds: GearSpeeds::new(car),
             checks: Checks::new(car, tables, &budget),
+            beyond_bounds: CarBeyondBounds::default(),
             carried: CarriedPressures::default(),
             jerk: ShiftJerk::default(),
             felt: FeltShift::of(AccelerationSource::OutputSpeed),
@@ -112,6 +115,7 @@ impl<'c> LoggedDrive<'c> {
             estimate.health = estimate.health.max(Health::CommandsMistimed);
         }
         self.learning.push(self.state.learnt());
+        self.beyond_bounds.push(step.time_s, self.filter.beyond_bounds(&self.state));
         let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
         let channels = [estimate.channels.engine, estimate.channels.turbine, estimate.channels.output];
         for (at, (reading, health)) in readings.into_iter().zip(channels).enumerate() {
@@ -310,7 +314,8 @@ impl<'c> LoggedDrive<'c> {
         self.passing.take_comfort(comfort);
         // A shift that the log cuts off is not complete.
         self.end(None);
-        let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings()).collect();
+        let of_car = self.beyond_bounds.warning(self.car, self.tables);
+        let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings()).chain(of_car).collect();
         ScoredDrive { warnings, ..self.passing.drive }
     }
 }

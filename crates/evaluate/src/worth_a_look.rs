@@ -22,8 +22,9 @@ pub(crate) fn measures(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Measu
             values.filter(|value| value.is_finite()).fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
         if count > 0 { sum / f64::from(count) } else { 0.0 }
     };
-    // A delay of the commands is of all shifts.
-    let is_remarked = |row: &&ShiftScoreRow| !matches!(row.health, Health::Good | Health::CommandsMistimed);
+    // A delay of the commands and a quantity of the car are of all shifts.
+    let of_all = [Health::Good, Health::BeyondBounds, Health::CommandsMistimed];
+    let is_remarked = |row: &&ShiftScoreRow| !of_all.contains(&row.health);
     let remarked = rows.iter().filter(is_remarked).count() as f64 / rows.len().max(1) as f64;
     let at_turbine = rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia));
     let mut at_turbine = at_turbine.filter_map(|row| row.at_turbine_n_m.map(|[_, std_dev]| std_dev)).peekable();

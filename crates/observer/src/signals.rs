@@ -146,6 +146,8 @@ pub enum Health {
     OutsideRange,
     /// The estimate was outside its guaranteed range, and is the nearest end of it.
     LimitedToRange,
+    /// The shifts so far show a quantity of the car beyond the bound of its error: the guaranteed ranges do not hold.
+    BeyondBounds,
     /// Over many shifts the valve commands have come late or early against the speeds: the guaranteed ranges do not hold. No observer says
     /// this, which needs the time after a shift; what reads a whole log does.
     CommandsMistimed,
@@ -177,13 +179,14 @@ pub enum Health {
 
 impl Health {
     /// All of them, in their order.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Good,
         Self::ReadingRefused,
         Self::ChannelLost,
         Self::Flare,
         Self::OutsideRange,
         Self::LimitedToRange,
+        Self::BeyondBounds,
         Self::CommandsMistimed,
         Self::CommandRejected,
         Self::PressureLimited,
@@ -206,6 +209,7 @@ impl Health {
             Self::Flare => "flare",
             Self::OutsideRange => "outside_range",
             Self::LimitedToRange => "limited_to_range",
+            Self::BeyondBounds => "beyond_bounds",
             Self::CommandsMistimed => "commands_mistimed",
             Self::CommandRejected => "command_rejected",
             Self::PressureLimited => "pressure_limited",

@@ -367,8 +367,8 @@ pub(crate) const HEALTHS: usize = Health::ALL.len();
 /// A line for each health that was met: where it holds. None if all is good.
 pub(crate) fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> {
     const COLOURS: [&str; HEALTHS] = [
-        "#009E73", "#E69F00", "#B8A50A", "#56B4E9", "#0072B2", "#CC79A7", "#332288", "#CC79A7", "#D55E00", "#767676",
-        "#767676", "#999933", "#117733", "#882255", "#AA4499", "#D55E00", "#000000",
+        "#009E73", "#E69F00", "#B8A50A", "#56B4E9", "#0072B2", "#CC79A7", "#6699CC", "#332288", "#CC79A7", "#D55E00",
+        "#767676", "#767676", "#999933", "#117733", "#882255", "#AA4499", "#D55E00", "#000000",
     ];
     let met = |wanted: &Health| healths.iter().any(|(_, healths)| healths[*wanted as usize]);
     let met: Vec<Health> = Health::ALL.into_iter().filter(met).collect();

@@ -33,6 +33,9 @@ pub fn health_meaning(health: Health) -> &'static str {
         Health::LimitedToRange => {
             "an estimate outside its guaranteed range, replaced by the nearest end: the observer has a large error, or the car is outside its error budget"
         }
+        Health::BeyondBounds => {
+            "a quantity of the car beyond the bound of its error by the shifts so far: the guaranteed ranges do not hold"
+        }
         Health::CommandsMistimed => {
             "commands that come late or early against the speeds: the guaranteed ranges do not hold"
         }

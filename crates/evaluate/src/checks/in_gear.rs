@@ -141,6 +141,7 @@ fn is_usable(health: Health) -> bool {
         | Health::Flare
         | Health::OutsideRange
         | Health::LimitedToRange
+        | Health::BeyondBounds
         | Health::CommandsMistimed
         | Health::PressureLimited => true,
         Health::CommandRejected

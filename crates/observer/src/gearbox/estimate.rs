@@ -116,6 +116,9 @@ impl<T: Real> GearboxFilter<'_, T> {
             (_, _, true) => Health::ReadingRefused,
             _ => Health::Good,
         });
+        if state.evidence.is_found() {
+            health = health.max(Health::BeyondBounds);
+        }
         let (_, since_s) = state.gears;
         let mut valve_pa =
             state.elements.each_ref().map(|element| element.as_ref().map_or(T::zero(), |element| element.valve_pa));

@@ -196,7 +196,7 @@ impl<T: Real> Acting<T> {
     }
 
     /// Place of a quantity among all.
-    fn place(&self, a: usize) -> Option<usize> {
+    pub(super) fn place(&self, a: usize) -> Option<usize> {
         self.places.get(a).copied().flatten().filter(|&place| place < LEARNT)
     }
 
@@ -225,8 +225,13 @@ impl<T: Real> Acting<T> {
         known
     }
 
+    /// How an error of the stiffness shows in each, per standard deviation of it.
+    pub(super) fn by_stiffness(&self) -> &[T; ACTING] {
+        &self.by_stiffness
+    }
+
     /// How a quantity acts per unit, `H`, and the variance beside it, `D`.
-    fn per_unit(&self, a: usize) -> (T, T) {
+    pub(super) fn per_unit(&self, a: usize) -> (T, T) {
         match self.place(a) {
             None => (T::zero(), T::one()),
             Some(INERTIA_AT..LAG_AT) => (T::one(), T::zero()),
@@ -397,12 +402,15 @@ impl<T: Real> Learnt<T> {
         after: &Known<T>,
         correlations: &Correlations<T>,
     ) -> bool {
-        let Some(gain) = InformationGain::between(before, after) else { return false };
+        let shown = Shown::of(acting, before, after, correlations);
+        shown.is_some_and(|shown| self.take_shown(acting, shown, correlations))
+    }
+
+    /// Takes what a shift has shown. Whether it was taken.
+    pub(super) fn take_shown(&mut self, acting: &Acting<T>, shown: Shown<T>, correlations: &Correlations<T>) -> bool {
+        let Shown { gain, by_budget } = shown;
         let by_car = Innovation::of(|k| self.mean[k], |i, j| self.covariance[i][j], acting, &gain);
-        let by_budget = Innovation::of(|_| T::zero(), |i, j| unlearnt(correlations, i, j), acting, &gain);
-        let (Some(mut by_car), Some(by_budget)) = (by_car, by_budget) else {
-            return false;
-        };
+        let Some(mut by_car) = by_car else { return false };
         // What no car of the budget shows speaks for none.
         if !by_budget.is_possible() {
             return false;
@@ -534,7 +542,7 @@ fn is_oil<T: Real>(degc: T) -> bool {
 }
 
 /// Bound of a quantity in its standard deviations.
-fn edge(k: usize) -> f64 {
+pub(super) fn edge(k: usize) -> f64 {
     match k {
         0..INERTIA_AT => EDGE_OF_TWO,
         LAG_AT.. => EDGE_OF_TIMING,
@@ -553,9 +561,37 @@ fn unlearnt<T: Real>(correlations: &Correlations<T>, i: usize, j: usize) -> T {
     }
 }
 
+/// What a shift has shown, and the innovation of it in a car of the budget.
+pub(super) struct Shown<T> {
+    gain: InformationGain<T>,
+    pub(super) by_budget: Innovation<T>,
+}
+
+impl<T: Real> Shown<T> {
+    /// From the acting quantities as they were before the shift, and after it; `None` if these are not means and covariances.
+    pub(super) fn of(
+        acting: &Acting<T>,
+        before: &Known<T>,
+        after: &Known<T>,
+        correlations: &Correlations<T>,
+    ) -> Option<Self> {
+        let gain = InformationGain::between(before, after)?;
+        let by_budget = Innovation::of(|_| T::zero(), |i, j| unlearnt(correlations, i, j), acting, &gain)?;
+        Some(Self { gain, by_budget })
+    }
+
+    /// The innovation by acting quantities of this size in a car of the budget.
+    pub(super) fn per_quantity(&self, acting: &[T; ACTING]) -> [T; ACTING] {
+        let values = self.gain.rows.each_ref().map(|row| dot(row, acting));
+        self.by_budget.whitening.each_ref().map(|row| dot(row, &values))
+    }
+}
+
 /// What a shift has shown beside what was known, in independent directions of variance one.
-struct Innovation<T> {
-    innovation: [T; ACTING],
+pub(super) struct Innovation<T> {
+    pub(super) innovation: [T; ACTING],
+    /// These directions, by those of the measurements.
+    whitening: Matrix<T>,
     /// Covariance of all quantities with each of them.
     with: [[T; ACTING]; LEARNT],
     /// Squared distance from what was known.
@@ -598,7 +634,7 @@ impl<T: Real> Innovation<T> {
         });
         let distance = dot(&innovation, &innovation);
         let spread = (0..ACTING).fold(T::zero(), |sum, k| sum + lower[k][k].ln());
-        Some(Self { innovation, with, distance, likelihood: -T::of(0.5) * distance - spread })
+        Some(Self { innovation, whitening: inverse, with, distance, likelihood: -T::of(0.5) * distance - spread })
     }
 }
 

@@ -29,6 +29,7 @@
 
 mod at_turbine;
 mod begin;
+mod beyond_bounds;
 mod correct;
 mod covariance;
 mod doubt;
@@ -60,6 +61,7 @@ use drivetrain::{Driveline, Real};
 use crate::kalman::engine::Engine;
 use crate::kalman::gate::{Gate, Verdict};
 use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, LOST_S, Reading, SpeedReading};
+use beyond_bounds::Evidence;
 use covariance::{Gaussian, Measured};
 use doubt::Moment;
 use elements::ElementState;
@@ -74,6 +76,7 @@ use timing::Timing;
 use turbine::InputSide;
 
 pub use at_turbine::ClutchesAtTurbine;
+pub use beyond_bounds::{BeyondBounds, CarQuantity, Elements};
 pub use estimate::{ClutchEstimate, ShiftEstimate};
 pub use input_clutch::InputClutch;
 pub use late::LONGEST_DELAY_S;
@@ -239,6 +242,7 @@ pub struct GearboxState<T> {
     /// The gears of the newest step, and since when they have been these, s.
     gears: (ShiftCommand, T),
     learnt: Learnt<T>,
+    evidence: Evidence<T>,
     /// Time since what is learnt was last let fade, s.
     fading_s: T,
     estimate: ShiftEstimate<T>,
@@ -326,6 +330,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             launches: false,
             gears: (ShiftCommand::NEUTRAL, T::zero()),
             learnt: *learnt,
+            evidence: Evidence::nothing(),
             fading_s: T::zero(),
             estimate: ShiftEstimate::nothing(),
         }
@@ -426,6 +431,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Follows the shift command.
     fn take_gear(&self, state: &mut GearboxState<T>, command: ShiftCommand) -> Health {
         let opens = self.is_open(state, command);
+        let evidence = &mut state.evidence;
         let (learnt, fading_s, elements) = (&mut state.learnt, &mut state.fading_s, &mut state.elements);
         let Some(running) = &mut state.running else { return Health::Good };
         let in_gear = command.is_steady();
@@ -440,7 +446,7 @@ impl<T: Real> GearboxFilter<'_, T> {
                     ShiftPhase::OffgoingHolds
                 };
                 if running.phase.phase == ends {
-                    self.end_shift(running, command.to, learnt);
+                    self.end_shift(running, command.to, (learnt, evidence));
                 }
                 Health::Good
             }

@@ -1,5 +1,7 @@
 //! Begin and end of a shift, and what is kept from shift to shift.
 
+use super::beyond_bounds::Evidence;
+use super::learnt::Shown;
 use super::timing::ByTiming;
 use super::{
     ACTING, Acting, Compared, Correlations, ElementState, ElementUncertainty, FRICTION, GearboxFilter, IN_GEAR,
@@ -77,9 +79,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// What is learnt of the torque at the gearbox input, as a fraction of that by the converter's maps (without a converter, of the reported one);
     /// and of the reported engine torque beside a converter, as a fraction of the true one: error and standard deviation.
     pub fn learnt_sources(&self, learnt: &Learnt<T>) -> [[T; 2]; 2] {
-        let (of, turbine) = (learnt.of_sources(), &self.turbine);
-        let first = if turbine.converter.is_some() { turbine.converter_share } else { turbine.engine_share };
-        let shares = [first, turbine.engine_share];
+        let (of, shares) = (learnt.of_sources(), [self.input_share(), self.turbine.engine_share]);
         [of[0].map(|x| shares[0] * x), of[1].map(|x| shares[1] * x)]
     }
 
@@ -125,14 +125,17 @@ impl<T: Real> GearboxFilter<'_, T> {
         elements.map(|element| self.tables.element(element).map_or(T::infinity(), |element| of(&element.uncertainty)))
     }
 
+    /// Standard deviation of the torque at the gearbox input unlearnt, as a fraction.
+    pub(super) fn input_share(&self) -> T {
+        if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share }
+    }
+
     /// How an error of the stiffness of the drive shafts shows in the lasting states, per standard deviation of it: as one of all
     /// torques alike, and of no kiss point and no timing.
     fn by_stiffness(&self, elements: [ShiftElement; 2]) -> [T; ACTING] {
         let u = &self.uncertainty;
-        let source =
-            if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share };
         let [off, on] = self.of_elements(elements, |u| u.torque_fraction);
-        let in_fractions = [off, on, T::infinity(), T::infinity(), u.inertia_share, source];
+        let in_fractions = [off, on, T::infinity(), T::infinity(), u.inertia_share, self.input_share()];
         let mut by = [T::zero(); ACTING];
         for (by, fraction) in by.iter_mut().zip(in_fractions).filter(|(_, fraction)| *fraction > T::zero()) {
             *by = u.stiffness_fraction / fraction;
@@ -189,12 +192,20 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// The gear holds, and the shift is learnt from.
-    pub(super) fn end_shift(&self, running: &mut Running<T>, gear: Gear, learnt: &mut Learnt<T>) {
+    pub(super) fn end_shift(
+        &self,
+        running: &mut Running<T>,
+        gear: Gear,
+        (learnt, evidence): (&mut Learnt<T>, &mut Evidence<T>),
+    ) {
         if let Some((before, shift)) = running.before.take().zip(running.shift) {
-            let correlations = self.correlations();
-            let shown = running.x.timing.together(before, running.lasting()).filter(|_| running.x.is_sound());
-            let taken =
-                shown.is_some_and(|(before, after)| learnt.take(&self.acting(&shift), &before, &after, &correlations));
+            let (correlations, acting) = (self.correlations(), self.acting(&shift));
+            let both = running.x.timing.together(before, running.lasting()).filter(|_| running.x.is_sound());
+            let shown = both.and_then(|(before, after)| Shown::of(&acting, &before, &after, &correlations));
+            let taken = shown.is_some_and(|shown| {
+                evidence.take(&acting, &shown);
+                learnt.take_shown(&acting, shown, &correlations)
+            });
             learnt.count(taken, &correlations);
         }
         self.take_turbine(running, learnt);

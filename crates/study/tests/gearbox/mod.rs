@@ -5,6 +5,7 @@
 
 mod attacks;
 mod band;
+mod beyond_bounds;
 mod bounds;
 mod cars;
 mod command_delay;
