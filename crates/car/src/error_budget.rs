@@ -215,7 +215,7 @@ pub const fn around(relative: f64) -> [f64; 2] {
 }
 
 /// Half of the width of a range.
-fn half_width([minimum, maximum]: [f64; 2]) -> f64 {
+pub(crate) fn half_width([minimum, maximum]: [f64; 2]) -> f64 {
     0.5 * (maximum - minimum)
 }
 

@@ -49,6 +49,8 @@ pub mod stroke;
 #[cfg(feature = "std")]
 pub mod template;
 #[cfg(feature = "std")]
+pub mod two_gears;
+#[cfg(feature = "std")]
 mod vehicle;
 
 pub use discretisation::Discretisation;

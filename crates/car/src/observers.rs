@@ -18,6 +18,8 @@ pub enum ObserverKind {
     Compliant,
     /// Full-order sliding-mode observer.
     Sliding,
+    /// Kalman filter of all shifts of a gearbox, for the shift of a vehicle file.
+    Gearbox,
     /// Kalman filter with unknown torques, scale and delays of the readings as states.
     Kalman,
     /// Extended Kalman filter on six states as textbooks have it, every reading of the moment.
@@ -32,12 +34,13 @@ pub enum ObserverKind {
 
 impl ObserverKind {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::OpenLoop,
         Self::OpenLoopMaps,
         Self::Rigid,
         Self::Compliant,
         Self::Sliding,
+        Self::Gearbox,
         Self::Kalman,
         Self::Extended,
         Self::Unscented,
@@ -53,6 +56,7 @@ impl ObserverKind {
             Self::Rigid => "rigid",
             Self::Compliant => "compliant",
             Self::Sliding => "sliding",
+            Self::Gearbox => "gearbox",
             Self::Kalman => "kalman",
             Self::Extended => "extended",
             Self::Unscented => "unscented",

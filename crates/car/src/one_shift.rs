@@ -45,7 +45,7 @@ const FRICTION: f64 = 0.13;
 const FACES: f64 = 3.0;
 /// Turbine acceleration of an inertia phase at which an error of the inertia is weighed, rad/s^2, per fraction by which the ratio falls
 /// \[chosen\]: a turbine of 400 rad/s that reaches its new speed in 0.4 s.
-const TURBINE_RAD_S2: f64 = 1000.0;
+pub(crate) const TURBINE_RAD_S2: f64 = 1000.0;
 
 /// Why a car has no vehicle of one shift.
 #[derive(Debug, thiserror::Error)]

@@ -4,14 +4,14 @@ use car::{Sensors, SpeedSensor, Vehicle};
 use drivetrain::{Real, ReducedShift};
 use observer::{
     ExtendedFilter, FilterNoise, KalmanFilter, OffgoingClutch, Readings, ReportedTorque, Uncertainty, UnscentedFilter,
-    ValveModel,
+    ValveModel, phase_supervisor,
 };
 
 use observer::of_sensors::{ENGINE_KG_M2, SCALE_MIN, engine_noise, lag_rad, speed_reading, std_dev_of, std_dev_rad_s};
 
 use crate::budget::{ValveErrors, shift_pressure, shift_time_constant};
 use crate::compliant::compliant_model;
-use crate::rigid::{input_limits, supervisor, tracker};
+use crate::rigid::{input_limits, tracker};
 
 /// Error of a reported engine torque beside its relative error, N m \[chosen\]: accessories, and friction that the temperature changes.
 const ENGINE_BESIDE_N_M: f64 = 5.0;
@@ -94,7 +94,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         (speed_reading(sensors.map(|sensors| &sensors.engine), budget.turbine_quantum_rad_s), engine),
         offgoing,
         reported,
-        supervisor(vehicle),
+        phase_supervisor(vehicle),
         input_limits(vehicle),
     )
 }

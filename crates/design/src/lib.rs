@@ -58,7 +58,7 @@ pub use open_loop::{compliant_open_loop_phases, open_loop_bound_pa, rigid_open_l
 pub use polytope::{Polytope, Vertex};
 pub use rigid::{
     RigidDesign, best_rigid, bounded, design_rigid, input_limits, range, requirement, rigid_model, rigid_observer,
-    supervisor, tracker,
+    tracker,
 };
 pub use rivals::{inversion, super_twisting};
 pub use sliding::{design_sliding, sliding_observer};

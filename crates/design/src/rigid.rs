@@ -3,7 +3,7 @@
 use car::{DesignRequirement, Vehicle};
 use observer::{
     Bounded, Budget, Discretisation, InputLimits, Phase, RangeEstimator, RigidGains, RigidModel, RigidObserver,
-    Schedule, ShaftErrors, ShaftRange, Supervisor, Tracker,
+    Schedule, ShaftErrors, ShaftRange, Tracker, phase_supervisor,
 };
 use serde::Serialize;
 
@@ -80,21 +80,10 @@ pub fn tracker(vehicle: &Vehicle) -> Tracker<f64> {
     Tracker {
         valve: vehicle.settings.valve,
         shift: vehicle.shift,
-        supervisor: supervisor(vehicle),
+        supervisor: phase_supervisor(vehicle),
         limits: input_limits(vehicle),
         discretisation: Discretisation::Exact,
         sample_max_s: SAMPLE_MAX_S,
-    }
-}
-
-/// The phase supervisor of this vehicle.
-pub fn supervisor(vehicle: &Vehicle) -> Supervisor<f64> {
-    let slips = &vehicle.settings.phase_slips;
-    Supervisor {
-        kiss_pressure_pa: vehicle.oncoming.clutch.kiss_pressure(),
-        release_slip_rad_s: slips.release_slip_rad_s,
-        lock_slip_rad_s: slips.lock_slip_rad_s,
-        lock_hold_s: slips.lock_hold_s,
     }
 }
 

@@ -18,3 +18,4 @@ mod ranges;
 mod sample_form;
 mod sliding;
 mod slip_direction;
+mod two_gears;

@@ -20,10 +20,11 @@ const BYTES: usize = 8;
 /// Every kind of observer, with gains of these methods where they are designed.
 pub(crate) fn observers(vehicle: &Vehicle, methods: &[GainMethod]) -> Result<Vec<AnyObserver>, DesignError> {
     use ObserverKind::{
-        Compliant, Extended, Inversion, Kalman, OpenLoop, OpenLoopMaps, Rigid, Sliding, SuperTwisting, Unscented,
+        Compliant, Extended, Gearbox, Inversion, Kalman, OpenLoop, OpenLoopMaps, Rigid, Sliding, SuperTwisting,
+        Unscented,
     };
     let designed = [Rigid, Compliant].into_iter().flat_map(|kind| methods.iter().map(move |&method| (kind, method)));
-    let others = [OpenLoop, OpenLoopMaps, Sliding, Kalman, Extended, Unscented, SuperTwisting, Inversion];
+    let others = [OpenLoop, OpenLoopMaps, Sliding, Gearbox, Kalman, Extended, Unscented, SuperTwisting, Inversion];
     (designed.chain(others.map(|kind| (kind, GainMethod::Iss))))
         .map(|(kind, method)| AnyObserver::designed(vehicle, kind, method, SAMPLE_S, None))
         .collect()
@@ -65,6 +66,7 @@ pub(crate) fn step_all(vehicle: &Vehicle, observers: &[AnyObserver], input: &[u8
             AnyObserver::Rigid(observer) => both!(observer),
             AnyObserver::Compliant(observer) => both!(observer.as_ref()),
             AnyObserver::Sliding(observer) => both!(observer),
+            AnyObserver::Gearbox(observer) => both!(observer.as_ref()),
             AnyObserver::Kalman(observer) => both!(observer.as_ref()),
             AnyObserver::Extended(observer) => both!(observer.as_ref()),
             AnyObserver::Unscented(observer) => both!(observer.as_ref()),

@@ -29,6 +29,8 @@ pub mod kalman;
 pub mod of_car;
 #[cfg(feature = "std")]
 pub mod of_sensors;
+#[cfg(feature = "std")]
+mod of_vehicle;
 pub mod pressure_range;
 pub mod rigid;
 pub mod rigid_model;
@@ -50,13 +52,17 @@ pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};
 pub use extended::{ExtendedFilter, ExtendedState, FilterNoise, Readings};
 pub use fill_range::{FillBudget, PistonRange};
-pub use gearbox::{GearboxFilter, GearboxState, GearboxTables, ShiftEstimate, ShiftInput};
+pub use gearbox::{
+    GearboxFilter, GearboxState, GearboxTables, OneShiftFilter, OneShiftState, ShiftEstimate, ShiftInput,
+};
 pub use inversion::{Inversion, InversionState};
 pub use kalman::{
     EngineNoise, KalmanFilter, KalmanState, OffgoingClutch, ReportedTorque, SpeedReading, Uncertainty, ValveModel,
 };
 #[cfg(feature = "std")]
 pub use of_car::{ShiftTables, element_uncertainty, gearbox_filter};
+#[cfg(feature = "std")]
+pub use of_vehicle::{one_shift_filter, phase_supervisor};
 pub use pressure_range::PressureRange;
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};

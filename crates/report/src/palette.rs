@@ -107,6 +107,7 @@ fn observer_colour(kind: ObserverKind, method: GainMethod) -> &'static str {
     match (kind, method) {
         (ObserverKind::OpenLoop, _) => GREY,
         (ObserverKind::OpenLoopMaps, _) => "#4D4D4D",
+        (ObserverKind::Gearbox, _) => "#003F72",
         (ObserverKind::Kalman, _) => "#0072B2",
         (ObserverKind::Extended, _) => "#56B4E9",
         (ObserverKind::Unscented, _) => "#332288",
@@ -130,12 +131,13 @@ fn observer_colour(kind: ObserverKind, method: GainMethod) -> &'static str {
 mod tests {
     use super::*;
 
-    const KINDS: [ObserverKind; 10] = [
+    const KINDS: [ObserverKind; 11] = [
         ObserverKind::OpenLoop,
         ObserverKind::OpenLoopMaps,
         ObserverKind::Rigid,
         ObserverKind::Compliant,
         ObserverKind::Sliding,
+        ObserverKind::Gearbox,
         ObserverKind::Kalman,
         ObserverKind::Extended,
         ObserverKind::Unscented,
@@ -177,7 +179,7 @@ mod tests {
         let all = colours.len();
         colours.sort_unstable();
         colours.dedup();
-        assert_eq!((colours.len(), all), (18, 18));
+        assert_eq!((colours.len(), all), (19, 19));
     }
 
     #[test]

@@ -9,7 +9,8 @@ use design::{
 };
 use observer::{
     Bounds, CompliantObserver, Discretisation, Estimate, Estimator, ExtendedFilter, Input, Inversion, KalmanFilter,
-    RigidGains, RigidObserver, SlidingGains, SlidingObserver, SuperTwisting, Tracker, UnscentedFilter,
+    OneShiftFilter, RigidGains, RigidObserver, SlidingGains, SlidingObserver, SuperTwisting, Tracker, UnscentedFilter,
+    one_shift_filter,
 };
 
 use crate::{EstimateColumns, RunColumns, run};
@@ -23,6 +24,8 @@ pub enum AnyObserver {
     Compliant(Box<CompliantObserver<f64>>),
     /// Full-order sliding-mode observer.
     Sliding(SlidingObserver<f64>),
+    /// Gearbox filter.
+    Gearbox(Box<OneShiftFilter<f64>>),
     /// Kalman filter.
     Kalman(Box<KalmanFilter<f64>>),
     /// Extended Kalman filter in its textbook form.
@@ -97,6 +100,7 @@ impl AnyObserver {
                 Self::Compliant(Box::new(observer))
             }
             ObserverKind::OpenLoopMaps => Self::Kalman(Box::new(open_loop_maps(vehicle))),
+            ObserverKind::Gearbox => Self::Gearbox(Box::new(one_shift_filter(vehicle, sensors))),
             ObserverKind::Kalman => Self::Kalman(Box::new(kalman_filter(vehicle, sensors))),
             ObserverKind::Extended => Self::Extended(Box::new(extended_filter(vehicle, sensors))),
             ObserverKind::Unscented => Self::Unscented(Box::new(unscented_filter(vehicle, sensors))),
@@ -145,7 +149,7 @@ impl AnyObserver {
         Ok(observer.with_discretisation(entry.discretisation))
     }
 
-    /// Takes the discretisation of an observer with a fixed sample time; the Kalman filter is always exact.
+    /// Takes the discretisation of an observer with a fixed sample time; the Kalman filters are always exact.
     fn with_discretisation(mut self, discretisation: Discretisation) -> Self {
         if let Some(tracker) = self.tracker_mut() {
             tracker.discretisation = discretisation;
@@ -158,7 +162,7 @@ impl AnyObserver {
             Self::Rigid(observer) => Some(&mut observer.tracker),
             Self::Compliant(observer) => Some(&mut observer.tracker),
             Self::Sliding(observer) => Some(&mut observer.tracker),
-            Self::Kalman(_) => None,
+            Self::Gearbox(_) | Self::Kalman(_) => None,
             Self::Extended(observer) => Some(&mut observer.tracker),
             Self::Unscented(observer) => Some(&mut observer.filter.tracker),
             Self::SuperTwisting(observer) => Some(&mut observer.tracker),
@@ -174,7 +178,12 @@ impl AnyObserver {
     /// The columns of its estimates of a log. They follow from what it can estimate, before it has estimated anything.
     pub fn columns(&self, has_wheel_speed: bool) -> EstimateColumns {
         let shaft = match self {
-            Self::Compliant(_) | Self::Kalman(_) | Self::Extended(_) | Self::Unscented(_) | Self::Inversion(_) => true,
+            Self::Compliant(_)
+            | Self::Gearbox(_)
+            | Self::Kalman(_)
+            | Self::Extended(_)
+            | Self::Unscented(_)
+            | Self::Inversion(_) => true,
             Self::Rigid(_) | Self::Sliding(_) | Self::SuperTwisting(_) => false,
         };
         EstimateColumns { shaft, range: true, shaft_range: has_wheel_speed }
@@ -216,6 +225,7 @@ impl AnyObserver {
             Self::Rigid(observer) => run_bounded(budget, samples, observer, take),
             Self::Compliant(observer) => run_bounded(budget, samples, observer.as_ref(), take),
             Self::Sliding(observer) => run_bounded(budget, samples, observer, take),
+            Self::Gearbox(observer) => run_bounded(budget, samples, observer.as_ref(), take),
             Self::Kalman(observer) => run_bounded(budget, samples, observer.as_ref(), take),
             Self::Extended(observer) => run_bounded(budget, samples, observer.as_ref(), take),
             Self::Unscented(observer) => run_bounded(budget, samples, observer.as_ref(), take),

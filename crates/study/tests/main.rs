@@ -8,3 +8,4 @@ mod chapter;
 mod demo_drive;
 mod field;
 mod gearbox;
+mod one_filter;

@@ -21,6 +21,8 @@ pub(crate) enum ObserverChoice {
     Compliant,
     /// Full-order sliding mode, gains from the sliding condition
     Sliding,
+    /// Kalman filter of both clutches, as for cars with a gearbox; also estimates the shaft torque
+    Gearbox,
     /// Kalman filter with unknown torques, scale and delays of the readings as states; needs wheel_speed_rad_s, also
     /// estimates the shaft torque
     Kalman,
@@ -46,6 +48,7 @@ impl ObserverChoice {
             Self::Rigid => ObserverKind::Rigid,
             Self::Compliant => ObserverKind::Compliant,
             Self::Sliding => ObserverKind::Sliding,
+            Self::Gearbox => ObserverKind::Gearbox,
             Self::Kalman => ObserverKind::Kalman,
             Self::Extended => ObserverKind::Extended,
             Self::Unscented => ObserverKind::Unscented,

@@ -132,6 +132,8 @@ pub(super) struct ElementState<T> {
     lag: T,
     delay_s: T,
     newest: Option<NewestCommand<T>>,
+    /// Standard deviation of its torque while no command comes, N m; zero of an element that needs its commands.
+    pub(super) unheard_n_m: T,
     /// Where the piston has a stroke, once a command has come.
     pistons: Option<Pistons<T>>,
     range: Option<PressureRange<T>>,
@@ -148,6 +150,7 @@ impl<T: Real> ElementState<T> {
             lag: T::one(),
             delay_s: element.valve.delay_s,
             newest: None,
+            unheard_n_m: T::zero(),
             pistons: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, element.limits.command_max)),
         }
@@ -182,6 +185,7 @@ impl<T: Real> ElementState<T> {
             range.step(budget, dt_s, usable, element.limits.command_max);
         }
         match (command, usable) {
+            (None, _) if self.newest.is_none() && self.unheard_n_m > T::zero() => ChannelHealth::Unused,
             (None, _) if self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S)) => ChannelHealth::Lost,
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,
@@ -313,6 +317,11 @@ impl<T: Real> ElementState<T> {
         [-u.valve_lag_fraction * self.per_lag_pa / self.lag, -u.valve_delay_s * self.rate_pa_s]
     }
 
+    /// Whether its torque is known by the speeds alone, as no command comes: it walks, and only a slip shows that it no longer holds.
+    fn is_unheard(&self) -> bool {
+        self.unheard_n_m > T::zero() && self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S))
+    }
+
     /// The pressure on the plates, by what is known of its errors. The plates do not pull: near the kiss point the mean of the
     /// positive part is more than that of the mean.
     #[inline]
@@ -341,6 +350,13 @@ impl<T: Real> ElementState<T> {
         let (clutch, u) = (&element.clutch, &element.uncertainty);
         let slip = shift.alpha * slip_rad_s;
         let size = shift.alpha.abs() * direction;
+        if self.is_unheard() {
+            return ClutchTorque {
+                ratio: shift.ratio,
+                per_pressure_n_m: size * self.unheard_n_m,
+                ..ClutchTorque::none()
+            };
+        }
         let per_pa = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
         let pressing = self.pressing(element, wrong);
         let Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa, by_fill_pa, per_fill_pa } = pressing;
@@ -367,6 +383,9 @@ impl<T: Real> ElementState<T> {
         factor: T,
         wrong: &PressureError<T>,
     ) -> T {
+        if self.is_unheard() {
+            return T::infinity();
+        }
         let clutch = &element.clutch;
         let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
         let per_pa = shift.alpha.abs() * friction * clutch.lever() * clutch.piston_area_m2;

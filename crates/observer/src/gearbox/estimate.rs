@@ -260,6 +260,14 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
     }
 
+    /// A clutch of a shift while there is none, by its valve model and what is learnt of it.
+    pub(super) fn unshifted(&self, state: &GearboxState<T>, shift: &ShiftRow<T>, c: usize) -> ClutchEstimate<T> {
+        let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
+        let learnt = state.learnt.known_mean(&self.acting(shift));
+        let slip = self.slip(clutch.ratio, self.measured(&state.newest, None));
+        self.by_valve(&state.elements, clutch, [slip.value, slip.direction()], [learnt[c], learnt[c + 2]])
+    }
+
     fn of_clutch(
         &self,
         running: &super::Running<T>,

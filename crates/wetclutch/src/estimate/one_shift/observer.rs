@@ -41,13 +41,13 @@ pub(crate) fn check_options(options: &EstimateOptions) -> Result<(), Error> {
 
 fn sensors_without_effect() -> Error {
     Error::Input(
-        "--sensors has no effect with this observer\nhint: use it with `--observer` kalman, extended or unscented"
+        "--sensors has no effect with this observer\nhint: use it with `--observer` gearbox, kalman, extended or unscented"
             .to_owned(),
     )
 }
 
 fn is_filter(kind: ObserverKind) -> bool {
-    [ObserverKind::Kalman, ObserverKind::Extended, ObserverKind::Unscented].contains(&kind)
+    [ObserverKind::Gearbox, ObserverKind::Kalman, ObserverKind::Extended, ObserverKind::Unscented].contains(&kind)
 }
 
 /// Whether it is a valve model alone, which reads no engine speed.
@@ -94,7 +94,8 @@ pub(crate) fn choose(
             _ => sensors_without_effect(),
         });
     }
-    if is_filter(kind) || [ObserverKind::Compliant, ObserverKind::Inversion].contains(&kind) {
+    let needs_wheel = is_filter(kind) && kind != ObserverKind::Gearbox;
+    if needs_wheel || [ObserverKind::Compliant, ObserverKind::Inversion].contains(&kind) {
         log.require(Role::WheelSpeed)?;
     }
     if !is_open_loop(kind) {

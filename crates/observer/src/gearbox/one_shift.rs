@@ -1,0 +1,373 @@
+//! The gearbox filter of a vehicle of one shift, as an observer of its oncoming clutch.
+//!
+//! A log of such a vehicle has no gears. They follow from the command of the oncoming clutch and from the clutch that holds:
+//!
+//! | from | to | when |
+//! |---|---|---|
+//! | 1 | 1-2 | the command asks for a pressure above the kiss point |
+//! | 1-2 | 2 | the oncoming clutch has held for 0.1 s |
+//! | 2 | 2-1 | the command asks for less than half the pressure of the kiss point |
+//! | 2-1 | 1 | the offgoing clutch of the vehicle has held for 0.1 s |
+//!
+//! A command that is taken back before its shift has ended leads to the other shift, or back to the gear that still holds.
+
+use car::{Input, ShiftCommand};
+use drivetrain::{Driveline, Real, ReducedShift};
+
+use super::skew::Skew;
+use super::{
+    FrictionElement, GearRow, GearboxFilter, GearboxState, GearboxTables, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
+    ShiftPhase, ShiftRow, ShiftUncertainty, TurbineTorque,
+};
+use crate::{
+    EngineNoise, Estimate, Estimator, Health, InputLimits, Phase, Reading, SpeedReading, Supervisor, SupervisorState,
+};
+
+/// Place of the offgoing clutch among the elements, and of the gear before among the gears.
+const OFFGOING: usize = 0;
+/// The same of the oncoming clutch and of the gear after.
+const ONCOMING: usize = 1;
+
+/// Time for which a clutch has to hold until its gear counts as engaged, s \[chosen\]. Gears that are given 0 to 0.3 s after a shift change
+/// an estimate by 2 % at most.
+const HOLDS_S: f64 = 0.1;
+/// Time for which readings may show a wrong slip, s: a flare lasts longer.
+const FRESH_S: f64 = 0.025;
+
+/// The tables of a vehicle of one shift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OneShiftTables<T> {
+    /// The offgoing clutch, then the oncoming one.
+    pub elements: [FrictionElement<T>; 2],
+    /// The gear before the shift, then the one after.
+    pub gears: [GearRow<T>; 2],
+    /// The shift, then the one back.
+    pub shifts: [ShiftRow<T>; 2],
+}
+
+/// The filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OneShiftFilter<T> {
+    tables: OneShiftTables<T>,
+    parameters: Parameters<T>,
+    shift: ReducedShift<T>,
+    supervisor: Supervisor<T>,
+    unheard: UnheardTorque<T>,
+    /// Largest skew of turbine and output speed, s.
+    skew_max_s: T,
+}
+
+/// The parameters of a [`GearboxFilter`] beside its tables.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Parameters<T> {
+    driveline: Driveline<T>,
+    wheels_kg_m2: T,
+    turbine: TurbineTorque<T>,
+    uncertainty: ShiftUncertainty<T>,
+    readings: [SpeedReading<T>; 3],
+    engine: (SpeedReading<T>, EngineNoise<T>),
+    limits: InputLimits<T>,
+}
+
+/// What is known of the torque of the offgoing clutch while its command does not come: it walks while the clutch holds, and fades once it
+/// has let go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UnheardTorque<T> {
+    /// Standard deviation while it holds, N m.
+    pub holds_n_m: T,
+    /// The same of what is left when it is open, N m.
+    pub open_n_m: T,
+    /// Time constant from the one to the other, s.
+    pub release_s: T,
+}
+
+/// Memory of a [`OneShiftFilter`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OneShiftState<T> {
+    filter: GearboxState<T>,
+    stage: Stage,
+    /// For how long the oncoming clutch of the shift has held, s.
+    holds_s: T,
+    /// For how long the turbine has run away from the old gear, s.
+    flares_s: T,
+    supervisor: SupervisorState<T>,
+    skew: Skew<T>,
+}
+
+/// Where the vehicle is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    First,
+    Up,
+    Second,
+    Down,
+}
+
+impl Stage {
+    fn command(self) -> ShiftCommand {
+        let [from, to] = match self {
+            Self::First => [OFFGOING, OFFGOING],
+            Self::Up => [OFFGOING, ONCOMING],
+            Self::Second => [ONCOMING, ONCOMING],
+            Self::Down => [ONCOMING, OFFGOING],
+        };
+        ShiftCommand::between(from, to)
+    }
+}
+
+impl<T: Real> OneShiftTables<T> {
+    /// As the filter takes them.
+    fn as_slices(&self) -> GearboxTables<'_, T> {
+        GearboxTables { elements: &self.elements, gears: &self.gears, shifts: &self.shifts }
+    }
+
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> OneShiftTables<U> {
+        OneShiftTables {
+            elements: self.elements.each_ref().map(FrictionElement::cast),
+            gears: self.gears.each_ref().map(GearRow::cast),
+            shifts: self.shifts.each_ref().map(ShiftRow::cast),
+        }
+    }
+}
+
+impl<T: Real> OneShiftFilter<T> {
+    /// The filter of these tables. Only the parameters of `filter` count, and not its tables.
+    pub fn new(
+        tables: OneShiftTables<T>,
+        filter: &GearboxFilter<'_, T>,
+        shift: ReducedShift<T>,
+        supervisor: Supervisor<T>,
+        unheard: UnheardTorque<T>,
+        skew_max_s: T,
+    ) -> Self {
+        let GearboxFilter { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits, .. } = *filter;
+        let parameters = Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits };
+        Self { tables, parameters, shift, supervisor, unheard, skew_max_s }
+    }
+
+    /// Its tables.
+    pub fn tables(&self) -> &OneShiftTables<T> {
+        &self.tables
+    }
+
+    /// The same filter in another precision.
+    pub fn cast<U: Real>(&self) -> OneShiftFilter<U> {
+        OneShiftFilter::new(
+            self.tables.cast(),
+            &self.filter().cast(GearboxTables { elements: &[], gears: &[], shifts: &[] }),
+            self.shift.cast(),
+            self.supervisor.cast(),
+            self.unheard.cast(),
+            U::of(self.skew_max_s.to_f64_exact()),
+        )
+    }
+
+    /// The filter with its tables.
+    fn filter(&self) -> GearboxFilter<'_, T> {
+        let Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits } = self.parameters;
+        let tables = self.tables.as_slices();
+        GearboxFilter { tables, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits }
+    }
+
+    /// Follows the command of the oncoming clutch before a step.
+    fn take_command(&self, state: &mut OneShiftState<T>, command: Option<Reading<T>>) {
+        let oncoming = &self.tables.elements[ONCOMING];
+        let Some(reading) = command.and_then(|reading| oncoming.limits.usable(&reading)) else { return };
+        let asked_pa = oncoming.valve.valve.settled_pressure(reading.value);
+        let kiss_pa = self.supervisor.kiss_pressure_pa;
+        let still_holds = state.filter.estimate.phase == Some(ShiftPhase::OffgoingHolds);
+        let stage =
+            match state.stage {
+                Stage::First | Stage::Down if asked_pa > kiss_pa => {
+                    if state.stage == Stage::Down && still_holds {
+                        Stage::Second
+                    } else {
+                        Stage::Up
+                    }
+                }
+                Stage::Second | Stage::Up if asked_pa < T::of(0.5) * kiss_pa => {
+                    if state.stage == Stage::Up && still_holds { Stage::First } else { Stage::Down }
+                }
+                same => same,
+            };
+        state.enter(stage);
+    }
+
+    /// Ends a shift whose oncoming clutch holds.
+    fn follow_shift(state: &mut OneShiftState<T>, found: &ShiftEstimate<T>, dt_s: T) {
+        let holds = found.phase == Some(ShiftPhase::OncomingHolds);
+        state.holds_s = if holds { state.holds_s + dt_s } else { T::zero() };
+        if state.holds_s >= T::of(HOLDS_S) {
+            let stage = match state.stage {
+                Stage::Up => Stage::Second,
+                Stage::Down => Stage::First,
+                same => same,
+            };
+            state.enter(stage);
+        }
+    }
+
+    /// Follows the skew of the readings in a gear.
+    fn follow_skew(&self, filter: &GearboxFilter<'_, T>, state: &mut OneShiftState<T>, dt_s: T) {
+        let gear = match state.stage {
+            Stage::First => &self.tables.gears[OFFGOING],
+            Stage::Second => &self.tables.gears[ONCOMING],
+            Stage::Up | Stage::Down => return,
+        };
+        filter.take_skew(&mut state.skew, &state.filter.newest, (gear.ratio, dt_s), self.skew_max_s);
+    }
+
+    /// Follows what is known of the torque of the offgoing clutch without its command.
+    fn follow_unheard(&self, state: &mut OneShiftState<T>, found: &ShiftEstimate<T>, dt_s: T) {
+        let UnheardTorque { holds_n_m, open_n_m, release_s } = self.unheard;
+        let std_dev_n_m = match found.phase {
+            Some(ShiftPhase::BothSlip) => {
+                let now = state.filter.elements[OFFGOING].map_or(open_n_m, |element| element.unheard_n_m);
+                open_n_m + (now - open_n_m) * (-dt_s / release_s).exp()
+            }
+            _ => holds_n_m,
+        };
+        set_unheard(&mut state.filter, std_dev_n_m);
+    }
+
+    /// The phase of the shift: by the clutch that holds, and by the readings where the filter does not run.
+    fn phase(
+        &self,
+        state: &mut OneShiftState<T>,
+        found: &ShiftEstimate<T>,
+        [turbine, output]: [T; 2],
+        dt_s: T,
+    ) -> Phase {
+        let valve_pa = found.valve_pa[ONCOMING];
+        let slips = [self.shift.offgoing_slip(turbine, output), self.shift.oncoming_slip(turbine, output)];
+        let by_readings = self.supervisor.step(&mut state.supervisor, dt_s, valve_pa, slips[0], slips[1]);
+        let kiss_pa = self.supervisor.kiss_pressure_pa;
+        let before_or_torque = if valve_pa > kiss_pa { Phase::TorquePhase } else { Phase::BeforeShift };
+        let is_released = valve_pa < T::of(0.5) * kiss_pa;
+        let phase = match (state.stage, found.phase) {
+            (_, None) => by_readings,
+            (_, Some(_)) if is_released => Phase::BeforeShift,
+            (_, Some(ShiftPhase::BothSlip)) => Phase::InertiaPhase,
+            (Stage::Second, Some(_))
+            | (Stage::Up, Some(ShiftPhase::OncomingHolds))
+            | (Stage::Down, Some(ShiftPhase::OffgoingHolds)) => Phase::AfterShift,
+            _ => before_or_torque,
+        };
+        state.supervisor.phase = phase;
+        phase
+    }
+}
+
+impl<T: Real> UnheardTorque<T> {
+    fn cast<U: Real>(&self) -> UnheardTorque<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        UnheardTorque { holds_n_m: to(self.holds_n_m), open_n_m: to(self.open_n_m), release_s: to(self.release_s) }
+    }
+}
+
+fn set_unheard<T: Real>(filter: &mut GearboxState<T>, std_dev_n_m: T) {
+    if let Some(offgoing) = &mut filter.elements[OFFGOING] {
+        offgoing.unheard_n_m = std_dev_n_m;
+    }
+}
+
+impl<T: Real> OneShiftState<T> {
+    fn enter(&mut self, stage: Stage) {
+        if stage != self.stage {
+            (self.stage, self.holds_s) = (stage, T::zero());
+        }
+    }
+}
+
+impl<T: Real> OneShiftFilter<T> {
+    /// Pressure and torque of the oncoming clutch, Pa and N m.
+    fn oncoming(&self, filter: &GearboxFilter<'_, T>, state: &OneShiftState<T>, found: &ShiftEstimate<T>) -> [T; 2] {
+        let in_shift = found.clutches.into_iter().flatten().find(|clutch| clutch.element.place() == Some(ONCOMING));
+        if let Some(clutch) = in_shift {
+            return [clutch.pressure_pa, clutch.torque_n_m];
+        }
+        let [up, _] = &self.tables.shifts;
+        let by_valve = filter.unshifted(&state.filter, up, ONCOMING);
+        let held_n_m = self.held_n_m(found).filter(|_| state.stage == Stage::Second);
+        [by_valve.pressure_pa, held_n_m.unwrap_or(by_valve.torque_n_m)]
+    }
+
+    /// Torque of the oncoming clutch in the gear after the shift, N m: what the turbine torque leaves beside the inertia.
+    fn held_n_m(&self, found: &ShiftEstimate<T>) -> Option<T> {
+        let ([_, gear], [up, _]) = (&self.tables.gears, &self.tables.shifts);
+        let (turbine_n_m, output_n_m) = (found.turbine_n_m?, found.shaft_n_m? / self.parameters.driveline.final_ratio);
+        let [[m11, m12], _] = up.mass_kg_m2;
+        let rate = (gear.ratio * turbine_n_m - output_n_m) / gear.inertia_kg_m2;
+        Some((turbine_n_m - (m11 * gear.ratio + m12) * rate) / up.clutches[ONCOMING].alpha)
+    }
+
+    /// Whether the turbine has run away from the old gear for longer than wrong readings can show it.
+    fn flares(&self, state: &mut OneShiftState<T>, found: &ShiftEstimate<T>, dt_s: T) -> bool {
+        let flares =
+            found.phase == Some(ShiftPhase::BothSlip) && found.flare_rad_s > self.supervisor.release_slip_rad_s;
+        state.flares_s = if flares { state.flares_s + dt_s } else { T::zero() };
+        self.supervisor.is_held_longer(state.flares_s, T::of(FRESH_S))
+    }
+}
+
+impl<T: Real> Estimator<T> for OneShiftFilter<T> {
+    type State = OneShiftState<T>;
+
+    fn start(&self) -> OneShiftState<T> {
+        let mut filter = self.filter().start();
+        set_unheard(&mut filter, self.unheard.holds_n_m);
+        OneShiftState {
+            filter,
+            stage: Stage::First,
+            holds_s: T::zero(),
+            flares_s: T::zero(),
+            supervisor: SupervisorState::new(),
+            skew: Skew::nothing(),
+        }
+    }
+
+    fn step(&self, state: &mut OneShiftState<T>, input: &Input<T>) -> Estimate<T> {
+        let dt_s = if input.dt_s >= T::zero() && input.dt_s.is_finite() { input.dt_s } else { T::zero() };
+        self.take_command(state, input.command);
+        let filter = self.filter();
+        let taken = state.skew.taken_off(&self.shift_input(state, input));
+        let found = filter.step(&mut state.filter, &taken);
+        self.follow_skew(&filter, state, dt_s);
+        Self::follow_shift(state, &found, dt_s);
+        self.follow_unheard(state, &found, dt_s);
+        let speeds = filter.measured(&state.filter.newest, None);
+        let phase = self.phase(state, &found, speeds, dt_s);
+        let [pressure_pa, clutch_torque_n_m] = self.oncoming(&filter, state, &found);
+        let flare = if self.flares(state, &found, dt_s) { Health::Flare } else { Health::Good };
+        let mut channels = found.channels;
+        [channels.offgoing_command, channels.command] = [OFFGOING, ONCOMING].map(|at| found.commands[at]);
+        Estimate {
+            pressure_pa,
+            clutch_torque_n_m,
+            shaft_torque_n_m: found.shaft_n_m,
+            phase,
+            health: found.health.max(flare),
+            channels,
+            bounds: None,
+        }
+    }
+}
+
+impl<T: Real> OneShiftFilter<T> {
+    fn shift_input(&self, state: &OneShiftState<T>, input: &Input<T>) -> ShiftInput<T> {
+        let mut commands = [None; MAX_ELEMENTS];
+        (commands[OFFGOING], commands[ONCOMING]) = (input.offgoing_command, input.command);
+        ShiftInput {
+            dt_s: input.dt_s,
+            engine_rad_s: input.engine_rad_s,
+            turbine_rad_s: input.turbine_rad_s,
+            output_rad_s: input.output_rad_s,
+            wheel_rad_s: input.wheel_rad_s,
+            engine_n_m: input.engine_torque_n_m,
+            lock_up_applied: false,
+            commands,
+            gear: state.stage.command(),
+        }
+    }
+}
