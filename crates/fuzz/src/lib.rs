@@ -58,6 +58,10 @@ pub enum Target {
     Trc,
     /// The same of tables of frames of SavvyCAN.
     Savvy,
+    /// The same of tables of frames of python-can.
+    PythonCan,
+    /// The same of tables with a reading in each row.
+    Readings,
     /// The reader of channel maps.
     Map,
     /// The reader of the messages and signals of a bus.
@@ -70,7 +74,7 @@ pub enum Target {
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 20] = [
         Self::Vehicle,
         Self::Experiment,
         Self::Study,
@@ -85,6 +89,8 @@ impl Target {
         Self::Blf,
         Self::Trc,
         Self::Savvy,
+        Self::PythonCan,
+        Self::Readings,
         Self::Map,
         Self::Dbc,
         Self::Gearbox,
@@ -108,6 +114,8 @@ impl Target {
             Self::Blf => "blf",
             Self::Trc => "trc",
             Self::Savvy => "savvy",
+            Self::PythonCan => "python_can",
+            Self::Readings => "readings",
             Self::Map => "map",
             Self::Dbc => "dbc",
             Self::Gearbox => "gearbox",
@@ -126,6 +134,8 @@ impl Target {
             Self::Blf => Format::Can(CanKind::Blf),
             Self::Trc => Format::Can(CanKind::Trc),
             Self::Savvy => Format::Can(CanKind::Savvy),
+            Self::PythonCan => Format::Can(CanKind::PythonCan),
+            Self::Readings => Format::Readings,
             _ => return None,
         })
     }
@@ -205,7 +215,9 @@ impl Fuzzer {
             | Target::Asc
             | Target::Blf
             | Target::Trc
-            | Target::Savvy => {
+            | Target::Savvy
+            | Target::PythonCan
+            | Target::Readings => {
                 // A file of another format is a case of another target.
                 if target.format() == Some(Format::of(input)) {
                     measured::log(self, input);
@@ -252,7 +264,9 @@ impl Fuzzer {
             | Target::Asc
             | Target::Blf
             | Target::Trc
-            | Target::Savvy => {
+            | Target::Savvy
+            | Target::PythonCan
+            | Target::Readings => {
                 let logs = measured::logs().into_iter().filter(|log| target.format() == Some(Format::of(log)));
                 seeds.extend(logs);
             }

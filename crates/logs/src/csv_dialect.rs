@@ -9,15 +9,19 @@ use crate::csv_log::{has_groups, split_unit};
 use crate::time_column::is_time_name;
 use crate::{LogError, error};
 
+/// Rows of titles at most: names, units, descriptions and types.
+const TITLES: usize = 4;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Dialect {
     pub(crate) delimiter: u8,
     pub(crate) decimal_comma: bool,
     /// Lines before the row of names.
     pub(crate) preamble: usize,
-    pub(crate) units_row: bool,
-    /// Lines with something in them between the names, or units, and the first row: marks of sections.
-    pub(crate) marks: usize,
+    /// Lines with something in them between the names and the first row: units, descriptions, marks of sections.
+    pub(crate) between: usize,
+    /// Which of them has the units.
+    pub(crate) units: Option<usize>,
     /// Line of the first row.
     pub(crate) first: usize,
 }
@@ -116,25 +120,30 @@ impl<'a> Table<'a> {
         let is_mark = |i: usize| self.rows[i].len() == 1 && lines[i].starts_with('[') && !lines[i].contains('"');
         let is_filled = |i: &usize| !lines[*i].trim().is_empty();
         let filled: Vec<usize> = (0..first).rev().filter(is_filled).filter(|&i| !is_mark(i)).collect();
-        if let Some(&open) = filled.iter().take(2).find(|&&i| lines[i].matches('"').count() % 2 == 1) {
+        if let Some(&open) = filled.iter().take(TITLES).find(|&&i| lines[i].matches('"').count() % 2 == 1) {
             return Err(LogError::damaged(
                 path,
                 format!("line {}", open + 1),
                 "a quotation mark among the names or units is not closed in its line\nhint: write names and units without line breaks",
             ));
         }
-        let line = |nth: usize| {
-            filled.get(nth).map(|&i| (i, &self.rows[i])).filter(|(_, row)| names(row.as_slice()) || is_units(row))
+        let near = &filled[..filled.len().min(TITLES)];
+        let has_names = |at: &&usize| names(&self.rows[**at]);
+        // Descriptions and types may stand between the names and the numbers: the name of the time tells the names from them.
+        let has_time = |at: &&usize| self.rows[**at].len() == self.rows[first].len() && has_time_name(&self.rows[**at]);
+        let units = near.iter().find(|at| is_units(&self.rows[**at]));
+        let below_names = match near {
+            [units, names_at, ..] if is_units(&self.rows[*units]) => Some(names_at).filter(has_names),
+            _ => None,
         };
-        let dialect = |preamble: usize, units_row: bool| {
-            let above = filled.first().map_or(0, |above| above + 1);
-            let marks = (above..first).filter(is_filled).count();
-            Dialect { delimiter, decimal_comma, preamble, units_row, marks, first }
-        };
-        match (line(0), line(1).filter(|(_, row)| names(row.as_slice()))) {
-            (Some((_, units)), Some((names_at, _))) if is_units(units) => Ok(dialect(names_at, true)),
-            (Some((names_at, row)), _) if names(row) => Ok(dialect(names_at, false)),
-            _ => Err(LogError::damaged(
+        let nearest = near.first().filter(has_names);
+        match near.iter().find(has_time).or(below_names).or(nearest) {
+            Some(&preamble) => {
+                let between: Vec<usize> = (preamble + 1..first).filter(is_filled).collect();
+                let units = units.and_then(|units| between.iter().position(|at| at == units));
+                Ok(Dialect { delimiter, decimal_comma, preamble, between: between.len(), units, first })
+            }
+            None => Err(LogError::damaged(
                 path,
                 format!("line {}", first + 1),
                 "there is no row of names above the first row of numbers\nhint: add one, with a time and a unit for each column; no name may be a number, such as `1` or `Inf`",

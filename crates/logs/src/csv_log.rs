@@ -13,8 +13,8 @@ use crate::columns::{Batch, Stream};
 use crate::csv_dialect::{Dialect, cells};
 use crate::row_order::RowOrder;
 use crate::samples::{Quality, Sample};
-use crate::stamp::{self, Midnight, StampForm};
-use crate::time_column::{is_time_name, one_clock, time_column, time_unit};
+use crate::stamp::{Midnight, StampForm};
+use crate::time_column::{ClockParts, is_time_name, one_clock, time_column, time_unit};
 use crate::{Channel, LogError, TimeColumn, error};
 
 /// Rows in a batch; of many columns fewer, so that it has at most so many cells, or is one row.
@@ -42,6 +42,8 @@ enum TimeForm {
     /// Numbers of a unit of this size, s.
     Numbers(f64),
     Stamps(StampForm),
+    /// A time of the day in several columns.
+    Parts(ClockParts),
 }
 
 impl CsvLog {
@@ -61,41 +63,53 @@ impl CsvLog {
         let mut records = Records::new(Box::new(input), dialect.delimiter);
         read_row(path, &mut records, dialect.preamble)?;
         let titles: Vec<String> = records.cells().map(|cell| text(cell).trim().to_owned()).collect();
-        let units: Vec<String> = if dialect.units_row {
+        let mut units: Vec<String> = Vec::new();
+        for at in 0..dialect.between {
             read_row(path, &mut records, dialect.preamble)?;
-            records.cells().map(|cell| unit_text(&text(cell))).collect()
-        } else {
-            Vec::new()
-        };
-        for _ in 0..dialect.marks {
-            read_row(path, &mut records, dialect.preamble)?;
+            if dialect.units == Some(at) {
+                units = records.cells().map(|cell| unit_text(&text(cell))).collect();
+            }
         }
         let names = names_and_units(&titles, &units);
         let mut notes = Vec::new();
         // A column of clock times or dates is the time where no name says so.
         let named = names.iter().any(|(name, _)| is_time_name(name));
-        let by_form = (0..names.len()).find(|&i| stamp(i).is_some()).filter(|_| time.is_none() && !named);
+        let stamps = || (0..names.len()).filter(|&i| stamp(i).is_some());
+        // Of several the one with parts of seconds: GPS gives whole ones.
+        let has_parts = |i: &usize| first[*i].rsplit(':').next().is_some_and(|seconds| seconds.contains(['.', ',']));
+        let by_form = stamps().find(has_parts).or_else(|| stamps().next()).filter(|_| time.is_none() && !named);
         let by_form = by_form.map(|i| TimeColumn { name: names[i].0.clone(), unit: None });
+        let parts = ClockParts::of(&names).filter(|_| time.is_none() && by_form.is_none());
         let time = time.or(by_form.as_ref());
-        let column = time_column(path, &names, &titles, time)?;
-        let time = match stamp(column) {
-            Some(form) => (column, TimeForm::Stamps(form)),
-            None => (column, TimeForm::Numbers(time_unit(path, &names[column], time, &mut notes)?)),
+        let column = parts.map_or_else(|| time_column(path, &names, &titles, time), |parts| Ok(parts.hour))?;
+        if stamp(column).is_some_and(StampForm::is_ambiguous) {
+            notes.push(format!(
+                "the day and the month of `{}` cannot be distinguished: the time of the day counts\nhint: dates such as 2024-03-31 are clear",
+                error::shown(&first[column])
+            ));
+        }
+        let time = match (stamp(column), parts) {
+            (_, Some(parts)) => (column, TimeForm::Parts(parts)),
+            (Some(form), None) => (column, TimeForm::Stamps(form)),
+            (None, None) => (column, TimeForm::Numbers(time_unit(path, &names[column], time, &mut notes)?)),
         };
         // The last line of the head may be cut.
         let whole = beginning.lines().count().saturating_sub(usize::from(!beginning.ends_with('\n')));
         let lines = beginning.lines().enumerate().take(whole).skip(dialect.first);
         let size_s = if let TimeForm::Numbers(size) = time.1 { size } else { 1.0 };
         let rows = lines.map(|(line, text)| (line, cells(text, dialect.delimiter)));
-        one_clock(path, &names, (column, size_s), "line", rows)?;
-        let named = |i: &usize| *i != time.0 && !names[*i].0.is_empty();
+        if parts.is_none() {
+            one_clock(path, &names, (column, size_s), "line", rows)?;
+        }
+        let is_time = |i: usize| i == time.0 || parts.is_some_and(|parts| parts.contains(i));
+        let named = |i: &usize| !is_time(*i) && !names[*i].0.is_empty();
         let columns: Vec<usize> = (0..titles.len()).filter(named).collect();
         let (path, width) = (path.to_owned(), titles.len());
         let batch = if is_followed { 1 } else { (CELLS / width.max(1)).clamp(1, BATCH) };
         // There may be very many.
         drop((titles, units));
         let named = |(i, (name, unit)): (usize, (String, String))| {
-            let is_channel = i != time.0 && !name.is_empty();
+            let is_channel = !is_time(i) && !name.is_empty();
             is_channel.then(|| Channel { name, unit, group: String::new() })
         };
         let channels = names.into_iter().enumerate().filter_map(named).collect();
@@ -127,7 +141,7 @@ impl CsvLog {
             text: Vec::new(),
             midnight: match self.time.1 {
                 TimeForm::Stamps(form) => form.turns(),
-                TimeForm::Numbers(_) => Midnight::default(),
+                TimeForm::Numbers(_) | TimeForm::Parts(_) => Midnight::default(),
             },
             order: RowOrder::default(),
             rows: 0,
@@ -200,22 +214,13 @@ impl Rows<'_> {
         let (without, rows) = (self.without_time, self.rows);
         let (first, decimal_comma) = (&self.first_without_time, self.log.dialect.decimal_comma);
         let of_number = Some(hint(first, decimal_comma)).filter(|hint| !hint.is_empty());
-        let forms = || {
-            let date = if stamp::is_ambiguous(first) {
-                "; the day and the month of a date such as this cannot be told apart: write `2024-03-31 12:00:01.25`"
-            } else {
-                ""
-            };
-            format!(
-                "\nhint: times are numbers, `12:00:01.25`, `2024-03-31 12:00:01.25` or `31.03.2024 12:00:01.25`, all in one form{date}"
-            )
-        };
+        let forms = "\nhint: times are numbers, `12:00:01.25`, `2024-03-31 12:00:01.25` or `31.03.2024 12:00:01.25`, all in one form";
         LogError::file(
             &self.log.path,
             format!(
                 "{without} of {rows} rows have no time, the first is `{}`{}",
                 error::shown(first),
-                of_number.map_or_else(forms, str::to_owned)
+                of_number.unwrap_or(forms)
             ),
         )
     }
@@ -225,6 +230,10 @@ impl Rows<'_> {
         let (column, form) = self.log.time;
         match form {
             TimeForm::Numbers(size) => self.number(column).map(|time| time * size).filter(|time_s| time_s.is_finite()),
+            TimeForm::Parts(parts) => {
+                let time_s = parts.seconds(|column| self.number(column))?;
+                Some(self.midnight.unwrap(time_s))
+            }
             TimeForm::Stamps(form) => {
                 let time_s = form.seconds(&text(self.records.cell(column)?))?;
                 Some(if form.has_turns() { self.midnight.unwrap(time_s) } else { time_s })
@@ -338,7 +347,7 @@ fn names_and_units(titles: &[String], units: &[String]) -> Vec<(String, String)>
 }
 
 /// Reads a row; false at the end.
-fn read_row(path: &Path, records: &mut Records, preamble: usize) -> Result<bool, LogError> {
+pub(crate) fn read_row(path: &Path, records: &mut Records, preamble: usize) -> Result<bool, LogError> {
     records.advance().map_err(|error| match error {
         RecordError::Io(source) => LogError::Io { path: path.to_owned(), source },
         RecordError::TooLong => too_long(path, records.line() + preamble as u64),
@@ -373,7 +382,7 @@ fn hint(cell: &str, decimal_comma: bool) -> &'static str {
 }
 
 /// Text of a file: UTF-8, or else Latin-1, in which every byte is a letter.
-fn text(bytes: &[u8]) -> String {
+pub(crate) fn text(bytes: &[u8]) -> String {
     std::str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&byte| char::from(byte)).collect(), str::to_owned)
 }
 

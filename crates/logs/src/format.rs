@@ -1,5 +1,7 @@
 //! Formats of files, by their first bytes.
 
+use crate::readings_table::is_of_readings;
+
 /// Formats of files, as their first bytes tell them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -11,6 +13,8 @@ pub enum Format {
     Can(CanKind),
     /// A format that is known and not read: what it is, and what to do.
     NotRead(&'static str),
+    /// A table as text with a reading in each row.
+    Readings,
     /// Anything else: a table as text.
     Csv,
 }
@@ -28,6 +32,8 @@ pub enum CanKind {
     Trc,
     /// Table of frames of SavvyCAN.
     Savvy,
+    /// Table of frames of python-can.
+    PythonCan,
 }
 
 /// First bytes of formats that are not read.
@@ -93,6 +99,9 @@ impl Format {
         if lower.starts_with("time stamp,id,extended,") {
             return Self::Can(CanKind::Savvy);
         }
+        if lower == "timestamp,arbitration_id,extended,remote,error,dlc,data" {
+            return Self::Can(CanKind::PythonCan);
+        }
         if lower.starts_with("timestamp,arbitration_id,") {
             return Self::NotRead(OTHER_FRAMES);
         }
@@ -102,7 +111,7 @@ impl Format {
         {
             return Self::Can(CanKind::Asc);
         }
-        Self::Csv
+        if is_of_readings(first) { Self::Readings } else { Self::Csv }
     }
 }
 

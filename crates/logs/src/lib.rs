@@ -39,6 +39,7 @@ pub mod on_change;
 mod parquet_log;
 pub mod plausibility;
 pub mod readings;
+mod readings_table;
 pub mod role;
 mod row_order;
 pub mod samples;

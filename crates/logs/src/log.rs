@@ -22,6 +22,7 @@ use crate::mdf::MdfLog;
 use crate::not_in_browser::{CanLog, Database, MdfLog, ParquetLog};
 #[cfg(not(target_family = "wasm"))]
 use crate::parquet_log::ParquetLog;
+use crate::readings_table::ReadingsTable;
 use crate::samples::Samples;
 use crate::{CanKind, Channel, Format, LogError, TimeColumn, csv_log, error};
 
@@ -46,6 +47,7 @@ pub struct Log {
 
 enum Source {
     Csv(Box<CsvLog>),
+    Readings(Box<ReadingsTable>),
     Parquet(ParquetLog),
     Mdf(Box<MdfLog>),
     Can(CanLog),
@@ -125,6 +127,8 @@ impl Log {
                 let channels = database.channels().to_vec();
                 (Source::Can(CanLog::new(path, kind, head, reader, database, is_followed)), channels)
             }
+            Format::Readings => ReadingsTable::open(path, head, reader, is_followed)
+                .map(|(log, channels)| (Source::Readings(Box::new(log)), channels))?,
             Format::Csv => CsvLog::open(path, head, reader, options.time.as_ref(), is_followed)
                 .map(|(log, channels)| (Source::Csv(Box::new(log)), channels))?,
         };
@@ -148,7 +152,7 @@ impl Log {
     /// Whether there are frames of a CAN bus in it.
     fn has_frames(&self) -> bool {
         match &self.source {
-            Source::Csv(_) | Source::Parquet(_) => false,
+            Source::Csv(_) | Source::Readings(_) | Source::Parquet(_) => false,
             Source::Mdf(log) => log.has_frames(),
             Source::Can(_) => true,
         }
@@ -160,7 +164,7 @@ impl Log {
             Source::Csv(log) => log.note(note),
             Source::Parquet(log) => log.note(note),
             Source::Mdf(log) => log.note(note),
-            Source::Can(_) => {}
+            Source::Can(_) | Source::Readings(_) => {}
         }
     }
 
@@ -186,6 +190,7 @@ impl Log {
     pub fn format(&self) -> String {
         match &self.source {
             Source::Csv(log) => log.format(),
+            Source::Readings(_) => "CSV, a reading in each row".to_owned(),
             Source::Parquet(_) => "Parquet".to_owned(),
             Source::Mdf(log) => log.format(),
             Source::Can(log) => log.format().to_owned(),
@@ -240,6 +245,7 @@ impl Log {
         let mask = self.mask(wanted);
         Ok(match &mut self.source {
             Source::Csv(log) => vec![log.stream(&mask)?],
+            Source::Readings(log) => vec![log.stream(&mask)?],
             Source::Parquet(log) => vec![log.stream(&mask)?],
             Source::Mdf(log) => {
                 log.unpack_with(Crew::of(self.threads));

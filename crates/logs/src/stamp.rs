@@ -16,7 +16,11 @@ const DATES: &[&str] = &[
     "%d-%b-%Y %I:%M:%S%.f %p",
     "%d %b %Y %H:%M:%S%.f",
     "%d %b %Y %I:%M:%S%.f %p",
+    "%a %b %d %H:%M:%S %Z %Y",
 ];
+/// Forms with a date, a time and the difference from UTC, beside RFC 3339.
+const ZONED: &[&str] = &["%a %b %d %H:%M:%S GMT%:z %Y"];
+const WEEKDAYS: [&str; 7] = ["Mon ", "Tue ", "Wed ", "Thu ", "Fri ", "Sat ", "Sun "];
 /// Forms in which the month may stand before the day or behind it.
 const MONTH_OR_DAY_FIRST: &[[&str; 2]] = &[
     ["%m/%d/%y %H:%M:%S%.f", "%d/%m/%y %H:%M:%S%.f"],
@@ -40,24 +44,28 @@ pub(crate) enum StampForm {
     Minutes,
     /// With a date; local, or without a zone.
     Date(&'static str),
-    /// With a date and the difference from UTC: `2024-03-31T12:00:00+02:00`.
-    Zoned,
+    /// With a date and the difference from UTC.
+    Zoned(&'static str),
+    /// The same by RFC 3339: `2024-03-31T12:00:00+02:00`.
+    Rfc3339,
+    /// With a date such as `3/4/2024`, whose month may be either number: the time of the day.
+    ClockOfDate(&'static [&'static str; 2]),
 }
 
 impl StampForm {
-    /// The form of a time, if it is written as one. A date such as `3/4/2024`, whose month may be either number, has none.
+    /// The form of a time, if it is written as one.
     pub(crate) fn of(text: &str) -> Option<Self> {
         // A number is no time, and most of what is not is known by its first letter.
-        if !text.trim_start().starts_with(|c: char| c.is_ascii_digit()) || !text.contains(':') {
+        let text = text.trim();
+        let begins = text.starts_with(|c: char| c.is_ascii_digit()) || WEEKDAYS.iter().any(|day| text.starts_with(day));
+        if !begins || !text.contains(':') {
             return None;
         }
         let is = |form: &Self| form.seconds(text).is_some();
         let clocks = CLOCKS.iter().map(|form| Self::Clock(form)).chain([Self::ClockWithMs, Self::Minutes]);
-        let forms = clocks.chain(DATES.iter().map(|form| Self::Date(form))).chain([Self::Zoned]);
-        forms.into_iter().find(is).or_else(|| match orders(text)? {
-            [Some(one), None] | [None, Some(one)] => Some(one),
-            _ => None,
-        })
+        let zoned = ZONED.iter().map(|form| Self::Zoned(form)).chain([Self::Rfc3339]);
+        let forms = clocks.chain(zoned).chain(DATES.iter().map(|form| Self::Date(form)));
+        forms.into_iter().find(is).or_else(|| Self::of_date_in_either_order(text))
     }
 
     /// The seconds since midnight, the hour or 1970; none where the text has another form.
@@ -86,7 +94,12 @@ impl StampForm {
                 (is_form && seconds < 60.0).then(|| 60.0 * f64::from(minutes) + seconds)
             }
             Self::Date(form) => NaiveDateTime::parse_from_str(&text, form).ok().map(since_1970),
-            Self::Zoned => DateTime::parse_from_rfc3339(&text).ok().map(|time| since_1970(time.naive_utc())),
+            Self::Zoned(form) => DateTime::parse_from_str(&text, form).ok().map(|time| since_1970(time.naive_utc())),
+            Self::ClockOfDate(forms) => {
+                let time = forms.iter().find_map(|form| NaiveDateTime::parse_from_str(&text, form).ok());
+                time.map(|time| of_day(time.time()))
+            }
+            Self::Rfc3339 => DateTime::parse_from_rfc3339(&text).ok().map(|time| since_1970(time.naive_utc())),
         }
     }
 
@@ -100,21 +113,24 @@ impl StampForm {
 
     /// Whether its times begin anew after a day or an hour.
     pub(crate) fn has_turns(self) -> bool {
-        matches!(self, Self::Clock(_) | Self::ClockWithMs | Self::Minutes)
+        matches!(self, Self::Clock(_) | Self::ClockWithMs | Self::Minutes | Self::ClockOfDate(_))
     }
-}
 
-/// The forms of a date that begins with the month and with the day; none where it is no such date.
-fn orders(text: &str) -> Option<[Option<StampForm>; 2]> {
-    let orders = MONTH_OR_DAY_FIRST
-        .iter()
-        .map(|pair| pair.map(|form| Some(StampForm::Date(form)).filter(|form| form.seconds(text).is_some())));
-    orders.into_iter().find(|orders| orders.iter().any(Option::is_some))
-}
+    /// The form of a date that begins with the month or with the day; none where it is no such date.
+    fn of_date_in_either_order(text: &str) -> Option<Self> {
+        MONTH_OR_DAY_FIRST.iter().find_map(|pair| {
+            let is = |form: &Self| form.seconds(text).is_some();
+            match pair.map(|form| Some(Self::Date(form)).filter(is)) {
+                [Some(_), Some(_)] => Some(Self::ClockOfDate(pair)),
+                [one, other] => one.or(other),
+            }
+        })
+    }
 
-/// Whether nothing in a date tells its day from its month: `3/4/2024 12:00:00`.
-pub(crate) fn is_ambiguous(text: &str) -> bool {
-    matches!(orders(text), Some([Some(_), Some(_)]))
+    /// Whether nothing in a date tells its day from its month: `3/4/2024 12:00:00`.
+    pub(crate) fn is_ambiguous(self) -> bool {
+        matches!(self, Self::ClockOfDate(_))
+    }
 }
 
 /// Times of a day, or of an hour, that go on after its end.
@@ -168,6 +184,9 @@ mod tests {
             ("3/31/24 12:00:00", noon_s),
             ("31/3/2024 12:00:00", noon_s),
             ("31-03-2024 12:00:00", noon_s),
+            ("Sun Mar 31 13:00:00 GMT+01:00 2024", noon_s),
+            ("Sun Mar 31 12:00:00 CET 2024", noon_s),
+            ("3/4/2024 12:00:01.25", 43_201.25),
             ("12:00:01:250", 43_201.25),
             ("00:01.5", 1.5),
             ("59:59,9", 3599.9),
@@ -181,7 +200,6 @@ mod tests {
             "12",
             "12.5",
             "12:00",
-            "3/4/2024 12:00:00",
             "2024-03-31",
             "25:00:00",
             "a:b:c",
@@ -200,8 +218,12 @@ mod tests {
 
     #[test]
     fn only_a_date_that_has_two_meanings_is_ambiguous() {
+        let is_ambiguous = |text: &str| StampForm::of(text).unwrap().is_ambiguous();
         assert!(is_ambiguous("3/4/2024 12:00:00") && is_ambiguous("03-04-2024 12:00:00 PM"));
-        assert!(!is_ambiguous("3/31/2024 12:00:00") && !is_ambiguous("2024/03/04 12:00:00") && !is_ambiguous("x"));
+        assert!(!is_ambiguous("3/31/2024 12:00:00") && !is_ambiguous("2024/03/04 12:00:00"));
+        // A day later there is one order.
+        let form = StampForm::of("12/12/2024 23:59:59").unwrap();
+        assert_eq!(form.seconds("12/13/2024 00:00:01"), Some(1.0));
     }
 
     #[test]

@@ -161,18 +161,44 @@ pub(crate) fn time_column(
     found.ok_or_else(|| LogError::file(path, without_time(names, wanted)))
 }
 
+/// The columns of a time that stands in several: hours, minutes, seconds, and milliseconds if there are any.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ClockParts {
+    pub(crate) hour: usize,
+    pub(crate) minute: usize,
+    pub(crate) second: usize,
+    pub(crate) ms: Option<usize>,
+}
+
+impl ClockParts {
+    /// Those of a table, if it has them and no other column with the name of a time.
+    pub(crate) fn of(names: &[(String, String)]) -> Option<Self> {
+        let find = |words: &[&str]| names.iter().position(|(name, _)| words.contains(&name.to_lowercase().as_str()));
+        let parts = Self {
+            hour: find(&["hour", "hours", "stunde", "stunden"])?,
+            minute: find(&["minute", "minutes", "min", "minuten"])?,
+            second: find(&["second", "seconds", "sec", "sekunde", "sekunden"])?,
+            ms: find(&["ms", "msec", "millis", "millisecond", "milliseconds", "millisekunden"]),
+        };
+        let is_other = |(i, (name, _)): (usize, &(String, String))| !parts.contains(i) && is_time_name(name);
+        (!names.iter().enumerate().any(is_other)).then_some(parts)
+    }
+
+    /// Whether a column is one of them.
+    pub(crate) fn contains(self, column: usize) -> bool {
+        [Some(self.hour), Some(self.minute), Some(self.second), self.ms].contains(&Some(column))
+    }
+
+    /// The time of the day, s; none where a part is none.
+    pub(crate) fn seconds(self, mut number: impl FnMut(usize) -> Option<f64>) -> Option<f64> {
+        let ms = self.ms.map_or(Some(0.0), &mut number)?;
+        let [hour, minute, second] = [self.hour, self.minute, self.second].map(number);
+        Some(3600.0 * hour? + 60.0 * minute? + second? + 1e-3 * ms).filter(|time_s| time_s.is_finite())
+    }
+}
+
 /// The error of a table without a time, with what to do.
 fn without_time(names: &[(String, String)], wanted: Option<&TimeColumn>) -> String {
-    let find =
-        |words: &[&str]| names.iter().map(|(name, _)| name).find(|name| words.contains(&name.to_lowercase().as_str()));
-    let parts =
-        [&["hour", "hours", "stunde"][..], &["minute", "minutes", "min"], &["second", "seconds", "sec", "sekunde"]];
-    if let ([Some(hour), Some(minute), Some(second)], None) = (parts.map(find), wanted) {
-        return format!(
-            "the time stands in several columns, such as `{hour}`, `{minute}` and `{second}`\n\
-             hint: join them into one column of clock times, `18:16:50.010`, or of dates, `2024-05-16 18:16:50.010`"
-        );
-    }
     let some: Vec<String> = names.iter().take(12).map(|(name, _)| error::shown(name)).collect();
     let is_likely = |name: &&String| {
         let name = name.to_lowercase();

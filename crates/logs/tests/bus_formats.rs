@@ -1,4 +1,4 @@
-//! Bus logs of PCAN and SavvyCAN, parameter groups of J1939, and DBC files with long names and impossible signals.
+//! Bus logs of PCAN, SavvyCAN and python-can, parameter groups of J1939, and DBC files with long names and impossible signals.
 
 use crate::common::{Folder, channel, read, with_dbc};
 use logs::{OpenOptions, Quality};
@@ -81,6 +81,26 @@ fn tables_of_frames_of_savvycan_are_read() {
     let wrong = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\nx,y,z,Rx,0,8,1\n";
     let error = read(&folder.write("bus.csv", wrong), &with_dbc()).map(drop).unwrap_err().to_string();
     assert!(error.contains("line 2: `x,y,z,Rx,0,8,1`"), "{error}");
+}
+
+#[test]
+fn tables_of_frames_of_python_can_are_read() {
+    // The data of all frames of a test is 40 0C and six zeros.
+    let head = "timestamp,arbitration_id,extended,remote,error,dlc,data\n";
+    let rows =
+        "1.0,0x100,0,0,0,8,QAwAAAAAAAA=\n1.2,0x100,0,1,0,8,\n1.4,0x4,0,0,1,0,\n2.0,0x100,0,0,0,8,QAwAAAAAAAA=\r\n\n";
+    let (format, values, notes) = engine(&format!("{head}{rows}"));
+    assert_eq!((&*format, notes), ("CAN log (python-can)", vec![]));
+    assert_eq!(values, [(1.0, values[0].1), (2.0, values[0].1)]);
+    assert_eq!(values[0].1, 0.25 * f64::from(0x0c40));
+    let folder = Folder::new("python-can-wrong");
+    for wrong in
+        ["1.0,0x100,0,0,0,8,QAw=", "x,0x100,0,0,0,2,QAw=", "1.0,0x100,2,0,0,2,QAw=", "1.0,0x100,0,0,0,2,Q*w=", "1.0"]
+    {
+        let log = folder.write("bus.csv", format!("{head}{wrong}\n"));
+        let error = read(&log, &with_dbc()).map(drop).unwrap_err().to_string();
+        assert!(error.contains(&format!("line 2: `{wrong}`")), "{error}");
+    }
 }
 
 /// A DBC of J1939: engine speed of EEC1, both shaft speeds of ETC1.

@@ -247,22 +247,38 @@ fn exports_of_loggers_and_apps_are_read() {
 fn a_time_that_is_not_found_is_named_with_a_map() {
     let folder = Folder::new("no-time");
     let error = |text: &str| values(&folder, text, "N").unwrap_err();
-    let parts =
-        error("Year,Month,Day,Hour,Minute,Second,Ms,N\n2024,5,16,18,16,50,0,1500.5\n2024,5,16,18,16,50,10,1501.5\n");
-    assert!(
-        parts.contains("the time stands in several columns, such as `Hour`, `Minute` and `Second`\nhint: join them"),
-        "{parts}"
-    );
     let map = error("N [rpm];Messzeit;M\n1500.5;0.01;1\n1501.5;0.02;1\n");
     assert!(
         map.ends_with("\nhint: name it `time_s`, or in the channel map under [time], for example\n  [time]\n  name = \"Messzeit\"\n  unit = \"ms\""),
         "{map}"
     );
-    let day = error("Date Time,N\n3/4/2024 6:16:50.000 PM,1500.5\n3/4/2024 6:16:50.010 PM,1501.5\n");
-    assert!(
-        day.contains("the day and the month of a date such as this cannot be told apart: write `2024-03-31"),
-        "{day}"
-    );
+}
+
+#[test]
+fn a_time_in_several_columns_is_read() {
+    let folder = Folder::new("time-parts");
+    let times = |text: &str| -> Vec<f64> {
+        let (log, samples, _) = read(&folder.write("log.csv", text), &OpenOptions::default()).unwrap();
+        assert_eq!(log.channels().last().unwrap().name, "N");
+        channel(&log, &samples, "N").into_iter().map(|(time_s, ..)| time_s).collect()
+    };
+    let head = "Year,Month,Day,Hour,Minute,Second,Ms,N\n";
+    let rows = "2024,5,16,23,59,59,990,1500.5\n2024,5,17,0,0,0,0,1501.5\n2024,5,17,0,0,,10,1502.5\n";
+    assert_eq!(times(&format!("{head}{rows}")), [86_399.99, 86_400.0]);
+    assert_eq!(times("Hours;Minutes;Seconds;N\n1;2;3,25;1500,5\n1;2;3,50;1501,5\n"), [3723.25, 3723.5]);
+    // A name of the time of its own comes first.
+    assert_eq!(times("Time,Hour,Minute,Second,N\n0.5,1,2,3,1500.5\n0.6,1,2,3,1501.5\n"), [0.5, 0.6]);
+}
+
+#[test]
+fn a_date_whose_month_may_be_either_number_counts_by_its_clock() {
+    let folder = Folder::new("day-or-month");
+    let text = "Date Time,N\n3/4/2024 11:59:59.750 PM,1500.5\n3/5/2024 12:00:00.000 AM,1501.5\n";
+    let (log, samples, notes) = read(&folder.write("log.csv", text), &OpenOptions::default()).unwrap();
+    let times: Vec<f64> = channel(&log, &samples, "N").into_iter().map(|(time_s, ..)| time_s).collect();
+    assert_eq!(times, [86_399.75, 86_400.0]);
+    let said = "the day and the month of `3/4/2024 11:59:59.750 PM` cannot be distinguished: the time of the day counts\nhint: ";
+    assert!(notes[0].starts_with(said), "{notes:?}");
 }
 
 #[test]

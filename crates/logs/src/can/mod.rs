@@ -1,4 +1,4 @@
-//! CAN logs: frames from candump, ASC, BLF, PCAN and SavvyCAN files, and the signals that a DBC finds in them.
+//! CAN logs: frames from candump, ASC, BLF, PCAN, SavvyCAN and python-can files, and the signals that a DBC finds in them.
 
 mod bits;
 mod blf;
@@ -7,6 +7,7 @@ mod frame;
 mod j1939;
 mod line;
 mod names;
+mod python_can;
 mod savvy;
 mod text;
 mod trc;
@@ -56,6 +57,7 @@ impl CanLog {
             CanKind::Blf => "CAN log (BLF)",
             CanKind::Trc => "CAN log (PCAN trace)",
             CanKind::Savvy => "CAN log (SavvyCAN)",
+            CanKind::PythonCan => "CAN log (python-can)",
         }
     }
 
@@ -73,10 +75,8 @@ impl CanLog {
 
 fn frames(path: &Path, kind: CanKind, input: Box<dyn Read>) -> Result<Box<dyn Frames>, LogError> {
     Ok(match kind {
-        CanKind::Candump | CanKind::Asc | CanKind::Trc | CanKind::Savvy => {
-            Box::new(text::Lines::new(path, kind, input))
-        }
         CanKind::Blf => Box::new(blf::Blf::open(path, input)?),
+        _ => Box::new(text::Lines::new(path, kind, input)),
     })
 }
 

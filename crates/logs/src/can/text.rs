@@ -1,10 +1,12 @@
-//! CAN logs as text: candump and ASC; lines of [PCAN traces](super::trc) and [SavvyCAN](super::savvy) have files of their own.
+//! CAN logs as text: candump and ASC; lines of [PCAN traces](super::trc), [SavvyCAN](super::savvy) and [python-can](super::python_can) have files of their
+//! own.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use super::frame::{Frame, Frames, PAYLOAD};
 use super::line::{Line, classic_length};
+use super::python_can;
 use super::savvy::Savvy;
 use super::trc::Trc;
 use crate::CanKind;
@@ -238,6 +240,7 @@ impl Frames for Lines {
                 CanKind::Asc => self.asc(&text),
                 CanKind::Trc => self.trc.line(&text),
                 CanKind::Savvy => self.savvy.line(&text),
+                CanKind::PythonCan => python_can::line(&text),
                 _ => self.candump(&text),
             };
             // Of a last line without an end digits or bytes may be missing.
