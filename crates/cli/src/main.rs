@@ -32,6 +32,9 @@ fn main() -> ExitCode {
             if arguments.force {
                 commands::replace_any();
             }
+            if let Some(units) = arguments.units {
+                units.hold();
+            }
             if arguments.verbose {
                 output::be_verbose();
             }

@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use indicatif::ProgressDrawTarget;
 use serde::Serialize;
-use trace::{FileUse, ShownPath as _, is_unprintable, printable};
+use trace::{FileUse, ShownPath as _, is_unprintable, printable, shown_units};
 
 use crate::failure::Failure;
 pub(crate) use crate::message::{error, say};
@@ -78,8 +78,16 @@ pub(crate) fn printable_lines(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.split('\n').map(printable).collect::<Vec<_>>().join("\n"))
 }
 
-/// A table on standard output: the first `left` columns to the left, the others to the right.
-pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
+/// A table on standard output: the first `left` columns to the left, the others to the right. A column whose title says a unit is
+/// shown in the one that the user wants.
+pub(crate) fn table(left: usize, mut titles: Vec<String>, mut rows: Vec<Vec<String>>) -> io::Result<()> {
+    shown_units::convert_table(&mut titles, &mut rows);
+    rows.insert(0, titles);
+    list(left, &rows)
+}
+
+/// A table without titles.
+pub(crate) fn list(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
     long_table(left, || rows.iter().cloned())
 }
 
@@ -99,10 +107,12 @@ fn printable_cells(row: Vec<String>) -> Vec<String> {
     row.into_iter().map(|cell| if let Cow::Owned(escaped) = printable(&cell) { escaped } else { cell }).collect()
 }
 
-/// The lines of a table, as [`table`] has them, below its titles. A title that is wider than the cells of its
+/// The lines of a table, as [`table`] has them, with its titles. A title that is wider than the cells of its
 /// column takes several lines.
 pub(crate) fn titled_lines(left: usize, titles: &[String], rows: &[Vec<String>]) -> Vec<String> {
-    let rows: Vec<Vec<String>> = rows.iter().cloned().map(printable_cells).collect();
+    let (mut titles, mut rows) = (titles.to_vec(), rows.to_vec());
+    shown_units::convert_table(&mut titles, &mut rows);
+    let rows: Vec<Vec<String>> = rows.into_iter().map(printable_cells).collect();
     let length = |text: &str| text.chars().count();
     let widest = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| length(cell)).max().unwrap_or(0);
     let word = |title: &str| words(title).map(|word| length(&word)).max().unwrap_or(0);

@@ -72,7 +72,7 @@ fn a_requirement_that_cannot_be_met_exits_with_1_and_names_it() {
         assert!(message.contains(part), "{part}: {message}");
     }
     // The best certified gain is shown beside what it misses.
-    assert!(stdout(&output).contains("offset bound 0.0499 MPa (required 0.0100, not met)"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("offset bound 0.0499 MPa (required 0.0100 MPa, not met)"), "{}", stdout(&output));
 }
 
 #[test]

@@ -52,7 +52,8 @@ fn without_a_shift_the_upshifts_that_hide_their_pressure_are_in_a_table() {
     let table = |more: &[&str]| printed(&wetclutch(&[&["design", &car, "--method", "interval"], more].concat()));
     let text = table(&[]);
     for words in [
-        "certified steady-state bound on the error of the torque of the oncoming clutch, N m",
+        "certified steady-state bound on the error of the torque of the oncoming clutch: of the valve",
+        "torque phase: open loop, N m",
         "observer rigid, method interval, sample time 10 ms",
         "Gains are designed for upshifts with a driving engine.",
         "`design` and `sensitivity` may call different phases hidden",

@@ -45,5 +45,6 @@ mod same_bits;
 mod studies;
 mod support;
 mod tables;
+mod units;
 mod write_map;
 mod wrong_maps;

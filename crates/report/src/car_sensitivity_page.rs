@@ -20,8 +20,8 @@ pub const BOUND_AND_STD_DEV: &str = "`design` and `sensitivity` may call differe
                                        anywhere within their bounds, independent of each other";
 
 /// Titles and rows of the summary: a row for each shift.
-pub fn sensitivity_rows(shifts: &[ShiftSensitivity], car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
-    let titles = vec![
+pub fn sensitivity_rows(shifts: &[ShiftSensitivity], car: &Car) -> (Vec<String>, Vec<Vec<String>>) {
+    let titles = [
         "shift",
         "kind",
         "clutch",
@@ -43,7 +43,7 @@ pub fn sensitivity_rows(shifts: &[ShiftSensitivity], car: &Car) -> (Vec<&'static
         }
         row
     };
-    (titles, shifts.iter().map(row).collect())
+    (titles.map(str::to_owned).to_vec(), shifts.iter().map(row).collect())
 }
 
 /// Shift, kind, clutch and `1/|i_off - i_on|`.

@@ -3,6 +3,7 @@
 //! Series are named in a column at the right, each with a piece of its stroke; phases of the shift are shaded through all
 //! panels and named above the first. Margins and heights follow from the names, so that none is cut.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use kuva::backend::svg::SvgBackend;
@@ -100,7 +101,7 @@ pub struct Span {
 #[derive(Debug, Clone)]
 pub struct Figure {
     /// Quantity and unit of the common axis.
-    pub x_label: &'static str,
+    pub x_label: Cow<'static, str>,
     /// First and last value of the common axis.
     pub x_range: (f64, f64),
     /// Shaded spans.
@@ -136,6 +137,10 @@ impl Figure {
 
     /// The same with clip paths that no other figure of this process has: a part of a page, which numbers them ([`numbered`]).
     pub(crate) fn drawing(&self) -> String {
+        self.in_shown_units().drawn()
+    }
+
+    fn drawn(&self) -> String {
         let panels: Vec<Placed<'_>> = self.panels.iter().map(|panel| self.place(panel)).collect();
         let margins = Margins {
             left: panels.iter().map(Placed::left).fold(0.0, f64::max),
@@ -231,7 +236,7 @@ impl Figure {
         }
         if last {
             let middle = (margins.left + WIDTH - margins.right) / 2.0;
-            scene.add(text(middle, y + TOP + placed.height + 36.0, self.x_label, TEXT, TextAnchor::Middle));
+            scene.add(text(middle, y + TOP + placed.height + 36.0, &self.x_label, TEXT, TextAnchor::Middle));
         }
         let top = y + TOP;
         for (at, entry) in self::placed(placed.legend(top), top, top + placed.height) {
@@ -423,7 +428,7 @@ mod tests {
 
     fn figure(series: Vec<Series>, axis: Axis) -> Figure {
         let panel = Panel { y_label: "pressure (MPa)".into(), height: 150.0, series, bands: Vec::new(), axis };
-        Figure { x_label: "time (s)", x_range: (0.0, 1.0), spans: Vec::new(), panels: vec![panel] }
+        Figure { x_label: "time (s)".into(), x_range: (0.0, 1.0), spans: Vec::new(), panels: vec![panel] }
     }
 
     #[test]

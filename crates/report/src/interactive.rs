@@ -115,7 +115,7 @@ impl Figure {
 
     /// The figure as JSON, as the script of the pages reads it.
     pub(crate) fn json(&self) -> String {
-        serde_json::to_string(&self.data()).unwrap_or_default()
+        serde_json::to_string(&self.in_shown_units().data()).unwrap_or_default()
     }
 
     /// The text of a figure for a page, with its drawing for readers without scripts if that is `drawn`.
@@ -145,7 +145,7 @@ impl Figure {
             to: span.end.min(to),
             colour: span.colour,
         });
-        Data { x: self.x_label, from, to, times: times.encoded(), spans: spans.collect(), panels }
+        Data { x: &self.x_label, from, to, times: times.encoded(), spans: spans.collect(), panels }
     }
 
     fn panel_data<'a>(&self, panel: &'a Panel, times: &mut TimesOfCurves) -> PanelData<'a> {
@@ -275,7 +275,7 @@ mod tests {
             axis: Axis::All,
         };
         let span = Span { label: "torque phase".to_owned(), start: 0.2, end: 9.0, colour: "#fff" };
-        Figure { x_label: "time (s)", x_range: (0.0, 1.0), spans: vec![span], panels: vec![panel] }
+        Figure { x_label: "time (s)".into(), x_range: (0.0, 1.0), spans: vec![span], panels: vec![panel] }
     }
 
     #[test]

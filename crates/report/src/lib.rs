@@ -23,6 +23,7 @@ pub mod reproduction;
 pub mod sensitivity_page;
 pub mod sheet;
 pub mod shift_figure;
+mod shown_figure;
 mod simplified;
 pub mod speeds_page;
 pub mod study_page;

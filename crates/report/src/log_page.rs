@@ -10,6 +10,7 @@ use observer::Health;
 use study::shift_estimates::{EstimatedShift, Ranged, thinned};
 use study::{LogSample, Overview, ShiftEstimate};
 use trace::ShownPath as _;
+use trace::shown_units::convert_table;
 use trace::units::{mpa, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
@@ -138,8 +139,10 @@ pub fn shift_rows(shifts: &[ShiftEstimate], maximum: usize) -> (Vec<String>, Vec
     let is_filled = |(_, cell): &&Column| shifts.iter().any(|shift| !cell(shift).is_empty());
     let columns: Vec<&Column> = COLUMNS.iter().filter(is_filled).collect();
     let row = |shift: &ShiftEstimate| columns.iter().map(|(_, cell)| cell(shift)).collect();
-    let titles = columns.iter().map(|(title, _)| (*title).to_owned()).collect();
-    (titles, shifts.iter().take(maximum).map(row).collect())
+    let mut titles: Vec<String> = columns.iter().map(|(title, _)| (*title).to_owned()).collect();
+    let mut rows: Vec<Vec<String>> = shifts.iter().take(maximum).map(row).collect();
+    convert_table(&mut titles, &mut rows);
+    (titles, rows)
 }
 
 /// A cell of an estimated shift; empty for others.
@@ -206,7 +209,7 @@ fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
         colour: TORQUE_PHASE,
     });
     Figure {
-        x_label: "time (s)",
+        x_label: "time (s)".into(),
         x_range: (first_s, last_s),
         spans: spans.take(MAX_DRAWN).collect(),
         panels: [
@@ -251,7 +254,7 @@ fn shift_figure(shift: &ShiftEstimate, vehicle: &VehicleFile, points: usize) -> 
     panels.extend(motion_panels(samples.0.iter().map(|sample| (sample.time_s, radius_m * sample.speeds_rad_s[2]))));
     let (panels, _) = with_values(panels);
     let [from_s, to_s] = shift.window_s;
-    Figure { x_label: "time (s)", x_range: (from_s, to_s), spans: phases(shift), panels }
+    Figure { x_label: "time (s)".into(), x_range: (from_s, to_s), spans: phases(shift), panels }
 }
 
 fn estimate(points: Points) -> Series {

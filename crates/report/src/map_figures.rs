@@ -35,7 +35,7 @@ fn figure(x_label: &'static str, x_range: (f64, f64), panels: Vec<(&str, Vec<Ser
         bands: Vec::new(),
         axis: Axis::All,
     };
-    Figure { x_label, x_range, spans: Vec::new(), panels: panels.into_iter().map(panel).collect() }
+    Figure { x_label: x_label.into(), x_range, spans: Vec::new(), panels: panels.into_iter().map(panel).collect() }
 }
 
 /// First and last value of the axis of a table.

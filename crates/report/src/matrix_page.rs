@@ -7,6 +7,7 @@ use minijinja::{Value, context};
 use study::gearbox::SquaredErrors;
 use study::gearbox::matrix::{CLASSES, Matrix, MatrixCounts, MatrixRow, NOTHING_N_M, PhaseErrors, Pooled, class};
 use trace::Cell;
+use trace::shown_units::convert_table;
 
 use crate::page::{PageError, origin, render};
 use crate::tables::number;
@@ -64,8 +65,8 @@ pub fn failures(matrix: &Matrix, car: &Car) -> Vec<String> {
 }
 
 /// Title and rows of the table of shifts.
-pub fn shift_rows(matrix: &Matrix, car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
-    let titles = vec![
+pub fn shift_rows(matrix: &Matrix, car: &Car) -> (Vec<String>, Vec<Vec<String>>) {
+    let titles = [
         "shift",
         "kind",
         "1/|i_off - i_on|",
@@ -76,7 +77,7 @@ pub fn shift_rows(matrix: &Matrix, car: &Car) -> (Vec<&'static str>, Vec<Vec<Str
         "other, inertia",
         "other, torque",
         "pressure kPa, inertia",
-        "torque",
+        "pressure kPa, torque",
         "above",
         "outside",
     ];
@@ -98,12 +99,12 @@ pub fn shift_rows(matrix: &Matrix, car: &Car) -> (Vec<&'static str>, Vec<Vec<Str
             row.counts.outside.to_string(),
         ]
     };
-    (titles, matrix.rows.iter().map(row).collect())
+    (titles.map(str::to_owned).to_vec(), matrix.rows.iter().map(row).collect())
 }
 
 /// Title and rows of the table of kinds, by class of `1/|i_off - i_on|`.
-pub fn kind_rows(matrix: &Matrix) -> (Vec<&'static str>, Vec<Vec<String>>) {
-    let titles = vec![
+pub fn kind_rows(matrix: &Matrix) -> (Vec<String>, Vec<Vec<String>>) {
+    let titles = [
         "kind",
         "1/|i_off - i_on|",
         "inertia phase",
@@ -136,7 +137,7 @@ pub fn kind_rows(matrix: &Matrix) -> (Vec<&'static str>, Vec<Vec<String>>) {
             ]);
         }
     }
-    (titles, rows)
+    (titles.map(str::to_owned).to_vec(), rows)
 }
 
 fn class_name(at: usize) -> String {
@@ -193,8 +194,10 @@ pub fn shift_cells<'a>(row: &MatrixRow, car: &'a Car) -> Vec<(String, Cell<'a>)>
 /// None in a released program; the tests render the template.
 pub fn matrix_page(matrix: &Matrix, car: &CarFile, seed: u64) -> Result<String, PageError> {
     let all = Pooled::of(&matrix.rows, |_| true).counts;
-    let (kind_titles, kinds) = kind_rows(matrix);
-    let (titles, rows) = shift_rows(matrix, car);
+    let (mut kind_titles, mut kinds) = kind_rows(matrix);
+    let (mut titles, mut rows) = shift_rows(matrix, car);
+    convert_table(&mut kind_titles, &mut kinds);
+    convert_table(&mut titles, &mut rows);
     render(
         "matrix.html",
         context! {

@@ -2,6 +2,7 @@
 
 use config::Source;
 use minijinja::{Value, context};
+use trace::shown_units::convert_table;
 
 use crate::figure::Figure;
 use crate::page::{PageError, inline, origin, render};
@@ -88,7 +89,11 @@ impl Part {
         match &self.content {
             Content::Figure(figure) => context! { heading, caption, figure => figure.html() },
             Content::Drawing(svg, words) => context! { heading, caption, drawing => inline(svg), words },
-            Content::Table(titles, rows) => context! { heading, caption, titles, rows },
+            Content::Table(titles, rows) => {
+                let (mut titles, mut rows) = (titles.clone(), rows.clone());
+                convert_table(&mut titles, &mut rows);
+                context! { heading, caption, titles, rows }
+            }
             Content::Intervals(rows) => {
                 context! { heading, caption, intervals => rows.iter().map(Interval::view).collect::<Vec<_>>() }
             }
@@ -133,7 +138,7 @@ mod tests {
     fn every_part_is_in_the_page_and_names_are_text() {
         let series = Series { label: "a".to_owned(), stroke: Stroke::SIGNAL, points: vec![(0.0, 1.0), (1.0, 2.0)] };
         let figure = Figure {
-            x_label: "settling time (s)",
+            x_label: "settling time (s)".into(),
             x_range: (0.0, 1.0),
             spans: Vec::new(),
             panels: vec![panel("bound (MPa)", 90.0, vec![series])],

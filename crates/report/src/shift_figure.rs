@@ -62,7 +62,7 @@ pub fn drive_figure(comparison: &Comparison) -> Figure {
     let unnamed = |span: Span| Span { label: String::new(), ..span };
     let vehicle = |name, unit: fn(f64) -> f64| vec![t.signal("vehicle", Stroke::SIGNAL, name, unit)];
     Figure {
-        x_label: "time (s)",
+        x_label: "time (s)".into(),
         x_range: (0.0, end),
         spans: t.spans().into_iter().map(unnamed).collect(),
         panels: vec![
@@ -92,7 +92,7 @@ impl<'a> Curves<'a> {
 
     /// Panels around the shift, its phases shaded.
     fn around_shift(&self, panels: Vec<Panel>) -> Figure {
-        Figure { x_label: "time (s)", x_range: self.shown_s(), spans: self.spans(), panels }
+        Figure { x_label: "time (s)".into(), x_range: self.shown_s(), spans: self.spans(), panels }
     }
 
     /// The shift and some time around it, s; the whole drive if there was none.

@@ -10,6 +10,8 @@ use fit::{Series as Readings, Verdict};
 use logs::Shift;
 use minijinja::{Value, context};
 use trace::ShownPath as _;
+use trace::quantity;
+use trace::shown_units::convert_table;
 use trace::units::{km_h, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
@@ -135,8 +137,9 @@ impl SpeedsPage<'_> {
                     [fit.knots.first(), fit.knots.iter().rev().nth(1)].map(|k| k.map_or(0.0, |k| k.speed_ratio));
                 said.push(format!(
                     "Converter: capacity from {:.1} s with slip, speed ratio {low:.2} to {high:.2}. The engine torque signal agrees with it to \
-                     {:.1} N m (1.48 times the median error).",
-                    fit.fitted_s, fit.scale_n_m
+                     {} (1.48 times the median error).",
+                    fit.fitted_s,
+                    quantity(fit.scale_n_m, "N m", 1)
                 ));
                 let capacities = fit.knots.iter().filter(|knot| knot.speed_ratio < 1.0);
                 let capacities = capacities.map(|knot| {
@@ -155,8 +158,11 @@ impl SpeedsPage<'_> {
             let torque = torque.as_ref()?;
             let ([minimum, length_s], error) = (torque.reduction?, torque.reduction_error_n_m?);
             Some(format!(
-                "{}-{} (to {minimum:.0} N m for {length_s:.2} s; the engine's torque was {error:.0} N m from it on average)",
-                shift.from, shift.to
+                "{}-{} (to {} for {length_s:.2} s; the engine's torque was {} from it on average)",
+                shift.from,
+                shift.to,
+                quantity(minimum, "N m", 0),
+                quantity(error, "N m", 0)
             ))
         });
         let asked: Vec<String> = asked.collect();
@@ -210,7 +216,7 @@ impl SpeedsPage<'_> {
         let span = format!("{from_s:.1} to {to_s:.1} s");
         match sum / count {
             mean if mean.abs() > NOTHING_N_M => {
-                format!("{span}: lock-up clutch closed, at {mean:.0} N m of the engine")
+                format!("{span}: lock-up clutch closed, at {} of the engine", quantity(mean, "N m", 0))
             }
             mean if mean.is_nan() => span,
             _ => format!("{span}: with nearly no torque, so the lock-up clutch may be open"),
@@ -218,7 +224,7 @@ impl SpeedsPage<'_> {
     }
 
     /// Titles and rows of the table of shifts. Columns that no shift fills are left out.
-    fn table(&self, torques: &[Option<ShiftTorque>]) -> (Vec<&'static str>, Vec<Vec<String>>) {
+    fn table(&self, torques: &[Option<ShiftTorque>]) -> (Vec<String>, Vec<Vec<String>>) {
         let ranged = |value: [f64; 3], unit: f64, decimals: usize| {
             let [low, middle, high] = value.map(|value| number(unit * value, decimals));
             format!("{middle} ({low} to {high})")
@@ -247,9 +253,11 @@ impl SpeedsPage<'_> {
         let rows: Vec<Vec<(&str, String)>> = self.shifts.iter().zip(torques).enumerate().map(row).collect();
         let width = rows.first().map_or(0, Vec::len);
         let filled: Vec<usize> = (0..width).filter(|j| rows.iter().any(|row| !row[*j].1.is_empty())).collect();
-        let titles = filled.iter().map(|j| rows[0][*j].0).collect();
+        let mut titles: Vec<String> = filled.iter().map(|j| rows[0][*j].0.to_owned()).collect();
         let cells = |row: &Vec<(&str, String)>| filled.iter().map(|j| row[*j].1.clone()).collect();
-        (titles, rows.iter().map(cells).collect())
+        let mut rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
+        convert_table(&mut titles, &mut rows);
+        (titles, rows)
     }
 
     fn remark(&self, torque: Option<&ShiftTorque>) -> &'static str {
@@ -295,7 +303,7 @@ impl SpeedsPage<'_> {
             },
             self.engine_torques([x_range.0, x_range.1], POINTS, 110.0),
         ];
-        Figure { x_label: "time (s)", x_range, spans: spans.collect(), panels: with_values(panels).0 }
+        Figure { x_label: "time (s)".into(), x_range, spans: spans.collect(), panels: with_values(panels).0 }
     }
 
     fn gears(&self, span_s: [f64; 2], maximum: usize) -> Panel {
@@ -379,7 +387,7 @@ impl SpeedsPage<'_> {
         curves.push(series("fitted", FITTED, line(0.0)));
         let band = Band { label: "95 %".to_owned(), colour: RANGE, lower: line(-2.0), upper: line(2.0) };
         Figure {
-            x_label: "turbine speed over engine speed",
+            x_label: "turbine speed over engine speed".into(),
             x_range: (0.0, 1.0),
             spans: Vec::new(),
             panels: vec![Panel { bands: vec![band], ..panel("capacity (10⁻³ N\u{a0}m\u{a0}s²)", 210.0, curves) }],
@@ -408,7 +416,7 @@ impl SpeedsPage<'_> {
             series("by the converter's capacity", FITTED, converter(0.0)),
         ];
         Figure {
-            x_label: "time (s)",
+            x_label: "time (s)".into(),
             x_range,
             spans: spans.collect(),
             panels: vec![Panel { bands: vec![band], ..panel("torque into the converter (N\u{a0}m)", 160.0, curves) }],
@@ -451,7 +459,7 @@ impl SpeedsPage<'_> {
             colour: INERTIA_PHASE,
         });
         Figure {
-            x_label: "time (s)",
+            x_label: "time (s)".into(),
             x_range: (window_s[0], window_s[1]),
             spans: inertia.into_iter().collect(),
             panels: with_values(panels).0,

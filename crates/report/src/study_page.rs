@@ -196,7 +196,7 @@ fn distributions(summary: &Summary, study: &Study) -> Figure {
         panel(&format!("{}: runs (%)", phase_name(phase)), 170.0, Axis::Fixed(0.0, 100.0), series.collect())
     });
     Figure {
-        x_label: "RMS error of the pressure (MPa)",
+        x_label: "RMS error of the pressure (MPa)".into(),
         x_range: (0.0, mpa(reach)),
         spans: Vec::new(),
         panels: panels.collect(),
@@ -243,7 +243,7 @@ fn effects_figure(summary: &Summary, phase: usize) -> Figure {
     });
     let panels: Vec<Panel> = panels.collect();
     Figure {
-        x_label: "factor, from its smallest (0 %) to its largest value (100 %)",
+        x_label: "factor, from its smallest (0 %) to its largest value (100 %)".into(),
         x_range: (0.0, 100.0),
         spans: Vec::new(),
         panels,

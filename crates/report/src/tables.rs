@@ -5,6 +5,7 @@ use minijinja::{Value, context};
 use observer::{Health, Phase};
 use study::campaign::COMPARED;
 use study::{Comparison, PhaseScore, ShiftQuality};
+use trace::quantity;
 use trace::units::mpa;
 
 /// A number with these decimals; with an exponent where it is that of a diverged observer, a dash where there is none.
@@ -176,8 +177,8 @@ pub fn quality_rows(q: &ShiftQuality) -> Vec<(&'static str, String)> {
     vec![
         ("torque phase", format!("{:.3} s", q.inertia_phase_start_s - q.torque_phase_start_s)),
         ("inertia phase", format!("{:.3} s", q.lock_up_s - q.inertia_phase_start_s)),
-        ("turbine speed flare", format!("{:.2} rad/s", q.flare_rad_s)),
-        ("lowest drive-shaft torque", format!("{:.0} N m", q.least_shaft_torque_n_m)),
+        ("turbine speed flare", quantity(q.flare_rad_s, "rad/s", 2)),
+        ("lowest drive-shaft torque", quantity(q.least_shaft_torque_n_m, "N m", 0)),
         ("jerk over 0.3 s", format!("{:.1} m/s³", q.jerk_peak_m_s3)),
         ("vibration dose value above 0.4 Hz", format!("{:.2} m/s^1.75", q.vibration_dose_m_s175)),
         ("friction work of the oncoming clutch", format!("{:.1} kJ", 1e-3 * q.friction_work_j)),

@@ -21,6 +21,7 @@ pub mod rows;
 #[cfg(test)]
 mod scratch;
 pub mod shown;
+pub mod shown_units;
 pub mod signal;
 #[cfg(test)]
 mod slow;
@@ -46,6 +47,7 @@ pub use not_in_browser::{MdfWriter, ParquetWriter};
 pub use parquet_file::{ParquetWriter, write_parquet};
 pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
 pub use shown::{ShownPath, is_unprintable, printable, toml_number, toml_string};
+pub use shown_units::{ShownUnits, quantity};
 pub use table::{ColumnKind, TableFormat, TableWriter};
 pub use table_rows::TableRows;
 pub use text_file::{read_small, read_text};

@@ -90,6 +90,12 @@ impl Unit {
         UNITS.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ")
     }
 
+    /// All units of a quantity.
+    pub fn of_quantity(quantity: Quantity) -> impl Iterator<Item = Self> {
+        let of = UNITS.iter().filter(move |(_, _, other, ..)| *other == quantity);
+        of.map(|&(name, _, quantity, size, zero)| Self { name, quantity, size, zero })
+    }
+
     /// The unit that the ending of a name says, such as `_rpm`.
     pub fn of_name(name: &str) -> Option<Self> {
         const SI: &[(&str, &str)] = &[

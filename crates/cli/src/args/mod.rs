@@ -8,6 +8,7 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use trace::ShownUnits;
 
 use crate::message::Colors;
 
@@ -59,6 +60,9 @@ pub(crate) struct Arguments {
     /// When messages have colours; results have none
     #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t)]
     pub(crate) color: Colors,
+    /// Units of tables, messages and pages, such as rpm,bar,degC: one for each quantity; files and JSON keep SI units
+    #[arg(long, global = true, value_name = "UNIT,...", env = "WETCLUTCH_UNITS", hide_env_values = true)]
+    pub(crate) units: Option<ShownUnits>,
     #[command(subcommand)]
     pub(crate) command: Command,
 }
@@ -128,7 +132,7 @@ pub(crate) enum Command {
     /// List what is in a log, suggest a channel map, find the shifts
     ///
     /// Reads a log of any format: CSV (any delimiter, decimal comma, units in names or in a row), Parquet, ASAM MDF 4,
-    /// CAN logs (candump, ASC, BLF, PCAN, SavvyCAN) with a DBC, also of J1939. `-` is standard input. Lists channels, units, groups,
+    /// CAN logs (candump, ASC, BLF, PCAN, SavvyCAN, python-can) with a DBC, also of J1939. `-` is standard input. Lists channels, units, groups,
     /// samples, rates, spans, values, gaps, and samples that cannot be used.
     ///
     ///   wetclutch inspect drive.mf4

@@ -5,6 +5,7 @@ use report::bench_page;
 use report::tables::{coverage, number};
 use study::Bench;
 use study::bench::{BenchConsistency, BenchRow, open_loop};
+use trace::quantity;
 use trace::{ShownPath as _, units};
 
 use crate::args;
@@ -59,11 +60,11 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
 }
 
 fn errors(result: &Bench) -> Result<(), Failure> {
-    output::line("RMS error of the pressure in the torque phase / in the inertia phase, MPa\n")?;
-    let names = result.rows.iter().take(1).flat_map(|row| row.cells.iter().map(|cell| cell.observer.clone()));
-    let mut rows = vec![std::iter::once("scenario".to_owned()).chain(names).collect()];
-    rows.extend(result.rows.iter().map(cells));
-    output::table(1, &rows)?;
+    output::line("RMS error of the pressure in the torque phase / in the inertia phase\n")?;
+    let names =
+        result.rows.iter().take(1).flat_map(|row| row.cells.iter().map(|cell| format!("{} MPa", cell.observer)));
+    let titles = std::iter::once("scenario".to_owned()).chain(names).collect();
+    output::table(1, titles, result.rows.iter().map(cells).collect())?;
     Ok(())
 }
 
@@ -80,11 +81,10 @@ fn ranking(result: &Bench) -> Result<(), Failure> {
         "worst",
         "chatter MPa",
         "shaft torque N m",
-        "worst",
+        "worst N m",
         "step ns",
     ];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
-    rows.extend(result.ranking.iter().map(|s| {
+    let rows = result.ranking.iter().map(|s| {
         let ratio = |value: f64| number(value, 2);
         let torque = |value: Option<f64>| value.map_or_else(String::new, |n_m| number(n_m, 0));
         vec![
@@ -99,24 +99,24 @@ fn ranking(result: &Bench) -> Result<(), Failure> {
             torque(s.shaft_worst_rms_n_m),
             format!("{:.0}", s.step_ns),
         ]
-    }));
-    output::table(1, &rows)?;
+    });
+    output::table(1, head.map(str::to_owned).to_vec(), rows.collect())?;
     Ok(())
 }
 
 /// Coverage, width and cost of the guaranteed range.
 fn ranges(result: &Bench) -> Result<(), Failure> {
     if let Some(first) = result.ranking.first().filter(|s| s.range_least_coverage.is_some()) {
-        let width = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |n_m| format!("{n_m:.0} N m"));
+        let width = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |n_m| quantity(n_m, "N m", 0));
         output::line(&format!(
             "\nguaranteed range of pressure and clutch torque, the same for every observer: contains the truth at {} of\n\
              the samples, in the worst scenario; expected range of the shaft torque: at {}\n\
-             median width: pressure {:.3} MPa, clutch torque {}, shaft torque {}\n\
+             median width: pressure {}, clutch torque {}, shaft torque {}\n\
              mean width, relative to the width that contains 95 % of the errors of {}: {:.1}\n\
              time that the range adds to a step: {:.0} ns",
             coverage(first.range_least_coverage.unwrap_or(f64::NAN)),
             coverage(first.shaft_range_least_coverage.unwrap_or(f64::NAN)),
-            units::mpa(first.range_median_width_pa.unwrap_or(f64::NAN)),
+            quantity(units::mpa(first.range_median_width_pa.unwrap_or(f64::NAN)), "MPa", 3),
             width(first.torque_range_median_width_n_m),
             width(first.shaft_range_median_width_n_m),
             first.observer,
@@ -153,14 +153,15 @@ fn consistent(filter: &BenchConsistency) -> String {
         "\n{}: the true pressure is in its own 95 % band at {} of the samples of the shifts, least in `{scenario}` with {}\n\
          mean square over variance: error of the pressure {:.2}; innovations of turbine {turbine:.2}, output {output:.2}, \
          wheel {wheel:.2}\n\
-         in single precision: within 1 kPa of double precision at {} of the samples, at most {:.2} kPa; RMS error {:+.2} %; \
+         in single precision: within {} of double precision at {} of the samples, at most {}; RMS error {:+.2} %; \
          {} restarts",
         filter.observer,
         coverage(all.inside_fraction()),
         coverage(*minimum),
         all.nees(),
+        quantity(1.0, "kPa", 0),
         coverage(all.same_fraction()),
-        1e-3 * all.largest_pa,
+        quantity(1e-3 * all.largest_pa, "kPa", 2),
         100.0 * all.excess_in_single(),
         all.restarts,
     )

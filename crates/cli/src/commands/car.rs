@@ -5,6 +5,7 @@ use std::path::Path;
 use car::{Car, TURBINE_SIDE_INERTIA_KG_M2};
 use config::{CarFile, Kind, Source};
 use trace::ShownPath as _;
+use trace::quantity;
 
 use super::gearbox;
 use crate::failure::Failure;
@@ -58,10 +59,10 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
     for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
         if let Some(clutch) = clutch {
             output::line(&format!(
-                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure{}{}",
+                "  {:4} kiss point {}, holds {} at line pressure{}{}",
                 element.name,
-                trace::units::mpa(clutch.clutch.kiss_pressure()),
-                clutch.clutch.static_capacity(car.line_pressure_pa),
+                quantity(trace::units::mpa(clutch.clutch.kiss_pressure()), "MPa", 3),
+                quantity(clutch.clutch.static_capacity(car.line_pressure_pa), "N m", 0),
                 if clutch.valve.falls() { ", valve normally high" } else { "" },
                 if clutch.has_stroke { ", with stroke" } else { "" },
             ))?;
@@ -80,8 +81,9 @@ pub(super) fn describe_gearbox(car: &Car) -> Result<(), Failure> {
         let [minimum, maximum] = TURBINE_SIDE_INERTIA_KG_M2;
         output::line(&format!(
             "ratios alone: `wetclutch estimate` gives the torque of all clutches together, as the turbine feels it, with its standard deviation.\n\
-             Without `shift_mass` in the gearbox file, M11 is assumed, somewhere from {minimum} to {maximum} kg m2 for an engine of 190 N m, and makes most of that\n\
-             deviation in a shift. The torque of a clutch needs the holding torques (level = \"shares\"), its pressure plates and piston besides (`pack`)"
+             Without `shift_mass` in the gearbox file, M11 is assumed, somewhere from {minimum} to {maximum} kg m2 for an engine of {}, and makes most of that\n\
+             deviation in a shift. The torque of a clutch needs the holding torques (level = \"shares\"), its pressure plates and piston besides (`pack`)",
+            quantity(190.0, "N m", 0)
         ))?;
     }
     Ok(())
@@ -91,7 +93,7 @@ pub(super) fn describe_gearbox(car: &Car) -> Result<(), Failure> {
 fn torques_asked(car: &Car) -> String {
     let mut asked: Vec<(String, Vec<&str>)> = Vec::new();
     for (at, gear) in car.gearbox.gears.iter().enumerate() {
-        let torque = format!("{:.0} N m", car.max_turbine_torque(at));
+        let torque = quantity(car.max_turbine_torque(at), "N m", 0);
         match asked.iter_mut().find(|(of, _)| *of == torque) {
             Some((_, gears)) => gears.push(&gear.name),
             None => asked.push((torque, vec![&gear.name])),

@@ -7,6 +7,7 @@ use config::{CarFile, DriveFile, ExperimentFile, GearboxFile, Kind, Source, Stud
 use design::{longest_step_of, unstable_corners};
 use report::tables::phase_name;
 use trace::ShownPath as _;
+use trace::quantity;
 use wetclutch::checks::errors_of;
 
 use super::car::{describe_car, describe_gearbox};
@@ -243,12 +244,12 @@ fn warn_of_steps(experiment: &Experiment, vehicle: &Vehicle) {
 
 fn describe(vehicle: &Vehicle) -> Result<(), Failure> {
     output::line(&format!(
-        "vehicle \"{}\": ratio {:.3} to {:.3}, {} kg, kiss point of the oncoming clutch {:.3} MPa",
+        "vehicle \"{}\": ratio {:.3} to {:.3}, {} kg, kiss point of the oncoming clutch {}",
         vehicle.name,
         vehicle.shift.ratio_offgoing(),
         vehicle.shift.ratio_oncoming(),
         vehicle.road.mass_kg,
-        trace::units::mpa(vehicle.oncoming.clutch.kiss_pressure()),
+        quantity(trace::units::mpa(vehicle.oncoming.clutch.kiss_pressure()), "MPa", 3),
     ))?;
     Ok(())
 }

@@ -28,13 +28,13 @@ pub(super) fn describe_defaults(vehicle: &VehicleFile, all: bool) -> Result<(), 
         return all_names(&vehicle.defaults_taken, &[], true);
     };
     output::line(
-        "which matter most: RMS change of pressure (kPa) and torque (N m) of the oncoming clutch, in the torque and inertia phase of a\n\
+        "which matter most: RMS change of pressure and torque of the oncoming clutch, in the torque and inertia phase of a\n\
          simulated upshift, where one default is off, for the open loop and for the default observer (kalman)\n",
     )?;
     let shown = if all { influences.len() } else { SHOWN.min(influences.len()) };
     let titles = ["default", "value", "off by", "open kPa", "open N m", "kalman kPa", "kalman N m"];
     let rows = influences[..shown].iter().map(row);
-    output::table(3, &std::iter::once(titles.map(str::to_owned).to_vec()).chain(rows).collect::<Vec<_>>())?;
+    output::table(3, titles.map(str::to_owned).to_vec(), rows.collect())?;
     output::line("")?;
     let shown: Vec<&str> = influences[..shown].iter().map(|influence| influence.taken.key.as_str()).collect();
     all_names(taken, &shown, all)
@@ -85,7 +85,7 @@ pub(super) fn describe_car_values(car: &CarFile, sensors: &Sensors, all: bool) -
         }
     };
     output::line(&format!(
-        "which values matter most: RMS error of torque (N m) and pressure (kPa) of the clutch that drives the inertia phase, while it\n\
+        "which values matter most: RMS error of torque and pressure of the clutch that drives the inertia phase, while it\n\
          slips, over {} simulated shifts between neighbouring gears, where one value of all elements is off, by the default filter and\n\
          by the open loop\n",
         influences.shifts
@@ -95,7 +95,7 @@ pub(super) fn describe_car_values(car: &CarFile, sensors: &Sensors, all: bool) -
         .to_vec();
     let as_it_is = car_row(["as it is".to_owned(), String::new(), String::new()], &influences.as_it_is);
     let rows = influences.values.iter().map(value_row);
-    output::table(3, &[titles, as_it_is].into_iter().chain(rows).collect::<Vec<_>>())?;
+    output::table(3, titles, std::iter::once(as_it_is).chain(rows).collect())?;
     output::line("")?;
     let shown: Vec<&str> = influences.values.iter().map(|value| value.key).collect();
     all_names(taken, &shown, all)

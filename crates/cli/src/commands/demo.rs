@@ -9,6 +9,7 @@ use report::page::findings;
 use report::tables::phase_name;
 use serde_json::{Value, json};
 use study::{AnyObserver, Comparison, ObserverRun, PhaseScore, RunColumns, compare, estimates_trace};
+use trace::quantity;
 use trace::{ShownPath as _, Trace, signal, units};
 use wetclutch::estimate::one_shift::observer::best;
 
@@ -120,9 +121,9 @@ fn errors(comparison: &Comparison) -> Vec<Value> {
 fn print(comparison: &Comparison, report: &Path) -> Result<(), Failure> {
     let range_pa = comparison.experiment.shift.line_pressure_pa;
     let title = &comparison.experiment.title;
-    output::line(&format!("{title} (error of the pressure; range {} MPa)\n", units::mpa(range_pa)))?;
+    output::line(&format!("{title} (error of the pressure; range {})\n", quantity(units::mpa(range_pa), "MPa", 2)))?;
     let head = ["phase", "observer", "peak MPa", "RMS MPa", "mean MPa", "RMS % of range"];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let mut rows = Vec::new();
     for i in 0..comparison.runs[0].pressure.len() {
         for run in &comparison.runs {
             let score = &run.pressure[i];
@@ -136,7 +137,7 @@ fn print(comparison: &Comparison, report: &Path) -> Result<(), Failure> {
             ]);
         }
     }
-    output::table(2, &rows)?;
+    output::table(2, head.map(str::to_owned).to_vec(), rows)?;
     output::line("")?;
     for sentence in findings(comparison) {
         output::line(&sentence.replace('’', "'"))?;

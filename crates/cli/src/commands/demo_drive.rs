@@ -15,6 +15,7 @@ use study::gearbox::measured::MeasuredRow;
 use study::gearbox::recording::Recording;
 use study::gearbox::tour::{self, LeftOut, drive_tour};
 use study::gearbox::{RECORD_S, ShiftDraw};
+use trace::quantity;
 use trace::{Cell, ShownPath as _};
 use wetclutch::studies::bench_sensors;
 
@@ -127,13 +128,13 @@ fn write_signals(folder: &Path, car: &Car, recording: &Recording) -> Result<[Pat
 }
 
 fn print(drive: &ScoredDrive, car: &Car, page: &Path) -> Result<(), Failure> {
-    output::line(
-        "RMS error of the clutch torque, relative to the open loop, and both errors in N m: filter / open loop. Of the clutch that\n\
-         controls the inertia phase; in brackets where the open loop errs by less than 2 N m\n",
-    )?;
+    output::line(&format!(
+        "RMS error of the clutch torque, relative to the open loop, and both errors: filter / open loop. Of the clutch that\n\
+         controls the inertia phase; in brackets where the open loop errs by less than {}\n",
+        quantity(2.0, "N m", 0)
+    ))?;
     for (left, (titles, rows)) in [(3, shift_rows(drive, car)), (2, kind_rows(&Matrix::of_drive(drive, car)))] {
-        let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
-        output::titled_lines(left, &head, &rows).iter().try_for_each(|line| output::line(line))?;
+        output::titled_lines(left, &titles, &rows).iter().try_for_each(|line| output::line(line))?;
         output::line("")?;
     }
     for (word, meaning) in shift_words(drive, car) {

@@ -5,6 +5,7 @@ use config::{Kind, Source, VehicleFile};
 use design::{Certificate, CompliantCertificate, DiscreteCertificate, Model, OffsetMissed, Quantity, SolverRecord};
 use observer::Phase;
 use report::tables::phase_name;
+use trace::quantity;
 use trace::{ShownPath as _, units};
 use wetclutch::gains::{GainUse, PhaseDesign, design_shift};
 
@@ -104,9 +105,9 @@ pub(super) fn options_apply(options: &Design) -> Result<(), Failure> {
 fn offset_line(use_of: &GainUse, offset: String) -> String {
     if use_of.is_open_loop {
         return format!(
-            "  the gain is the open loop: the valve alone has the required decay; steady-state bound {:.4} MPa, by the \
+            "  the gain is the open loop: the valve alone has the required decay; steady-state bound {}, by the \
              valve errors of the budget",
-            units::mpa(use_of.open_loop_bound_pa)
+            mpa(use_of.open_loop_bound_pa)
         );
     }
     offset
@@ -117,8 +118,8 @@ fn use_lines(use_of: &GainUse, offset_pa: f64) -> Vec<String> {
     let mut lines = vec![step_line(use_of.longest_step_s)];
     if !use_of.is_open_loop && offset_pa > use_of.open_loop_bound_pa {
         lines.push(format!(
-            "  open loop serves: its steady-state bound, with every error of the budget, is {:.4} MPa, less than the offset bound of this gain",
-            units::mpa(use_of.open_loop_bound_pa)
+            "  open loop serves: its steady-state bound, with every error of the budget, is {}, less than the offset bound of this gain",
+            mpa(use_of.open_loop_bound_pa)
         ));
     }
     lines
@@ -134,8 +135,8 @@ fn step_line(longest_step_s: f64) -> String {
 fn rigid_lines(phase: Phase, certificate: &Certificate, use_of: &GainUse) -> Vec<String> {
     let vertices = certificate.vertices.iter().map(|v| (v.vertex.label.as_str(), v.decay_per_s, v.margin_per_s));
     let offset = format!(
-        "  offset bound {:.4} MPa ({}) for model errors up to {:.1} rad/s^2 and an exact valve model",
-        units::mpa(certificate.offset_pa),
+        "  offset bound {} ({}) for model errors up to {:.1} rad/s^2 and an exact valve model",
+        mpa(certificate.offset_pa),
         required_words(certificate.offset_pa, certificate.offset_max_pa),
         certificate.model_error_max_rad_s2,
     );
@@ -165,10 +166,10 @@ fn compliant_lines(phase: Phase, certificate: &CompliantCertificate, use_of: &Ga
         offset_line(
             use_of,
             format!(
-                "  offset bound {:.4} MPa ({}), {:.0} N m, for |w| up to {:.2} and an exact valve model",
-                units::mpa(certificate.offset_pa),
+                "  offset bound {} ({}), {}, for |w| up to {:.2} and an exact valve model",
+                mpa(certificate.offset_pa),
                 required_words(certificate.offset_pa, certificate.offset_max_pa),
-                certificate.offset_n_m,
+                quantity(certificate.offset_n_m, "N m", 0),
                 certificate.w_max,
             ),
         ),
@@ -178,9 +179,14 @@ fn compliant_lines(phase: Phase, certificate: &CompliantCertificate, use_of: &Ga
     lines
 }
 
+/// A pressure in the unit that is wanted.
+fn mpa(pascal: f64) -> String {
+    quantity(units::mpa(pascal), "MPa", 4)
+}
+
 fn required_words(offset_pa: f64, required_pa: f64) -> String {
     let missed = if offset_pa > required_pa { ", not met" } else { "" };
-    format!("required {:.4}{missed}", units::mpa(required_pa))
+    format!("required {}{missed}", mpa(required_pa))
 }
 
 fn kappas(kappa1: f64, kappa2: f64) -> String {
@@ -216,9 +222,10 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
     };
     let size = |pascal: f64| match certificate.quantity {
         Quantity::ClutchTorque => {
-            format!("{:.1} N m ({:.4} MPa)", units::mpa(pascal) * certificate.torque_n_m_mpa, units::mpa(pascal))
+            let torque_n_m = units::mpa(pascal) * certificate.torque_n_m_mpa;
+            format!("{} ({})", quantity(torque_n_m, "N m", 1), mpa(pascal))
         }
-        Quantity::Pressure => format!("{:.4} MPa", units::mpa(pascal)),
+        Quantity::Pressure => mpa(pascal),
     };
     let name = phase_name(phase);
     let mut lines = Vec::new();
@@ -250,7 +257,7 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
         1e3 * certificate.sample_time_s
     ));
     let parts = certificate.contributions.iter().filter(|part| part.bound_pa > 0.0);
-    lines.extend(parts.map(|part| format!("    {:<24} {:.5} MPa", part.cause, units::mpa(part.bound_pa))));
+    lines.extend(parts.map(|part| format!("    {:<24} {}", part.cause, quantity(units::mpa(part.bound_pa), "MPa", 5))));
     let (what, of) = match certificate.method {
         GainMethod::Interval => ("entries", "smallest entry"),
         _ => ("eigenvalues", "smallest eigenvalue"),

@@ -219,7 +219,7 @@ fn print(
     let method = clap::ValueEnum::to_possible_value(&method).map_or(String::new(), |value| value.get_name().to_owned());
     output::line(&format!(
         "{} ({})\n\n\
-         certified steady-state bound on the error of the {what} of the oncoming clutch, {unit}: of the valve model alone (open loop) and with the best gain\n\
+         certified steady-state bound on the error of the {what} of the oncoming clutch: of the valve model alone (open loop) and with the best gain\n\
          (observer {of_model}, method {method}, sample time {} ms), with all errors of the car at their bounds at the same time.\n\
          {OPEN_LOOP}: no gain reduces the bound; in this phase the shift hides its pressure.\n",
         car.name,
@@ -228,11 +228,11 @@ fn print(
     ))?;
     let mut titles = ["upshift", "oncoming", "alpha", "1/|i_off - i_on|"].map(str::to_owned).to_vec();
     for &phase in options.phases() {
-        titles.push(format!("{}: open loop", phase_name(phase)));
-        titles.push("best gain".to_owned());
+        titles.push(format!("{}: open loop, {unit}", phase_name(phase)));
+        titles.push(format!("best gain, {unit}"));
     }
     let cells = rows.iter().map(|row| row.cells(car, quantity));
-    output::table(2, &std::iter::once(titles).chain(cells).collect::<Vec<_>>())?;
+    output::table(2, titles, cells.collect())?;
     for reason in without {
         output::line(&format!("no design: {reason}"))?;
     }

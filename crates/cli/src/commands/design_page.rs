@@ -84,7 +84,7 @@ fn phase_part(vehicle: &Vehicle, phase: Phase, options: &Design) -> Option<Part>
     };
     let unit = if model == Model::Rigid { "gain (Pa s/rad)" } else { "gain, normalised" };
     let figure = Figure {
-        x_label: "settling time (s)",
+        x_label: "settling time (s)".into(),
         x_range: (first.settling_s, points.last()?.settling_s),
         spans: Vec::new(),
         panels: vec![

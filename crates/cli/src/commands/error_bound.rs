@@ -56,7 +56,7 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     }
     output::line(&format!("{} runs, {} without a complete shift\n", found.runs, found.unfinished))?;
     let head = ["phase", "model error, rad/s^2", "largest", "50 % of runs below", "95 %", "99 %", "settled after run"];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let mut rows = Vec::new();
     for (phase, found) in PHASES.into_iter().zip(&found.phases) {
         for (name, size) in named(found) {
             let [half, maximum, nearly_all] = size.quantiles;
@@ -67,7 +67,7 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
             rows.push(cells);
         }
     }
-    output::table(2, &rows)?;
+    output::table(2, head.map(str::to_owned).to_vec(), rows)?;
     match &options.output {
         Some(path) => {
             output::line(&format!("\nbounds: {}", path.shown()))?;

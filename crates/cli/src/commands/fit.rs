@@ -6,6 +6,7 @@ use config::{Kind, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use trace::ShownPath as _;
+use trace::shown_units::with_unit;
 use wetclutch::fitted::{MapChange, ReportRow};
 use wetclutch::{FitOptions, FitProgress, Fitted, LogInput, VehicleFile, fit as fitted, read_sensors};
 
@@ -172,9 +173,10 @@ fn table(rows: &[ReportRow]) -> Result<(), Failure> {
     let titles = ["", "value", "95 %", "after / before", ""].map(str::to_owned).to_vec();
     let cells = rows.iter().map(|row| {
         let verdict = format!(" {}", row.verdict.name());
-        vec![row.name.clone(), row.value_text(), row.interval_text(), format!("{:.2}", row.fraction), verdict]
+        let [value, interval] = [row.value_text(), row.interval_text()].map(with_unit);
+        vec![row.name.clone(), value, interval, format!("{:.2}", row.fraction), verdict]
     });
-    Ok(output::table(1, &[titles].into_iter().chain(cells).collect::<Vec<_>>())?)
+    Ok(output::table(1, titles, cells.collect())?)
 }
 
 /// A line on standard error that says what is being done; nothing if standard error is not a terminal.

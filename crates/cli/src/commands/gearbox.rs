@@ -84,7 +84,7 @@ pub(super) fn gears(gearbox: &Gearbox) -> Result<(), Failure> {
         ", holding torque of each engaged element per N m of turbine torque"
     };
     output::line(&format!("\ngears{what}"))?;
-    output::table(1, &gear_rows(gearbox))?;
+    output::list(1, &gear_rows(gearbox))?;
     let loose: Vec<&str> =
         gearbox.gears.iter().filter(|gear| !gear.holding_is_unique).map(|gear| gear.name.as_str()).collect();
     if !loose.is_empty() {
@@ -98,8 +98,9 @@ pub(super) fn capacities(gearbox: &Gearbox, capacities: &[Capacity]) -> Result<(
     if capacities.is_empty() {
         return Ok(());
     }
-    let mut rows =
-        vec![["element", "kind", "faces", "holds N m", "asked N m", "in gear", "factor"].map(str::to_owned).to_vec()];
+    let titles =
+        ["element", "kind", "faces", "holds N m", "asked N m", "in gear", "factor"].map(str::to_owned).to_vec();
+    let mut rows = Vec::new();
     for capacity in capacities {
         let element = &gearbox.elements[capacity.element];
         rows.push(vec![
@@ -113,7 +114,7 @@ pub(super) fn capacities(gearbox: &Gearbox, capacities: &[Capacity]) -> Result<(
         ]);
     }
     output::line("\ncapacity at line pressure beside the largest torque asked")?;
-    output::table(2, &rows)?;
+    output::table(2, titles, rows)?;
     Ok(())
 }
 
@@ -131,7 +132,7 @@ pub(super) fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
     let names = |elements: &[usize]| elements.iter().map(|&element| name(element)).collect::<Vec<_>>().join(" ");
     let gear = |at: usize| gearbox.gears[at].name.as_str();
     let heads = ["shift", "off", "on", "held", "alpha off", "alpha on", "M11", "M12", "M22 kg m2", "1/(i_off - i_on)"];
-    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+    let mut rows = Vec::new();
     let mut others: Vec<(String, Vec<String>)> = Vec::new();
     for shift in pairs(gearbox) {
         let label = format!("{}-{}", gear(shift.from), gear(shift.to));
@@ -169,7 +170,7 @@ pub(super) fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
         rows.push(row);
     }
     output::line("\nshifts between one element and another; the way back exchanges off and on")?;
-    output::table(4, &rows)?;
+    output::table(4, heads.map(str::to_owned).to_vec(), rows)?;
     for (kind, labels) in others {
         let what = match kind.as_str() {
             "interrupted" => "only dogs change, no clutch takes the load over".to_owned(),
@@ -190,7 +191,7 @@ fn order_of_phases() -> Result<(), Failure> {
         };
         vec![kind.name().to_owned(), phases.to_owned()]
     };
-    output::table(2, &ShiftKind::ALL.map(order))?;
+    output::list(2, &ShiftKind::ALL.map(order))?;
     Ok(())
 }
 

@@ -268,9 +268,7 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
             "flare rpm, 95 %",
             "jerk m/s^3",
         ];
-        let mut rows = vec![titles.map(str::to_owned).to_vec()];
-        rows.extend(found.iter().map(row));
-        output::table(3, &rows)?;
+        output::table(3, titles.map(str::to_owned).to_vec(), found.iter().map(row).collect())?;
     }
     if !has_command(map) {
         output::note("no valve command is mapped: shifts and speeds can be studied, a pressure cannot be estimated");

@@ -6,6 +6,7 @@ use car::{Car, Sensors};
 use report::matrix_page::{failures, kind_rows, matrix_page, not_driven, shift_cells, shift_rows};
 use serde_json::json;
 use study::gearbox::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
+use trace::quantity;
 use trace::{Cell, ShownPath as _};
 use wetclutch::studies::bench_sensors;
 
@@ -58,20 +59,21 @@ pub(super) fn sensors_or_bench(path: Option<&Path>) -> Result<Sensors, Failure> 
 }
 
 fn print(result: &Matrix, car: &Car) -> Result<(), Failure> {
-    output::line(
-        "RMS error of the clutch torque, relative to the open loop, and both errors in N m: filter / open loop. Of the clutch that\n\
-         controls the inertia phase; in brackets where the open loop errs by less than 2 N m\n",
-    )?;
+    output::line(&format!(
+        "RMS error of the clutch torque, relative to the open loop, and both errors: filter / open loop. Of the clutch that\n\
+         controls the inertia phase; in brackets where the open loop errs by less than {}\n",
+        quantity(2.0, "N m", 0)
+    ))?;
     for (left, (titles, rows)) in [(2, shift_rows(result, car)), (2, kind_rows(result))] {
-        let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
-        output::table(left, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
+        output::table(left, titles, rows)?;
         output::line("")?;
     }
     let counts = Pooled::of(&result.rows, |_| true).counts;
     output::line(&format!(
-        "above the open loop by more than 1 N m: {} of {} shifts; by phases {} of {}\n\
+        "above the open loop by more than {}: {} of {} shifts; by phases {} of {}\n\
          outside their guaranteed ranges: {} of {} pressures and torques of both clutches\n\
          a held element is said to slip: {} of {} rows",
+        quantity(1.0, "N m", 0),
         counts.runs_above,
         counts.compared_runs,
         counts.above,

@@ -18,6 +18,7 @@ use crate::args::SensitivityOptions;
 use crate::commands::{read_car, replaceable, sensors_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
+use trace::quantity;
 use wetclutch::shell_quoted;
 
 pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
@@ -48,12 +49,11 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
             "bound",
             "unit",
             "equivalent pressure error, kPa",
-            "per unit",
+            "per unit, kPa",
             "clutch torque per unit, N m",
             "angle to the pressure",
         ];
-        let mut rows = vec![head.map(str::to_owned).to_vec()];
-        rows.extend(phase.effects.iter().map(|effect| {
+        let rows = phase.effects.iter().map(|effect| {
             vec![
                 effect.error.to_owned(),
                 effect.bound_text(),
@@ -63,16 +63,16 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
                 format!("{:.2}", effect.clutch_n_m_per_unit),
                 effect.angle_deg.map_or_else(|| "one speed".to_owned(), |angle| format!("{angle:.1} deg")),
             ]
-        }));
-        output::table(1, &rows)?;
+        });
+        output::table(1, head.map(str::to_owned).to_vec(), rows.collect())?;
         output::line("")?;
     }
-    let kpa = |effect: &ValveEffect| format!("{} {:.1} kPa", effect.error, 1e-3 * effect.pressure_pa);
+    let kpa = |effect: &ValveEffect| format!("{} {}", effect.error, quantity(1e-3 * effect.pressure_pa, "kPa", 1));
     output::line(&format!(
         "pressure error of the open loop in a shift: {}\n",
         valve.iter().map(kpa).collect::<Vec<_>>().join(", ")
     ))?;
-    let n_m = |effect: &ShaftEffect| format!("{} {:.0} N m", effect.error, effect.torque_n_m);
+    let n_m = |effect: &ShaftEffect| format!("{} {}", effect.error, quantity(effect.torque_n_m, "N m", 0));
     output::line(&format!(
         "error of the level of the shaft torque, which the speeds do not show: {}\n",
         shaft.iter().map(n_m).collect::<Vec<_>>().join(", ")
@@ -99,13 +99,12 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     output::line(
-        "deviation of the estimated torque of the clutch that drives the inertia phase, N m: filter / valve model alone, and their ratio,\n\
+        "deviation of the estimated torque of the clutch that drives the inertia phase: filter / valve model alone, and their ratio,\n\
          where each error is anywhere within its bound, independent of the others; hidden: the ratio is above 0.9, the speeds show nothing of\n\
          this torque, and the valve model serves\n",
     )?;
     let (titles, rows) = sensitivity_rows(&shifts, &car);
-    let titles = titles.into_iter().map(str::to_owned).collect();
-    output::table(3, &std::iter::once(titles).chain(rows).collect::<Vec<_>>())?;
+    output::table(3, titles, rows)?;
     let budget = ErrorBudget::of_car(&car);
     let bound = |error: ShiftErrorKind| format!("{} {}", error.name(), error.bound(&budget));
     let bounds: Vec<String> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(&car)).map(bound).collect();

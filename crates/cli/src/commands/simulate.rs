@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use study::drive::{DriveColumns, DriveRow, Recording};
 use study::sampling::through_sensors;
 use study::{ShiftQuality, ShiftRating, ShiftSample};
+use trace::quantity;
 use trace::{CsvWriter, ShownPath as _, Trace, WholeFile, signal};
 
 use super::simulate_drive::simulate_drive;
@@ -55,11 +56,11 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     let rated = rating.finish();
     match &rated {
         Some(quality) => output::note(&format!(
-            "shift: torque phase {:.3} to {:.3} s, inertia phase to {:.3} s, flare {:.1} rad/s, jerk {:.1} m/s^3",
+            "shift: torque phase {:.3} to {:.3} s, inertia phase to {:.3} s, flare {}, jerk {:.1} m/s^3",
             quality.torque_phase_start_s,
             quality.inertia_phase_start_s,
             quality.lock_up_s,
-            quality.flare_rad_s,
+            quantity(quality.flare_rad_s, "rad/s", 1),
             quality.jerk_peak_m_s3,
         )),
         None => output::note("the shift was not completed within the simulated time"),

@@ -7,6 +7,7 @@ use config::DriveFile;
 use evaluate::measured::MeasuredRow;
 use plant::car::OverSpeed;
 use serde_json::json;
+use trace::quantity;
 use trace::units::{km_h, rpm};
 use trace::{CsvWriter, ShownPath as _, WholeFile};
 use wetclutch::simulate::{DriveColumn, drive_columns, measured_columns, sensors_of, simulate_rows};
@@ -86,10 +87,10 @@ fn over_speed(over: &OverSpeed, car: &Car) -> String {
     let [from, to] = [gears.from, gears.to].map(|gear| car.gear_name(gear));
     let in_gear = if from == to { format!("in gear {from}") } else { format!("in the shift {from}-{to}") };
     format!(
-        "warning: the engine turns at {:.0} rpm {in_gear} at {time_s:.2} s, and its torque map ends at {:.0} rpm: beyond, the last torque of the \
+        "warning: the engine turns at {} {in_gear} at {time_s:.2} s, and its torque map ends at {}: beyond, the last torque of the \
          map is used\nhint: a gearbox controller would refuse such a shift; check [[shift]], the schedule and the grade",
-        rpm(engine_rad_s),
-        rpm(map_rad_s)
+        quantity(rpm(engine_rad_s), "rpm", 0),
+        quantity(rpm(map_rad_s), "rpm", 0)
     )
 }
 

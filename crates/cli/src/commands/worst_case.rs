@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use study::campaign::{Metric, PHASES};
 use study::{Campaign, Row, Target, WorstCase, worst_case as search};
 use trace::ShownPath as _;
+use trace::quantity;
 use trace::units::mpa;
 
 use crate::args::{PhaseChoice, WorstCaseOptions};
@@ -126,7 +127,7 @@ fn places(options: &WorstCaseOptions, phase: usize) -> [PathBuf; 2] {
 fn score(campaign: &Campaign, target: Target, row: &Row) -> String {
     match mpa(row.numbers[campaign.layout.score(target.observer, target.phase, target.metric)]) {
         f64::INFINITY => "infinite (it diverged)".to_owned(),
-        score => format!("{score:.4} MPa"),
+        score => quantity(score, "MPa", 4),
     }
 }
 

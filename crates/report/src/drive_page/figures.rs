@@ -92,7 +92,7 @@ pub(super) fn overview_figure(drive: &ScoredDrive, car: &Car) -> (Figure, Vec<St
     ];
     let (panels, missing) = with_values(panels);
     let figure = Figure {
-        x_label: "time (s)",
+        x_label: "time (s)".into(),
         x_range: (first_s, last_s.max(first_s + SHORTEST_S)),
         spans: spans.take(MAX_DRAWN).collect(),
         panels: panels.into_iter().chain(health_panel(&healths)).collect(),
@@ -140,7 +140,7 @@ pub(super) fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) 
     let mut spans = phase_spans(shift, "torque phase", TruePhase::Torque, TORQUE_PHASE);
     spans.extend(phase_spans(shift, "inertia phase", TruePhase::Inertia, INERTIA_PHASE));
     spans.sort_by(|a, b| a.start.total_cmp(&b.start));
-    Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels: with_values(panels).0 }
+    Figure { x_label: "time (s)".into(), x_range: (from_s.max(0.0), to_s), spans, panels: with_values(panels).0 }
 }
 
 /// Estimated torque times slip of both clutches.

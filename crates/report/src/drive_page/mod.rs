@@ -14,6 +14,8 @@ use study::gearbox::drive::{ScoredDrive, ScoredShift};
 use study::gearbox::matrix::Matrix;
 use study::gearbox::worth_a_look::BY_EACH;
 use study::gearbox::{ShiftDraw, TruePhase};
+use trace::quantity;
+use trace::shown_units::convert_table;
 
 use crate::interactive::within_room;
 use crate::matrix_page::kind_rows;
@@ -68,17 +70,18 @@ impl DrivePage<'_> {
             }
         });
         let figures: Vec<Value> = figures.collect();
-        let (columns, (_, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
+        let (columns, (titles, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
         let mut rows: Vec<_> = rows.into_iter().zip(&drive.shifts).collect();
         rows.sort_by(|(_, a), (_, b)| by_need(a, b));
         let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
         let first = rows.iter().map(|(_, shift)| *shift).find(|shift| is_drawn(shift)).map(|shift| shift.number);
         let rows: Vec<Value> =
             rows.into_iter().map(|(cells, shift)| context! { cells, linked => is_drawn(shift) }).collect();
-        let (kind_titles, kinds) = kind_rows(&Matrix::of_drive(drive, car));
+        let (mut kind_titles, mut kinds) = kind_rows(&Matrix::of_drive(drive, car));
+        convert_table(&mut kind_titles, &mut kinds);
         let (overview, missing) = overview_figure(drive, car);
         let named = worst.iter().take(WORST).map(|shift| {
-            context! { number => shift.number, gears => car.shift_name(shift.gears), error => number(shift.worst_error_n_m(), 1) }
+            context! { number => shift.number, gears => car.shift_name(shift.gears), error => quantity(shift.worst_error_n_m(), "N m", 1) }
         });
         render(
             "drive.html",
@@ -93,7 +96,7 @@ impl DrivePage<'_> {
                 found => found(&findings(drive)),
                 kind_titles,
                 kinds,
-                columns => columns.iter().map(|column| context! { title => column.title, meaning => column.meaning }).collect::<Vec<_>>(),
+                columns => titles.iter().zip(columns).map(|(title, column)| context! { title, meaning => column.meaning }).collect::<Vec<_>>(),
                 rows,
                 healths => healths(drive),
                 figures,
@@ -196,9 +199,9 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     sentences.push(format!("{completed} of {} shifts were completed{longest}.", shifts.len()));
     if shifts.iter().any(|shift| !shift.is_garage) {
         sentences.push(format!(
-            "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s.",
-            number(maximum(|shift| shift.quality.flare_rad_s), 1),
-            number(maximum(|shift| shift.quality.past_synchronous_rad_s), 1),
+            "Largest flare of an old gear {}, largest slip beyond a new gear {}.",
+            quantity(maximum(|shift| shift.quality.flare_rad_s), "rad/s", 1),
+            quantity(maximum(|shift| shift.quality.past_synchronous_rad_s), "rad/s", 1),
         ));
     }
     sentences.extend([format!(

@@ -7,6 +7,7 @@ use study::gearbox::matrix::{ErrorsByPhase, controlling_of};
 use study::gearbox::shift_comfort::ShiftComfort;
 use study::gearbox::{SquaredErrors, TruePhase};
 use trace::Cell;
+use trace::shown_units::convert_table;
 
 use super::{clutch_names, kind_name, phase_s};
 use crate::matrix_page::{ratio, torques};
@@ -140,10 +141,13 @@ pub(super) fn filled_columns(drive: &ScoredDrive, car: &Car) -> Vec<&'static Col
 
 /// Titles and rows of the table of shifts. Errors of the clutch torque where the truth is known, else means of the estimates; columns
 /// that no shift fills are left out.
-pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
+pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<String>, Vec<Vec<String>>) {
     let columns = filled_columns(drive, car);
     let row = |shift: &ScoredShift| columns.iter().map(|column| (column.cell)(shift, car)).collect();
-    (columns.iter().map(|column| column.title).collect(), drive.shifts.iter().map(row).collect())
+    let mut titles: Vec<String> = columns.iter().map(|column| column.title.to_owned()).collect();
+    let mut rows: Vec<Vec<String>> = drive.shifts.iter().map(row).collect();
+    convert_table(&mut titles, &mut rows);
+    (titles, rows)
 }
 
 /// What the words of the table of shifts say that a reader may not have met, and the healths in it: word and meaning.

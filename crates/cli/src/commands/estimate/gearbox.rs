@@ -61,7 +61,6 @@ fn report(found: &DriveEstimates, file: &CarFile, is_output_free: bool, say: &mu
     let (titles, mut rows) = shift_rows(&found.drive, file);
     let more = rows.len().saturating_sub(SHOWN);
     rows.truncate(SHOWN);
-    let titles: Vec<String> = titles.into_iter().map(str::to_owned).collect();
     if !rows.is_empty() {
         say.table(&shift_lines(&titles, &rows, more), is_output_free)?;
     }

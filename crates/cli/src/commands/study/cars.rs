@@ -10,6 +10,7 @@ use study::gearbox::campaign::{CarCampaign, CarSummary};
 use study::gearbox::matrix::{MatrixCounts, Pooled};
 use study::gearbox::tour;
 use trace::ShownPath as _;
+use trace::quantity;
 use wetclutch::studies::bench_sensors;
 
 use super::part::{Part, lock, merged};
@@ -67,16 +68,17 @@ fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary, json: bool) -> Res
     if let Some(failure) = &summary.failure {
         output::note(&format!("warning: the first car that failed: {failure}"));
     }
-    output::line(
-        "RMS error of the clutch torque, relative to the open loop, and both errors in N m: filter / open loop. Of the clutch that\n\
-         controls the inertia phase; left out where the open loop errs by less than 2 N m\n",
-    )?;
-    let (titles, rows) = kind_rows(&matrix);
-    let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
-    output::table(2, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
     output::line(&format!(
-        "\nabove the open loop by more than 1 N m: {} of {} shifts; by phases {} of {}\n\
+        "RMS error of the clutch torque, relative to the open loop, and both errors: filter / open loop. Of the clutch that\n\
+         controls the inertia phase; left out where the open loop errs by less than {}\n",
+        quantity(2.0, "N m", 0)
+    ))?;
+    let (titles, rows) = kind_rows(&matrix);
+    output::table(2, titles, rows)?;
+    output::line(&format!(
+        "\nabove the open loop by more than {}: {} of {} shifts; by phases {} of {}\n\
          outside their guaranteed ranges: {} of {} pressures and torques of both clutches",
+        quantity(1.0, "N m", 0),
         counts.runs_above,
         counts.compared_runs,
         counts.above,

@@ -104,17 +104,18 @@ fn print_json(part: &Part<'_, Campaign>, summary: &Summary, page: Option<&Path>)
 fn print(summary: &Summary, page: &Path) -> Result<(), Failure> {
     let statuses = summary.statuses.iter().map(|(status, count)| format!("{count} {}", status.name()));
     output::line(&format!("{}\n", statuses.collect::<Vec<_>>().join(", ")))?;
-    let mut table = vec![["phase", "observer", "RMS MPa: median", "95 %", "worst"].map(str::to_owned).to_vec()];
+    let titles = ["phase", "observer", "median RMS, MPa", "95 %, MPa", "worst, MPa"].map(str::to_owned).to_vec();
+    let mut rows = Vec::new();
     for (i, phase) in PHASES.into_iter().enumerate() {
         for (observer, name) in summary.layout.observers.iter().enumerate() {
             let rms = summary.rms(observer, i);
             let mpa = |pascal: f64| number(units::mpa(pascal), 4);
             let mut row = vec![phase_name(phase).to_owned(), name.clone()];
             row.extend([mpa(rms.quantile(0.5)), mpa(rms.quantile(0.95)), mpa(rms.largest())]);
-            table.push(row);
+            rows.push(row);
         }
     }
-    output::table(2, &table)?;
+    output::table(2, titles, rows)?;
     print_relative(summary)?;
     if let Some(diverged) = diverged(summary) {
         output::line(&format!("\ndiverged: {diverged}"))?;
@@ -128,7 +129,7 @@ fn print_relative(summary: &Summary) -> Result<(), Failure> {
     for (compared, name) in COMPARED_NAMES.into_iter().enumerate() {
         let head =
             ["phase", "observer", "in a run: median", "95 %", "worst", "95 % over 95 %", "worst over worst", "better"];
-        let mut table = vec![head.map(str::to_owned).to_vec()];
+        let mut rows = Vec::new();
         for (i, phase) in PHASES.into_iter().enumerate() {
             for (observer, name) in summary.layout.observers.iter().enumerate() {
                 let Some(relative) = summary.relative(compared, observer, i) else { continue };
@@ -142,12 +143,12 @@ fn print_relative(summary: &Summary) -> Result<(), Failure> {
                 let mut row = vec![phase_name(phase).to_owned(), name.clone()];
                 row.extend(ratios.map(|ratio| number(ratio, 2)));
                 row.push(format!("{:.0} %", (100.0 * relative.better).floor()));
-                table.push(row);
+                rows.push(row);
             }
         }
-        if table.len() > 1 {
+        if !rows.is_empty() {
             output::line(&format!("\nRMS error of the {name}, relative to that of the open loop\n"))?;
-            output::table(2, &table)?;
+            output::table(2, head.map(str::to_owned).to_vec(), rows)?;
         }
     }
     Ok(())

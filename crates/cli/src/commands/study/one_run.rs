@@ -45,14 +45,14 @@ pub(super) fn one_run(campaign: &Campaign, number: u64, options: &StudyOptions) 
     if let Some(quality) = &run.quality {
         output::line("\nthe shift\n")?;
         let rows = quality_rows(quality).into_iter().map(|(name, value)| vec![name.to_owned(), value]);
-        output::table(1, &rows.collect::<Vec<_>>())?;
+        output::list(1, &rows.collect::<Vec<_>>())?;
     }
     if row.status.is_scored() {
         scores(&campaign.layout, &row)?;
     }
     output::line("\nfiles\n")?;
     let files = files.into_iter().map(|(path, what)| vec![path.shown().to_string(), what]);
-    Ok(output::table(2, &files.collect::<Vec<_>>())?)
+    Ok(output::list(2, &files.collect::<Vec<_>>())?)
 }
 
 /// Prints the run as JSON: its factors, scores as in its row, and files.
@@ -72,23 +72,24 @@ fn print_json(campaign: &Campaign, row: &Row, files: &[(PathBuf, String)]) -> Re
 /// The values that the study gave to this run.
 fn factors(campaign: &Campaign, row: &Row) -> Result<(), Failure> {
     output::line("\nvaried\n")?;
-    let mut table = vec![["factor", "key", "value"].map(str::to_owned).to_vec()];
+    let titles = ["factor", "key", "value"].map(str::to_owned).to_vec();
+    let mut rows = Vec::new();
     for (factor, value) in campaign.study.factors.iter().zip(&row.numbers) {
-        table.push(vec![factor.name.clone(), factor.key.clone(), toml_number(*value)]);
+        rows.push(vec![factor.name.clone(), factor.key.clone(), toml_number(*value)]);
     }
-    Ok(output::table(2, &table)?)
+    Ok(output::table(2, titles, rows)?)
 }
 
 /// The errors of each observer in both phases.
 fn scores(layout: &Layout, row: &Row) -> Result<(), Failure> {
     output::line("\nerrors of the estimates\n")?;
     let head = ["phase", "observer", "pressure RMS MPa", "peak MPa", "torque RMS N m", "in range"];
-    let mut table = vec![head.map(str::to_owned).to_vec()];
+    let mut rows = Vec::new();
     for (i, phase) in PHASES.into_iter().enumerate() {
         for (observer, name) in layout.observers.iter().enumerate() {
             let score = |metric: Metric| row.numbers[layout.score(observer, i, metric)];
             let inside = score(Metric::Coverage);
-            table.push(vec![
+            rows.push(vec![
                 phase_name(phase).to_owned(),
                 name.clone(),
                 number(mpa(score(Metric::PressureRms)), 4),
@@ -98,7 +99,7 @@ fn scores(layout: &Layout, row: &Row) -> Result<(), Failure> {
             ]);
         }
     }
-    Ok(output::table(2, &table)?)
+    Ok(output::table(2, head.map(str::to_owned).to_vec(), rows)?)
 }
 
 /// Writes the signals, the estimates, the figure and the row; the files, each with what is in it.

@@ -7,6 +7,7 @@ use observer::{ChannelHealth, Estimate as Sample, Health};
 use report::tables::{health_meaning, phase_name};
 use study::log::FIRST_LOOK;
 use study::{ErrorScore, Passages};
+use trace::quantity;
 use trace::units;
 
 use super::measured::{Measured, Step};
@@ -218,10 +219,10 @@ impl Findings {
         let scores = self.errors.as_ref().map(ErrorScore::finish).unwrap_or_default();
         for score in scores.iter().filter(|score| score.samples > 0) {
             said.push(format!(
-                "error against the true pressure, {}: peak {:.4} MPa, RMS {:.4} MPa",
+                "error against the true pressure, {}: peak {}, RMS {}",
                 phase_name(score.phase),
-                units::mpa(score.peak),
-                units::mpa(score.rms),
+                quantity(units::mpa(score.peak), "MPa", 4),
+                quantity(units::mpa(score.rms), "MPa", 4),
             ));
         }
         let rows = grouped(self.rows + self.other_gear);
