@@ -20,6 +20,7 @@ mod failing_channels;
 mod first_words;
 mod fit;
 mod fit_gearbox;
+mod from_log;
 mod garage;
 mod hostile_files;
 mod json;

@@ -24,6 +24,11 @@ pub(crate) struct Mapping {
 }
 
 impl Mapping {
+    /// Whether anything is said of the channels.
+    pub(crate) fn is_given(&self) -> bool {
+        self.files().next().is_some() || !self.channel.is_empty()
+    }
+
     /// The files that it names.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.dbc.iter().chain(&self.map)
@@ -48,6 +53,9 @@ pub(crate) struct Inspect {
     /// Open the page in the browser
     #[arg(long, requires = "output")]
     pub(crate) open: bool,
+    /// With --shifts: the converter that the log shows, as a table of a vehicle file; needs the engine torque
+    #[arg(long, value_name = "OUT.toml", requires = "shifts")]
+    pub(crate) write_converter: Option<PathBuf>,
     /// Ratios of the forward gears, 1st first; they replace those of the map
     #[arg(long, value_name = "R1,R2,...", value_delimiter = ',', requires = "shifts")]
     pub(crate) ratios: Vec<f64>,
@@ -180,19 +188,25 @@ impl FormatChoice {
 }
 
 #[derive(Debug, Args)]
-#[command(group(ArgGroup::new("shifts").required(true).args(["gearbox", "ratios"])))]
+#[command(group(ArgGroup::new("shifts").required(true).multiple(true).args(["gearbox", "ratios", "from_log"])))]
 pub(crate) struct Init {
     /// Name of the car
     #[arg(long, default_value = "my car")]
     pub(crate) name: String,
+    /// Log of a drive: without --gearbox the ratios in which the car was driven become the gearbox file; final ratio, wheel radius and engine
+    /// torque that are not given are those of the log, as far as it shows them
+    #[arg(long, value_name = "LOG", conflicts_with_all = ["ratios", "complete"])]
+    pub(crate) from_log: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
     /// Mass with driver, kg: 200 to 60000
     #[arg(long, value_name = "KG", allow_negative_numbers = true, value_parser = within(200.0..=60e3))]
     pub(crate) mass_kg: f64,
     /// Rolling radius of the driven wheels, m: 0.1 to 1
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = within(0.1..=1.0))]
-    pub(crate) wheel_radius_m: f64,
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = within(0.1..=1.0), required_unless_present = "from_log")]
+    pub(crate) wheel_radius_m: Option<f64>,
     /// The gearbox: 8hp, 10_speed, dual_clutch_7, lepelletier_6, ravigneaux_4, 722_6, 8hp45, 9g_tronic, a340e, a8lr1, c6, fn4a, tf80sc, or a gearbox file
-    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["valve", "complete"])]
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["valve", "complete", "ratios"])]
     pub(crate) gearbox: Option<String>,
     /// What connects engine and gearbox [default: clutch for dual_clutch_7, else converter]
     #[arg(long, value_enum, conflicts_with = "ratios")]
@@ -201,11 +215,11 @@ pub(crate) struct Init {
     #[arg(long, value_name = "BEFORE,AFTER", value_delimiter = ',', num_args = 1, allow_negative_numbers = true, value_parser = within(0.6..=20.0))]
     pub(crate) ratios: Vec<f64>,
     /// Ratio from gearbox output to wheels, 0.5 to 10; 1 for dual_clutch_7, whose ratios contain it
-    #[arg(long, value_name = "RATIO", allow_negative_numbers = true, value_parser = within(0.5..=10.0))]
-    pub(crate) final_ratio: f64,
+    #[arg(long, value_name = "RATIO", allow_negative_numbers = true, value_parser = within(0.5..=10.0), required_unless_present = "from_log")]
+    pub(crate) final_ratio: Option<f64>,
     /// Maximum engine torque, N m: 20 to 2000
-    #[arg(long, value_name = "N_M", allow_negative_numbers = true, value_parser = within(20.0..=2000.0))]
-    pub(crate) engine_torque_n_m: f64,
+    #[arg(long, value_name = "N_M", allow_negative_numbers = true, value_parser = within(20.0..=2000.0), required_unless_present = "from_log")]
+    pub(crate) engine_torque_n_m: Option<f64>,
     /// Kind of the clutches' valves
     #[arg(long, value_enum, default_value_t)]
     pub(crate) valve: ValveChoice,

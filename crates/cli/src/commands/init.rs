@@ -9,8 +9,9 @@ use serde_json::json;
 use trace::ShownPath as _;
 
 use crate::args::{Init, LaunchChoice};
+use crate::commands::init_from_log::{FromLog, Numbers};
 use crate::commands::written::is_forced;
-use crate::commands::{check_output, write_text};
+use crate::commands::{check_output, warn_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
 use wetclutch::shell_quoted;
@@ -25,9 +26,15 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
         );
         return Err(Failure::Input(message));
     }
-    let gearbox = match &options.gearbox {
-        Some(gearbox) => car(options, gearbox)?,
-        None => one_shift(options).map(|()| None)?,
+    let log = options.from_log.as_deref().map(|log| FromLog::read(log, options)).transpose()?;
+    if log.is_none() && options.mapping.is_given() {
+        warn_without_effect("a channel map", "it says which channels of the log of --from-log are which signals");
+    }
+    let numbers = Numbers::of(options, log.as_ref())?;
+    let gearbox = match (&options.gearbox, &log) {
+        (Some(gearbox), _) => car(options, &numbers, gearbox)?,
+        (None, Some(log)) => Some(by_ratios(options, &numbers, log)?),
+        (None, None) => one_shift(options, &numbers).map(|()| None)?,
     };
     if options.json {
         let gearbox = gearbox.map(|path| path.shown().to_string());
@@ -38,7 +45,7 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
 }
 
 /// A vehicle file of one upshift.
-fn one_shift(options: &Init) -> Result<(), Failure> {
+fn one_shift(options: &Init, numbers: &Numbers) -> Result<(), Failure> {
     let [ratio_before, ratio_after] = options.ratios[..] else {
         let message = "--ratios needs two ratios, those of the gears before and after the shift\nhint: for example --ratios 4.17,2.34";
         return Err(Failure::Input(message.to_owned()));
@@ -46,11 +53,11 @@ fn one_shift(options: &Init) -> Result<(), Failure> {
     let facts = Facts {
         name: options.name.clone(),
         mass_kg: options.mass_kg,
-        wheel_radius_m: options.wheel_radius_m,
+        wheel_radius_m: numbers.wheel_radius_m,
         ratio_before,
         ratio_after,
-        final_ratio: options.final_ratio,
-        engine_torque_n_m: options.engine_torque_n_m,
+        final_ratio: numbers.final_ratio,
+        engine_torque_n_m: numbers.engine_torque_n_m,
         valve: options.valve.into(),
     };
     let text = if options.complete { complete_file } else { short_file }(&facts, options.stroke)?;
@@ -58,8 +65,8 @@ fn one_shift(options: &Init) -> Result<(), Failure> {
 }
 
 /// A vehicle file with a gearbox, and the gearbox file beside it if it is one of the program's, which is returned.
-fn car(options: &Init, gearbox: &str) -> Result<Option<PathBuf>, Failure> {
-    let torque_n_m = options.engine_torque_n_m;
+fn car(options: &Init, numbers: &Numbers, gearbox: &str) -> Result<Option<PathBuf>, Failure> {
+    let torque_n_m = numbers.engine_torque_n_m;
     let shipped = SHIPPED.iter().find(|(name, _)| *name == gearbox);
     let (source, named, beside) = match shipped {
         Some((name, text)) => {
@@ -76,23 +83,41 @@ fn car(options: &Init, gearbox: &str) -> Result<Option<PathBuf>, Failure> {
         None if gearbox == "dual_clutch_7" => LaunchChoice::Clutch,
         None => LaunchChoice::Converter,
     };
-    let facts = CarFacts {
-        name: options.name.clone(),
-        gearbox: named,
-        has_converter: launch == LaunchChoice::Converter,
-        has_stroke: options.stroke,
-        mass_kg: options.mass_kg,
-        wheel_radius_m: options.wheel_radius_m,
-        final_ratio: options.final_ratio,
-        engine_torque_n_m: torque_n_m,
-    };
-    let text = short_car_file(&facts, &source)?;
+    let text = short_car_file(&facts(options, numbers, named, launch), &source)?;
     if let Some(path) = &beside {
         write_text(path, &source.text)?;
         output::note(&format!("gearbox file: {}", path.shown()));
     }
     write_text(&options.output, &text)?;
     Ok(beside)
+}
+
+/// A vehicle file, and a gearbox file beside it with the ratios that a log shows.
+fn by_ratios(options: &Init, numbers: &Numbers, log: &FromLog) -> Result<PathBuf, Failure> {
+    let stem = options.output.file_stem().map_or("car".into(), |stem| stem.to_string_lossy());
+    let file = format!("{stem}_gearbox.toml");
+    let path = options.output.with_file_name(&file);
+    let source = Source { path: path.clone(), text: log.gearbox_file(&options.name)? };
+    refuse_existing(&path, &source.text)?;
+    let launch = options.launch.unwrap_or(LaunchChoice::Converter);
+    let text = short_car_file(&facts(options, numbers, file, launch), &source)?;
+    write_text(&path, &source.text)?;
+    output::note(&format!("gearbox file: {}", path.shown()));
+    write_text(&options.output, &text)?;
+    Ok(path)
+}
+
+fn facts(options: &Init, numbers: &Numbers, gearbox: String, launch: LaunchChoice) -> CarFacts {
+    CarFacts {
+        name: options.name.clone(),
+        gearbox,
+        has_converter: launch == LaunchChoice::Converter,
+        has_stroke: options.stroke,
+        mass_kg: options.mass_kg,
+        wheel_radius_m: numbers.wheel_radius_m,
+        final_ratio: numbers.final_ratio,
+        engine_torque_n_m: numbers.engine_torque_n_m,
+    }
 }
 
 /// The gearbox file of a car, and what may be given where there is none.

@@ -3,20 +3,17 @@
 use std::path::Path;
 
 use drivetrain::Real;
-use fit::drive::{DriveRecord, fit_converter};
+use fit::drive::{DriveRecord, converter_file};
 use logs::plausibility::{likely_time_unit, too_fast_a_time};
-use logs::{
-    Channel, ChannelMap, ChannelSummary, Inspection, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder,
-};
-use report::SpeedsPage;
+use logs::{Channel, ChannelMap, ChannelSummary, Inspection, Log, Reading, Readings, RoleSummary, Shift, ShiftFinder};
 use trace::ShownPath as _;
 use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
-use crate::browser;
+use crate::commands::inspect_drive::{Drive, has_command, page, write_converter};
 use crate::commands::inspect_json;
-use crate::commands::written::{is_page, replaces_only};
-use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, write_text};
+use crate::commands::written::{head, is_page, replaces_only};
+use crate::commands::{channel_map, check_output, not_an_input, shown_from_s};
 use crate::failure::Failure;
 use crate::output;
 
@@ -50,8 +47,13 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
                     .to_owned(),
             ));
         }
-        check_output(options.output.as_ref())?;
-        not_an_input(options.output.as_ref(), options.mapping.files().chain([&options.log]))?;
+        for output in [&options.output, &options.write_converter] {
+            check_output(output.as_ref())?;
+            not_an_input(output.as_ref(), options.mapping.files().chain([&options.log]))?;
+        }
+        let is_converter = |path: &Path| head(path).starts_with(converter_file::BEGIN);
+        let converter = options.write_converter.as_deref();
+        converter.map(|path| replaces_only("table of a converter", path, is_converter)).transpose()?;
         options.output.as_deref().map(|page| replaces_only("page in HTML", page, is_page)).transpose()?;
         return shifts(options, &mut log, &map);
     }
@@ -239,7 +241,7 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
         rates.push(readings.entry(), reading.stamp_s);
         finder.push(&reading);
         let origin_s = *origin_s.get_or_insert_with(|| shown_from_s(first_s));
-        if options.output.is_some() {
+        if options.output.is_some() || options.write_converter.is_some() {
             record.push(&Reading { time_s: reading.time_s - origin_s, ..reading });
         }
     }
@@ -251,6 +253,10 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
     finder.restart();
     let found: Vec<Shift> = finder.take_settled(f64::INFINITY).iter().map(|shift| shift.earlier_by(origin_s)).collect();
     notes.extend(finder.notes());
+    let drive = Drive::of(record, map);
+    if let Some(path) = &options.write_converter {
+        write_converter(path, &options.log, &drive)?;
+    }
     if options.json {
         return inspect_json::shifts(options, [first_s, last_s], &found, &notes);
     }
@@ -274,58 +280,9 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
         output::note("no valve command is mapped: shifts and speeds can be studied, a pressure cannot be estimated");
     }
     match &options.output {
-        Some(path) => page(path, options, map, &found, record, notes),
+        Some(path) => page(path, options, map, &found, &drive, notes),
         None => Ok(()),
     }
-}
-
-/// Writes the page of the drive.
-fn page(
-    path: &Path,
-    options: &Inspect,
-    map: &ChannelMap,
-    shifts: &[Shift],
-    mut record: DriveRecord,
-    mut faults: Vec<String>,
-) -> Result<(), Failure> {
-    record.complete(map.gearbox.output_rad_per_m);
-    let moments = record.moments();
-    let map_file = options.mapping.map.as_deref().map(config::Source::read).transpose()?;
-    if record.is_cut {
-        faults.push("The page shows the first five hours: the drive is longer.".to_owned());
-    }
-    let page = SpeedsPage {
-        log: &options.log,
-        map: map_file.as_ref(),
-        record: &record,
-        moments: &moments,
-        ratios: &map.gearbox.ratios,
-        shifts,
-        converter: &fit_converter(&record, &moments),
-        has_command: has_command(map),
-        faults: &faults,
-    };
-    write_text(path, &page.html()?)?;
-    for sentence in page.findings(&page.torques()) {
-        output::line(&sentence)?;
-    }
-    output::note(&format!("page: {}", path.shown()));
-    if options.open {
-        browser::open(path);
-    }
-    Ok(())
-}
-
-fn has_command(map: &ChannelMap) -> bool {
-    let commands = [
-        Role::OncomingCurrent,
-        Role::OncomingDuty,
-        Role::OncomingPressureCommand,
-        Role::ElementCurrent,
-        Role::ElementDuty,
-        Role::ElementPressureCommand,
-    ];
-    commands.into_iter().any(|role| map.has(role))
 }
 
 /// What was met in the log, in sentences.
