@@ -144,15 +144,20 @@ fn table(car: &CarFile, options: &Design) -> Result<(), TableError> {
 
 /// The model of the table; refuses what it has no use for.
 fn model_of(options: &Design, method: MethodChoice) -> Result<Model, Failure> {
-    options_apply(&Design { method: Some(method), ..options.clone() })?;
     let hint = "\nhint: the table compares bounds for a sample time: `--observer rigid` or `compliant`, with any method but `iss`; --shift 1-2 gives \
                 the gains of one shift";
-    match (options.observer, method) {
-        (_, MethodChoice::Iss) => Err(Failure::Input(format!("`--method iss` has no bound for a sample time{hint}"))),
-        (DesignChoice::Rigid, _) => Ok(Model::Rigid),
-        (DesignChoice::Compliant, _) => Ok(Model::Compliant),
-        (DesignChoice::Sliding, _) => Err(Failure::Input(format!("`--observer sliding` has no certificate{hint}"))),
+    let model = match options.observer {
+        DesignChoice::Rigid => Model::Rigid,
+        DesignChoice::Compliant => Model::Compliant,
+        DesignChoice::Sliding => {
+            return Err(Failure::Input(format!("`--observer sliding` has no certificate{hint}")));
+        }
+    };
+    if method == MethodChoice::Iss {
+        return Err(Failure::Input(format!("`--method iss` has no bound for a sample time{hint}")));
     }
+    options_apply(&Design { method: Some(method), ..options.clone() })?;
+    Ok(model)
 }
 
 impl Row<'_> {

@@ -105,7 +105,7 @@ impl DesignOptions {
         let sampled = [
             ("quantity", self.quantity.is_some() && is_continuous),
             ("sample_time_s", self.sample_time_s.is_some() && is_continuous),
-            ("method", is_discrete && is_sliding),
+            ("method", self.method.is_some() && is_sliding),
         ];
         required.into_iter().chain(sampled).find_map(|(name, is_unused)| is_unused.then_some(name))
     }
@@ -188,6 +188,7 @@ mod tests {
             (DesignOptions { sample_time_s: Some(0.02), ..sampled.clone() }, None),
             (DesignOptions { observer: DesignObserver::Sliding, ..sampled }, Some("method")),
             (DesignOptions { offset_max_pa: Some(1e5), ..sliding.clone() }, Some("offset_max_pa")),
+            (DesignOptions { method: Some(GainMethod::Iss), ..sliding.clone() }, Some("method")),
             (sliding, None),
         ] {
             assert_eq!(options.without_effect(), expected, "{options:?}");
