@@ -3,10 +3,12 @@
     python3 .ci/reference.py target/release/wetclutch           # write docs/reference/{commands,keys,columns}.md
     python3 .ci/reference.py target/release/wetclutch --check   # fail where they are stale
 
-Ranges of keys are what `wetclutch check` says of a value that is far too large; columns are those that the commands write.
+Ranges of keys are what `wetclutch check` says of a value that is far too large, and those of the JSON schemas (.ci/schemas.py, which is to be run
+first) for keys that the shown files do not have; columns are those that the commands write.
 """
 
 import csv
+import json
 import re
 import shutil
 import subprocess
@@ -17,6 +19,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 
 from reference_columns import MEANINGS  # noqa: E402
+from reference_keys import READERS  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = Path(sys.argv[1]).resolve()
@@ -51,13 +54,18 @@ def commands():
 # Keys
 
 KINDS = [
-    ("Vehicle file with a gearbox", "vehicles", ["eight_speed.toml", "eight_speed_stroke.toml"]),
-    ("Vehicle file of one shift", "vehicles", ["two_speed_stroke.toml", "two_speed_pwm.toml"]),
-    ("Gearbox file", "gearboxes", ["8hp.toml", "dual_clutch_7.toml"]),
-    ("Drive file", "drives", ["city.toml", "wltc_3b.toml"]),
-    ("Experiment file", "experiments", ["bench.toml", "fill.toml"]),
-    ("Study file", "experiments", ["combined.toml", "eight_speed_ftp_75.toml"]),
+    ("Vehicle file with a gearbox", "car", "vehicles", ["eight_speed.toml", "eight_speed_stroke.toml"]),
+    ("Vehicle file of one shift", "vehicle", "vehicles", ["two_speed_stroke.toml", "two_speed_pwm.toml"]),
+    ("Gearbox file", "gearbox", "gearboxes", ["8hp.toml", "dual_clutch_7.toml"]),
+    ("Drive file", "drive", "drives", ["city.toml", "wltc_3b.toml"]),
+    ("Experiment file", "experiment", "experiments", ["bench.toml", "fill.toml"]),
+    ("Study file", "study", "experiments", ["combined.toml"]),
+    ("Study file of a car with a gearbox", "car_study", "experiments", ["eight_speed_ftp_75.toml"]),
+    ("Channel map", "channel_map", "maps", ["genesis_at8.toml"]),
 ]
+# Kinds of which no file is shipped: their keys are those of the schema.
+OTHERS = [("Sensors file", "sensors"), ("File of what was learnt", "learnt")]
+TITLES = ["| key | value | range | read by | |", "|---|---|---|---|---|"]
 NUMBER = re.compile(r"[-+]?\d[\d_]*(\.\d+)?([eE][-+]?\d+)?")
 
 
@@ -92,7 +100,10 @@ def keys_of(text):
 
 def allowed(folder, text, number, value):
     """What `check` expects of a value, by the error that an absurd one gets."""
-    if NUMBER.fullmatch(value):
+    listed = re.match(r"\[+\s*([-+0-9.eE_]+)\s*[,\]]", value)
+    if listed:
+        value, absurd = listed.group(1), "9e99"
+    elif NUMBER.fullmatch(value):
         absurd = "9e99" if "." in value or "e" in value.lower() else "999999999999"
     elif value.startswith('"'):
         absurd = '"?"'
@@ -114,18 +125,70 @@ def shortened(number):
     return short if len(text) > 6 and float(text) != 0 else text
 
 
+def schema_keys(schema, path=""):
+    """Each key of a schema with what it says of its values."""
+    for one in schema.get("anyOf", [schema]):
+        if one.get("type") == "array" and "items" in one and path:
+            items = one["items"]
+            if "properties" in items or "anyOf" in items:
+                yield from schema_keys(items, path + "[]")
+                continue
+        if "properties" not in one and not isinstance(one.get("additionalProperties"), dict):
+            if path:
+                yield path, one
+            continue
+        for key, of in one.get("properties", {}).items():
+            yield from schema_keys(of, f"{path}.{key}" if path else key)
+        if isinstance(one.get("additionalProperties"), dict):
+            yield from schema_keys(one["additionalProperties"], path + ".NAME")
+
+
+def values_of(schema):
+    """The values that a key takes, in words: type and range."""
+    if "enum" in schema:
+        return "", ", ".join(f"`{word}`" for word in schema["enum"])
+    types = schema.get("type", "")
+    words = " or ".join([types] if isinstance(types, str) else types)
+    items = schema
+    while "items" in items:
+        items = items["items"]
+    if "minimum" in items:
+        return words, " to ".join(shortened(NUMBER.match(f"{items[end]:.12g}")) for end in ("minimum", "maximum"))
+    return words, items.get("description", "").removeprefix("expected ")
+
+
+def reader(kind, path):
+    """The commands that read a key."""
+    found = next((by for pattern, by in READERS[kind] if re.match(pattern, path)), None)
+    if found is None:
+        sys.exit(f"{kind}: `{path}` has no reader in .ci/reference_keys.py")
+    return found
+
+
+def rows_of_schema(kind, seen):
+    """Rows of the keys of a schema that are not among those."""
+    schema = json.loads((ROOT / "docs" / "schemas" / f"{kind}.json").read_text())
+    rows = {}
+    for path, of in schema_keys(schema):
+        if path not in seen and path not in rows:
+            words, allowed = values_of(of)
+            rows[path] = f"| `{path}` | {words} | {cell(allowed)} | {reader(kind, path)} | |"
+    return list(rows.values())
+
+
 def keys():
     if WORK.exists():
         shutil.rmtree(WORK)
-    for folder in ["vehicles", "gearboxes", "drives", "experiments"]:
+    for folder in ["vehicles", "gearboxes", "drives", "experiments", "maps"]:
         shutil.copytree(ROOT / folder, WORK / folder)
     page = [HEAD, "# Keys of the files\n"]
     page += [
-        "The value is that of the shipped file that is named; the range is the one that `check` states. An empty range: other rules hold, which `check` names.",
+        "The value is that of the shipped file that is named; the range is the one that `check` states. An empty range: other rules hold, which `check` names. `[]` is any entry of a list of tables, `NAME` any name.",
+        "Read by: the commands whose results depend on the key. `simulate` stands for all that simulate: `demo`, `bench`, `study`, `worst-case`, `error-bound`; `estimate` also for `fit`, `export`, `sensitivity` and the estimates of those. `check` reads every key.",
         "What each table is for: [vehicle files](vehicle-file.md), [gearbox files](gearbox-file.md), [simulation files](simulation-files.md), [channel map](channel-map.md).",
     ]
-    for title, folder, names in KINDS:
-        page += ["", f"## {title}", "", "| key | value | range | |", "|---|---|---|---|"]
+    for title, kind, folder, names in KINDS:
+        page += ["", f"## {title}", "", *TITLES]
         seen = set()
         for name in names:
             text = (ROOT / folder / name).read_text()
@@ -135,8 +198,13 @@ def keys():
                 seen.add(path)
                 shown = "[...]" if value == "[" else value if len(value) <= 40 else value[:36] + " ..."
                 comment = comment if len(comment) <= 160 else comment[:157] + "..."
-                page.append(f"| `{path}` | `{cell(shown)}` | {cell(allowed(folder, text, number, value))} | {cell(comment)} |")
+                page.append(f"| `{path}` | `{cell(shown)}` | {cell(allowed(folder, text, number, value))} | {reader(kind, path)} | {cell(comment)} |")
         page += ["", "From " + ", ".join(f"[`{folder}/{name}`](../../{folder}/{name})" for name in names) + "."]
+        others = rows_of_schema(kind, seen)
+        if others:
+            page += ["", "Other keys of such a file:", "", *TITLES, *others]
+    for title, kind in OTHERS:
+        page += ["", f"## {title}", "", *TITLES, *rows_of_schema(kind, set())]
     return "\n".join(page) + "\n"
 
 

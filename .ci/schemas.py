@@ -3,8 +3,8 @@
     python3 .ci/schemas.py target/release/wetclutch           # write them
     python3 .ci/schemas.py target/release/wetclutch --check   # fail where one is stale
 
-The shipped files are read, and `wetclutch check` is asked for each key which types of values it takes, and for each table which keys. A file that the
-program accepts fits its schema; ranges that depend on other values are in the descriptions alone.
+The shipped files are read, and `wetclutch check` is asked for each key which types of values it takes, for each number which range, and for each table
+which keys. A file that the program accepts fits its schema. A range that changes with other values of the file is in the description alone.
 """
 
 import json
@@ -24,7 +24,10 @@ REFUSED = ("invalid type", "invalid length", "invalid value", "data did not matc
 # A value of each type, and what a schema calls the type.
 TYPES = [(1.0, "number"), ("?", "string"), (True, "boolean"), ([1.0, 1.0], "array"), ([[1.0]], "array"), ([], "array"), ({}, "object")]
 ALL = {name for _, name in TYPES}
-NUMBER = re.compile(r"-?\d+(\.\d+)?")
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+RANGE = re.compile(f"({NUMBER.pattern}) to ({NUMBER.pattern})")
+# A number outside every range.
+ABSURD = 9e99
 KINDS = {
     "a vehicle file of a car with a gearbox": ("car", "Vehicle file with a gearbox"),
     "a vehicle file of one shift": ("vehicle", "Vehicle file of one shift"),
@@ -32,6 +35,10 @@ KINDS = {
     "a drive file": ("drive", "Drive file"),
     "an experiment file": ("experiment", "Experiment file"),
     "a study file": ("study", "Study file"),
+    "a study file of a car with a gearbox": ("car_study", "Study file of a car with a gearbox"),
+    "a sensors file": ("sensors", "Sensors file"),
+    "a file with a part of a vehicle file, such as bounds": ("bounds", "Part of a vehicle file, such as bounds"),
+    "a file of what was learnt of a car": ("learnt", "What the gearbox filter has learnt of a car"),
     "a channel map": ("channel_map", "Channel map"),
 }
 
@@ -50,19 +57,50 @@ def check(*files):
     return json.loads(done.stdout)["files"]
 
 
+def scaled(value, factor):
+    """A value whose decimal numbers are all multiplied."""
+    if isinstance(value, dict):
+        return {key: scaled(of, factor) for key, of in value.items()}
+    if isinstance(value, list):
+        return [scaled(of, factor) for of in value]
+    return value * factor if isinstance(value, float) else value
+
+
 class File:
     """A shipped file, of which parts are replaced."""
 
-    def __init__(self, path):
-        self.path, self.root = path, tomllib.loads(path.read_text())
+    def __init__(self, path, root=None):
+        self.path, self.root = path, root or tomllib.loads(path.read_text())
+        self.others = scaled(self.root, 0.97)
 
-    def errors(self, place, value):
-        """The errors of the file with another value at a place, or without any."""
-        root = json.loads(json.dumps(self.root))
+    def changed(self, place, value):
+        """The file with another value at a place."""
+        return File(self.path, self.replaced(place, value))
+
+    def range_of(self, place, value, root=None):
+        """The range of a number, by the error of an absurd one."""
+        said = [error for error in self.errors(place, value, root) if error["expected"] and error["value"] == ABSURD]
+        return said[0]["expected"] if said else None
+
+    def fixed_range(self, place, value):
+        """The range of a number, and its ends if it is the same with other values of the file."""
+        expected = self.range_of(place, value)
+        ends = RANGE.fullmatch(expected or "")
+        is_fixed = ends and self.range_of(place, value, self.others) == expected
+        return expected, [float(ends.group(1)), float(ends.group(2))] if is_fixed else None
+
+    def replaced(self, place, value, root=None):
+        """The tables of the file, or other ones, with another value at a place."""
+        root = json.loads(json.dumps(root or self.root))
         inner = root
         for step in place[:-1]:
             inner = inner[step]
         inner[place[-1]] = value
+        return root
+
+    def errors(self, place, value, root=None):
+        """The errors of the file, or of one with other numbers, with another value at a place."""
+        root = self.replaced(place, value, root)
         probe = self.path.with_name("probe.toml")
         probe.write_text("".join(f"{json.dumps(key)} = {toml(of)}\n" for key, of in root.items()))
         return check(str(probe))[0]["errors"]
@@ -81,8 +119,30 @@ def keys_of(file, place):
     return None
 
 
+def with_range(schema, found):
+    """The schema of a number with its range."""
+    expected, ends = found
+    if ends:
+        return {**schema, "minimum": ends[0], "maximum": ends[1]}
+    if expected:
+        return {**schema, "description": f"expected {NUMBER.sub(lambda number: f'{float(number.group()):g}', expected)}"}
+    return schema
+
+
+def numbers_of(file, place, value):
+    """The schema of a list of numbers, or of lists of them."""
+    if value and all(type(item) in (int, float) for item in value):
+        found = file.fixed_range(place, [ABSURD, *value[1:]])
+        return {"type": "array", "items": with_range({"type": "number"}, found)} if found[0] else None
+    if value and all(isinstance(item, list) for item in value):
+        # The first list stands for all.
+        inner = numbers_of(file, [*place, 0], value[0])
+        return {"type": "array", "items": inner} if inner else None
+    return None
+
+
 def schema_of_value(file, place, value):
-    types, words, ranges = set(), [], None
+    types, words = set(), []
     for probe, name in TYPES:
         errors = file.errors(place, probe)
         refused = [error["message"] for error in errors if error["message"].startswith(REFUSED)]
@@ -90,29 +150,33 @@ def schema_of_value(file, place, value):
         words += variants[0] if variants else []
         if not refused:
             types.add(name)
-    types.add({int: "number", float: "number", str: "string", bool: "boolean", list: "array", dict: "object"}[type(value)])
-    if type(value) in (int, float):
-        said = [error["expected"] for error in file.errors(place, 9e99) if error["expected"]]
-        ranges = said[0] if said else None
+    if value is not None:
+        types.add({int: "number", float: "number", str: "string", bool: "boolean", list: "array", dict: "object"}[type(value)])
     # What takes every type is read by rules of its own.
-    schema = {} if types == ALL else {"type": sorted(types) if len(types) > 1 else types.pop()}
+    schema = {} if types == ALL or not types else {"type": sorted(types) if len(types) > 1 else types.pop()}
     if words and schema.get("type") == "string":
         schema = {"enum": sorted(set(words))}
-    if ranges:
-        schema["description"] = f"expected {NUMBER.sub(lambda number: f'{float(number.group()):g}', ranges)}"
-    return schema
+    if schema == {"type": "object"} and value is None:
+        # A table that no shipped file has.
+        return schema_of_table([(file.changed(place, {}), place, {})])
+    if schema.get("type") == "number":
+        return with_range(schema, file.fixed_range(place, ABSURD))
+    numbers = numbers_of(file, place, value) if isinstance(value, list) and schema.get("type") == "array" else None
+    return numbers or schema
 
 
 def schema_of_table(places):
     """The schema of a table that stands at these places: `(file, place, value)`."""
-    known, is_open, values = set(), False, {}
+    known, is_open, values = {}, False, {}
     for file, place, table in places:
         keys = keys_of(file, place)
         is_open |= keys is None
-        known.update(keys or [])
+        for key in keys or []:
+            known.setdefault(key, (file, [*place, key], None))
         for key, value in table.items():
             values.setdefault(key, []).append((file, [*place, key], value))
-    properties = {key: {} for key in known}
+    # Keys that no shipped file has.
+    properties = {key: schema_of_value(*found) for key, found in known.items() if key not in values}
     for key, found in values.items():
         properties[key] = schema_of(found)
     if is_open and all(isinstance(value, dict) for found in values.values() for _, _, value in found) and values:
@@ -152,6 +216,8 @@ def fits(schema, value):
     name = {bool: "boolean", int: "number", float: "number", str: "string", list: "array", dict: "object"}[type(value)]
     if name not in ([schema["type"]] if isinstance(schema["type"], str) else schema["type"]):
         return False
+    if name == "number":
+        return schema.get("minimum", value) <= value <= schema.get("maximum", value)
     if isinstance(value, list):
         return all(fits(schema.get("items", {}), item) for item in value)
     if isinstance(value, dict):
@@ -161,10 +227,30 @@ def fits(schema, value):
     return True
 
 
+def write_parts():
+    """Files of the kinds of which none is shipped, from parts of those that are."""
+    for path in (WORK / "experiments").glob("*.toml"):
+        table = tomllib.loads(path.read_text())
+        if "sensors" in table and "shift" in table:
+            path.with_name(f"sensors_of_{path.name}").write_text(f"sensors = {toml(table['sensors'])}\n")
+    for path in (WORK / "vehicles").glob("two_speed*.toml"):
+        parts = {key: of for key, of in tomllib.loads(path.read_text()).items() if isinstance(of, dict) and key != "gear_train"}
+        path.with_name(f"part_of_{path.name}").write_text("".join(f"{key} = {toml(of)}\n" for key, of in parts.items()))
+    # A car with a lock-up clutch, which stands in comments of the shipped file, and with bounds of one element.
+    car = (WORK / "vehicles" / "eight_speed.toml").read_text()
+    begin, end = car.index("# [lock_up]"), car.index("[hydraulics]")
+    lock_up = re.sub("(?m)^# ", "", car[begin:end])
+    more = "[clutch.A]\ndrag_n_m = 1.0\n[clutch.A.error_bounds]\nfriction_factor = [0.9, 1.1]\n"
+    (WORK / "vehicles" / "more_of_eight_speed.toml").write_text(f"{car[:begin]}{lock_up}{car[end:]}\n{more}")
+    learnt = {"gearbox": "8hp", "elements": ["A"], "shifts": 3, "refused": 0, "oil_temperature_degc": 80.0, "mean": [0.0], "covariance": [[1.0]]}
+    (WORK / "vehicles" / "learnt.toml").write_text("".join(f"{key} = {toml(of)}\n" for key, of in learnt.items()))
+
+
 def main():
     shutil.rmtree(WORK, ignore_errors=True)
     for folder in FOLDERS:
         shutil.copytree(ROOT / folder, WORK / folder)
+    write_parts()
     paths = [path for folder in FOLDERS for path in sorted((WORK / folder).glob("*.toml"))]
     files = {kind: [] for kind in KINDS}
     for path, found in zip(paths, check(*map(str, paths))):
