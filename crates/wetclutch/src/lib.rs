@@ -14,6 +14,7 @@ pub mod estimate;
 mod export;
 pub mod fitted;
 pub mod gains;
+mod memory_writer;
 mod score;
 pub mod simulate;
 pub mod studies;

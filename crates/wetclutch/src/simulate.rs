@@ -10,6 +10,7 @@ use plant::car::{
 };
 use trace::{Cell, ColumnKind, signal};
 
+use crate::memory_writer::MemoryWriter;
 use crate::{Error, Table};
 
 /// A simulated drive in memory.
@@ -43,7 +44,7 @@ pub fn simulate_until(car: &Car, drive: &Drive, is_interrupted: &dyn Fn(f64) -> 
         readings.push(car, row);
         if is_interrupted(row.sample.time_s) { Err(Error::interrupted()) } else { Ok(()) }
     })?;
-    Ok(Simulation { truth: truth.table, measured: readings.table, summary })
+    Ok(Simulation { truth: truth.writer.finish(), measured: readings.writer.finish(), summary })
 }
 
 /// The sensors of a drive with the time between two rows, s.
@@ -85,17 +86,17 @@ pub fn simulate_rows(
 /// Rows in memory.
 struct Rows {
     columns: Vec<DriveColumn>,
-    table: Table,
+    writer: MemoryWriter,
 }
 
 impl Rows {
     fn new(columns: Vec<DriveColumn>) -> Self {
-        let table = Table::with_columns(columns.iter().map(|column| (column.name.as_str(), column.kind())));
-        Self { columns, table }
+        let writer = MemoryWriter::new(columns.iter().map(|column| (column.name.as_str(), column.kind())));
+        Self { columns, writer }
     }
 
     fn push(&mut self, car: &Car, row: &MeasuredRow) {
-        self.table.push(row.sample.time_s, self.columns.iter().map(|column| column.cell(car, row)));
+        self.writer.push(row.sample.time_s, self.columns.iter().map(|column| column.cell(car, row)));
     }
 }
 

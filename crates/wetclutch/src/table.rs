@@ -3,7 +3,7 @@
 use std::io::Read as _;
 use std::sync::Arc;
 
-use trace::{Cell, ColumnKind, TableRows, Unit, signal};
+use trace::{Cell, TableRows, Unit};
 
 use crate::table_text::TableText;
 use crate::{Error, Words};
@@ -44,18 +44,6 @@ impl Column {
 }
 
 impl Table {
-    /// An empty table with the time and these columns.
-    pub(crate) fn with_columns<'a>(named: impl Iterator<Item = (&'a str, ColumnKind)>) -> Self {
-        let column = |(name, kind): (&str, ColumnKind)| Column {
-            name: name.to_owned(),
-            values: match kind {
-                ColumnKind::Word => Values::Words(Words::default()),
-                ColumnKind::Number | ColumnKind::Whole => Values::Numbers(Vec::new()),
-            },
-        };
-        Self { columns: std::iter::once((signal::TIME, ColumnKind::Number)).chain(named).map(column).collect() }
-    }
-
     /// A table of rows of named cells, which all have the same names.
     pub(crate) fn of_rows<'a>(rows: impl IntoIterator<Item = Vec<(String, Cell<'a>)>>) -> Self {
         let mut table = Self::default();
@@ -75,34 +63,6 @@ impl Table {
             table.columns.iter_mut().zip(row).for_each(|(column, (_, cell))| column.values.push(cell));
         }
         table
-    }
-
-    /// Makes room for rows that are known to come.
-    pub(crate) fn reserve(&mut self, rows: usize) {
-        self.columns.iter_mut().for_each(|column| match &mut column.values {
-            Values::Numbers(numbers) => numbers.reserve_exact(rows),
-            Values::Words(words) => words.codes.reserve(rows),
-        });
-    }
-
-    /// Appends a row.
-    pub(crate) fn push<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) {
-        let [time, columns @ ..] = self.columns.as_mut_slice() else { return };
-        time.values.push(Cell::Number(time_s));
-        let mut filled = 0;
-        for (column, cell) in columns.iter_mut().zip(cells) {
-            if matches!(cell, Cell::SameWords) {
-                break;
-            }
-            column.values.push(cell);
-            filled += 1;
-        }
-        columns[filled..].iter_mut().for_each(|column| column.values.push(Cell::SameWord));
-    }
-
-    /// Appends a row of numbers, and behind them the words of the row before.
-    pub(crate) fn push_numbers(&mut self, time_s: f64, numbers: &[f64]) {
-        self.push(time_s, numbers.iter().map(|number| Cell::Number(*number)).chain([Cell::SameWords]));
     }
 
     /// The table as CSV, in the form in which a command writes it.
@@ -185,36 +145,8 @@ impl Values {
             (Self::Numbers(numbers), Cell::Whole(number)) => numbers.push(number as f64),
             (Self::Numbers(numbers), _) => numbers.push(f64::NAN),
             (Self::Words(words), Cell::Word(word)) => words.push(word),
-            (Self::Words(words), Cell::SameWord | Cell::SameWords) => words.repeat(),
+            (Self::Words(words), Cell::SameWord | Cell::SameWords) => words.repeat(1),
             (Self::Words(words), Cell::Number(_) | Cell::Whole(_)) => words.push(""),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_of_the_row_before_are_repeated() {
-        let columns =
-            [("turbine_speed_rad_s", ColumnKind::Number), ("phase", ColumnKind::Word), ("health", ColumnKind::Word)];
-        let mut table = Table::with_columns(columns.into_iter());
-        table.push(0.0, [Cell::Number(1.0), Cell::Word("fill"), Cell::Word("good")]);
-        table.push(0.01, [Cell::Number(2.0), Cell::SameWords]);
-        table.push(0.02, [Cell::Number(3.0), Cell::Word("torque phase"), Cell::SameWord]);
-        table.push_numbers(0.03, &[4.0]);
-        table.push(0.04, [Cell::Number(f64::NAN), Cell::Word("fill"), Cell::SameWord]);
-        assert_eq!(table.len(), 5);
-        assert_eq!(table.numbers("time_s"), Some([0.0, 0.01, 0.02, 0.03, 0.04].as_slice()));
-        let phases = table.words("phase").unwrap();
-        assert_eq!(
-            (0..5).filter_map(|row| phases.get(row)).collect::<Vec<_>>(),
-            ["fill", "fill", "torque phase", "torque phase", "fill"]
-        );
-        assert_eq!(phases.words.len(), 2);
-        assert_eq!(table.words("health").unwrap().words, ["good"]);
-        assert_eq!(table.column("turbine_speed_rad_s").and_then(Column::unit), Some("rad/s"));
-        assert_eq!(table.column("phase").and_then(Column::unit), None);
     }
 }

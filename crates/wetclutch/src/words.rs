@@ -44,11 +44,13 @@ impl Words {
         self.codes.push(code);
     }
 
-    pub(crate) fn repeat(&mut self) {
-        match self.codes.last() {
-            Some(last) => self.codes.push(last),
-            None => self.push(""),
+    /// Repeats the last word; an empty one where there is none.
+    pub(crate) fn repeat(&mut self, times: usize) {
+        if times > 0 && self.codes.is_empty() {
+            self.push("");
+            return self.repeat(times - 1);
         }
+        self.codes.repeat(times);
     }
 }
 
@@ -97,6 +99,14 @@ impl Codes {
 
     fn last(&self) -> Option<usize> {
         self.get(self.len().checked_sub(1)?)
+    }
+
+    /// Repeats the last one.
+    fn repeat(&mut self, times: usize) {
+        match self {
+            Self::Bytes(codes) => codes.resize(codes.len() + times, codes.last().copied().unwrap_or(0)),
+            Self::Wide(codes) => codes.resize(codes.len() + times, codes.last().copied().unwrap_or(0)),
+        }
     }
 
     fn push(&mut self, code: usize) {

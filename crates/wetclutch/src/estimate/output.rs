@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use trace::{Cell, ColumnKind, CsvWriter, TableWriter};
 
+use crate::memory_writer::MemoryWriter;
 use crate::{Error, Table};
 
 /// Where estimates go.
@@ -29,7 +30,7 @@ impl<'p> Destination<'p> {
 pub(crate) enum Output {
     File(TableWriter, PathBuf),
     Standard(Box<CsvWriter<BufWriter<io::Stdout>>>),
-    Memory(Table),
+    Memory(Box<MemoryWriter>),
 }
 
 impl Output {
@@ -39,7 +40,7 @@ impl Output {
         named: impl Iterator<Item = (&'a str, ColumnKind)>,
     ) -> Result<Self, Error> {
         match destination {
-            Destination::Memory => Ok(Self::Memory(Table::with_columns(named))),
+            Destination::Memory => Ok(Self::Memory(Box::new(MemoryWriter::new(named)))),
             Destination::File(path) => {
                 let writer = TableWriter::create(path, named).map_err(|error| Error::writing(path, &error))?;
                 Ok(Self::File(writer, path.to_owned()))
@@ -53,8 +54,8 @@ impl Output {
 
     /// Makes room for as many rows as are known to come, where they stay in memory.
     pub(crate) fn reserve(&mut self, rows: usize) {
-        if let Self::Memory(table) = self {
-            table.reserve(rows);
+        if let Self::Memory(writer) = self {
+            writer.reserve(rows);
         }
     }
 
@@ -62,8 +63,8 @@ impl Output {
         match self {
             Self::File(writer, path) => writer.row(time_s, cells).map_err(|error| Error::writing(path, &error)),
             Self::Standard(writer) => Ok(writer.row(time_s, cells)?),
-            Self::Memory(table) => {
-                table.push(time_s, cells);
+            Self::Memory(writer) => {
+                writer.push(time_s, cells);
                 Ok(())
             }
         }
@@ -74,8 +75,8 @@ impl Output {
         match self {
             Self::File(writer, path) => writer.numbers(time_s, numbers).map_err(|error| Error::writing(path, &error)),
             Self::Standard(writer) => Ok(writer.numbers(time_s, numbers)?),
-            Self::Memory(table) => {
-                table.push_numbers(time_s, numbers);
+            Self::Memory(writer) => {
+                writer.push(time_s, numbers.iter().map(|number| Cell::Number(*number)).chain([Cell::SameWords]));
                 Ok(())
             }
         }
@@ -101,7 +102,7 @@ impl Output {
                 writer.finish()?.flush()?;
                 Ok(None)
             }
-            Self::Memory(table) => Ok(Some(table)),
+            Self::Memory(writer) => Ok(Some(writer.finish())),
         }
     }
 }

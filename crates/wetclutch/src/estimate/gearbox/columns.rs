@@ -2,8 +2,8 @@
 
 use car::columns::element_column;
 use car::{Car, Gear, ShiftCommand};
-use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate};
-use observer::{ChannelHealth, Channels};
+use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftPhase};
+use observer::{ChannelHealth, Channels, Health};
 use study::gearbox::channels::gear_number;
 use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
@@ -24,7 +24,25 @@ pub(crate) struct Row<'a> {
 /// What the columns of readings say of a row: of channels, of the commands of elements, and which of these are those of the shift.
 type Said = (Channels<ChannelHealth>, [ChannelHealth; MAX_ELEMENTS], Option<[ShiftElement; 2]>);
 
+/// What the other columns of words say of a row: gears, phase, clutches and health.
+type Named = (ShiftCommand, Option<ShiftCommand>, Option<ShiftPhase>, Option<[ShiftElement; 2]>, Health);
+
+/// Which words of a row are those of the row before.
+#[derive(Clone, Copy)]
+pub(crate) struct Same {
+    /// Those of the columns of readings.
+    pub(crate) readings: bool,
+    /// All others.
+    pub(crate) others: bool,
+}
+
 impl<'a> Row<'a> {
+    /// What its columns of words say but for those of readings: mostly the same as in the row before.
+    pub(crate) fn named(&self) -> Named {
+        let ShiftEstimate { gear, phase, clutches, health, .. } = &self.estimate;
+        (self.gears, *gear, *phase, clutches.map(|clutches| clutches.map(|clutch| clutch.element)), *health)
+    }
+
     /// What its columns of readings say, which is mostly the same as in the row before.
     pub(crate) fn said(&self) -> Said {
         let ShiftEstimate { channels, commands, clutches, .. } = &self.estimate;
@@ -165,6 +183,17 @@ pub(crate) struct Column {
     pub(crate) name: String,
     pub(crate) kind: ColumnKind,
     pub(crate) value: Value,
+}
+
+impl Column {
+    /// Its cell in a row.
+    pub(crate) fn cell<'a>(&self, row: &Row<'a>, same: Same) -> Cell<'a> {
+        match (self.kind, self.value) {
+            (ColumnKind::Word, Value::Reading(_) | Value::Command(_)) if same.readings => Cell::SameWord,
+            (ColumnKind::Word, Value::Of(_)) if same.others => Cell::SameWord,
+            (_, value) => value.cell(row),
+        }
+    }
 }
 
 /// What decides which columns a car has.

@@ -18,7 +18,7 @@ use trace::{Cell, ShownPath as _};
 
 use self::checks::{RowTimes, refused};
 pub use self::columns::is_car_column;
-use self::columns::{Knows, Row, before_readings, chosen, columns};
+use self::columns::{Knows, Row, Same, before_readings, chosen, columns};
 pub use self::learnt::LearntOfDrive;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
@@ -133,7 +133,7 @@ pub fn estimate(
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
     let columns = chosen(columns(&places, Knows::of(car)), &options.columns)?;
-    let (before_readings, mut said) = (before_readings(&columns), None);
+    let (before_readings, mut said, mut named_before) = (before_readings(&columns), None, None);
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(destination, named)?;
     table.reserve(log.known_rows(&options.shifts));
@@ -152,10 +152,13 @@ pub fn estimate(
         drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, shift.gears));
         let row = Row { car, places: &places, gears: step.input.gear, estimate, ranges_pa: drive.pressure_ranges_pa() };
         passing.push(step.time_s, row, |time_s, row| {
-            let is_same = said.replace(row.said()) == Some(row.said());
-            let new = if is_same { &columns[..before_readings] } else { &columns[..] };
-            let same = (new.len() < columns.len()).then_some(Cell::SameWords);
-            table.cells(time_s, new.iter().map(|column| column.value.cell(row)).chain(same))
+            let same = Same {
+                readings: said.replace(row.said()) == Some(row.said()),
+                others: named_before.replace(row.named()) == Some(row.named()),
+            };
+            let new = if same.readings { &columns[..before_readings] } else { &columns[..] };
+            let rest = (new.len() < columns.len()).then_some(Cell::SameWords);
+            table.cells(time_s, new.iter().map(|column| column.cell(row, same)).chain(rest))
         })?;
         if options.is_followed() {
             table.flush()?;
