@@ -306,6 +306,8 @@ fn the_shipped_vehicle_files_are_right() {
         ("four_speed", 5),
         ("four_speed_one_way", 5),
         ("three_speed_c6", 4),
+        ("three_speed_th400", 4),
+        ("four_speed_4l60e", 5),
         ("five_speed_722_6", 6),
         ("four_speed_fn4a", 5),
         ("four_speed_simpson", 6),

@@ -237,7 +237,10 @@ fn c6() -> Gearbox {
     gearbox!("../../../gearboxes/c6.toml")
 }
 fn th400() -> Gearbox {
-    gearbox!("gearboxes/th400.toml")
+    gearbox!("../../../gearboxes/th400.toml")
+}
+fn gm_4l60e() -> Gearbox {
+    gearbox!("../../../gearboxes/4l60e.toml")
 }
 
 #[test]
@@ -275,6 +278,45 @@ fn simpson_three_speeds_have_the_published_ratios_and_one_way_clutches_take_sing
             assert_eq!(gearbox.shift(pair[1], pair[0]).unwrap().change.single(), Some([element(on), element(off)]));
         }
     }
+}
+
+#[test]
+fn the_4l60e_has_the_published_ratios_and_its_sprag_carries_the_torque_of_the_forward_clutch() {
+    let gearbox = gm_4l60e();
+    assert_ratios(&gearbox, "R 1 2 3 4", "-2.294 3.059 1.625 1.000 0.696", Printed::Rounded);
+    // Sun and ring of the input set share the turbine torque in 3rd by their teeth, 34 and 70.
+    assert_torques(
+        &gearbox,
+        &[
+            "REV 1.000 LR -3.294 F2 0.000",
+            "FWD 1.000 F2 1.000 F1 2.059",
+            "FWD 1.000 F2 1.000 24 0.625",
+            "FWD 0.327 F2 0.327 34 0.673",
+            "FWD 0.000 34 1.000 24 -0.304",
+        ],
+    );
+}
+
+#[test]
+fn an_element_is_one_sided_where_a_one_way_clutch_that_is_held_holds_its_gear_too() {
+    let one_sided = |gearbox: &Gearbox, from: &str, to: &str| {
+        let shift = gearbox.shift(gearbox.gear(from).unwrap(), gearbox.gear(to).unwrap()).unwrap();
+        shift.change.single().unwrap().map(|element| shift.is_one_sided(gearbox, element))
+    };
+    // The sprag is held from 1st to 2nd, opens from 2nd to 3rd, and carries nothing in L and R.
+    let th400 = th400();
+    assert_eq!(one_sided(&th400, "1", "2"), [false, true]);
+    assert_eq!(one_sided(&th400, "2", "1"), [true, false]);
+    assert_eq!(one_sided(&th400, "2", "3"), [false, false]);
+    assert_eq!(one_sided(&th400, "L", "2"), [false, true]);
+    assert_eq!(one_sided(&th400, "R", "1"), [false, false]);
+    let gearbox = gm_4l60e();
+    assert_eq!(one_sided(&gearbox, "1", "2"), [true, true]);
+    assert_eq!(one_sided(&gearbox, "3", "2"), [true, true]);
+    assert_eq!(one_sided(&gearbox, "3", "4"), [false, false]);
+    let ravigneaux = gearbox!("../../../gearboxes/ravigneaux_4_one_way.toml");
+    assert_eq!(one_sided(&ravigneaux, "1", "2"), [false, false]);
+    assert_eq!(one_sided(&ravigneaux, "R", "1"), [false, false]);
 }
 
 #[test]

@@ -70,11 +70,14 @@ layout! {
 /// Words of an element of a shift that is no clutch or brake with a place in the tables.
 const ONE_WAY: u32 = u32::MAX;
 const UNKNOWN: u32 = u32::MAX - 1;
+/// Added to the place of one whose gear a one-way clutch holds too.
+const ONE_SIDED: u32 = 1 << 31;
 
 impl Layout for ShiftElement {
     fn put(&self, name: &'static str, sink: &mut impl Sink) {
         let word = match *self {
             Self::Friction(place) => u32::from(place),
+            Self::OneSided(place) => ONE_SIDED + u32::from(place),
             Self::OneWay => ONE_WAY,
             Self::Unknown => UNKNOWN,
         };
@@ -84,6 +87,7 @@ impl Layout for ShiftElement {
     fn take(words: &mut Words<'_>) -> Option<Self> {
         Some(match words.whole()? {
             ONE_WAY => Self::OneWay,
+            word if word >= ONE_SIDED => Self::one_sided((word - ONE_SIDED) as usize),
             place => Self::at(place as usize),
         })
     }

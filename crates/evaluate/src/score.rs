@@ -2,7 +2,7 @@
 
 use car::{Car, ErrorBudget, Sensors};
 use drivetrain::Real;
-use observer::gearbox::{GearboxFilter, GearboxState, ShiftElement, ShiftEstimate, ShiftInput};
+use observer::gearbox::{GearboxFilter, GearboxState, ShiftEstimate, ShiftInput};
 use observer::{Health, ShiftTables, gearbox_filter};
 use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_shift};
 
@@ -272,7 +272,7 @@ pub fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstima
     let alphas = tables.tables().shift(under_way.from, under_way.to).map(|row| row.clutches.map(|clutch| clutch.alpha));
     let of = |c: usize| {
         let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
-        (found.element == tables.place(truth.element).map_or(ShiftElement::OneWay, ShiftElement::at)).then(|| {
+        (found.element.place() == tables.place(truth.element)).then(|| {
             ClutchRow {
                 // A valve model knows no direction: it is told the true one. Else noise of a slip that is not yet seen would be its error.
                 torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m.abs().copysign(truth.torque_n_m)],

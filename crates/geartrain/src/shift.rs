@@ -3,7 +3,8 @@
 use drivetrain::{ReducedShift, ShiftKind};
 
 use crate::description::ElementKind;
-use crate::gearbox::{Gear, GearboxElement};
+use crate::gearbox::{Gear, Gearbox, GearboxElement, Holding};
+use crate::train::ZERO;
 
 /// A change of gear.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +56,20 @@ impl Shift {
     /// Power-on or power-off, up or down, at this turbine torque.
     pub fn kind(&self, gears: &[Gear], turbine_n_m: f64) -> Option<ShiftKind> {
         ShiftKind::of(turbine_n_m, gears[self.from].ratio, gears[self.to].ratio)
+    }
+
+    /// Whether an element that changes holds the turbine in one direction alone: a one-way clutch that is engaged in both gears, as the sprag
+    /// behind a brake, holds the gear of this element too. While it overruns, this element carries nothing.
+    pub fn is_one_sided(&self, gearbox: &Gearbox, element: usize) -> bool {
+        let Change::Single { offgoing, oncoming, held } = &self.change else { return false };
+        let gear = match element {
+            _ if element == *offgoing => self.from,
+            _ if element == *oncoming => self.to,
+            _ => return false,
+        };
+        let holds =
+            |of: &Holding| held.contains(&of.element) && gearbox.is_one_way(of.element) && of.per_turbine_torque > ZERO;
+        gearbox.gears.get(gear).is_some_and(|gear| gear.holding.iter().any(holds))
     }
 }
 

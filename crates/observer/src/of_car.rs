@@ -74,7 +74,8 @@ impl ShiftTables<f64> {
         let shift_rows = gearbox.shifts.iter().filter_map(|shift| {
             let of = |element: usize| match places[element] {
                 None => gearbox.is_one_way(element).then_some(ShiftElement::OneWay),
-                place => place.map(ShiftElement::at),
+                Some(place) if shift.is_one_sided(gearbox, element) => Some(ShiftElement::one_sided(place)),
+                Some(place) => Some(ShiftElement::at(place)),
             };
             let clutches = match &shift.change {
                 Change::Single { offgoing, oncoming, .. } => [of(*offgoing)?, of(*oncoming)?],

@@ -18,7 +18,7 @@ const LEVELS: &str = "the levels are \"stick-diagram\" (shafts, sets, elements),
                       \"ratios\" (ratios alone)";
 
 /// The gearbox files of the program, each by its name, for the gasoline engine of `vehicles/eight_speed.toml`.
-pub const SHIPPED: [(&str, &str); 13] = [
+pub const SHIPPED: [(&str, &str); 15] = [
     ("8hp", include_str!("../../../../gearboxes/8hp.toml")),
     ("10_speed", include_str!("../../../../gearboxes/10_speed.toml")),
     ("dual_clutch_7", include_str!("../../../../gearboxes/dual_clutch_7.toml")),
@@ -30,6 +30,8 @@ pub const SHIPPED: [(&str, &str); 13] = [
     ("a340e", include_str!("../../../../gearboxes/a340e.toml")),
     ("a8lr1", include_str!("../../../../gearboxes/a8lr1.toml")),
     ("fn4a", include_str!("../../../../gearboxes/fn4a.toml")),
+    ("th400", include_str!("../../../../gearboxes/th400.toml")),
+    ("4l60e", include_str!("../../../../gearboxes/4l60e.toml")),
     ("c6", include_str!("../../../../gearboxes/c6.toml")),
     ("tf80sc", include_str!("../../../../gearboxes/tf80sc.toml")),
 ];

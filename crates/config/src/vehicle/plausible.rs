@@ -5,7 +5,7 @@
 use car::ShiftClutch;
 use drivetrain::road::GRAVITY_M_S2;
 use drivetrain::{ClutchValve, Converter, Driveline, Engine, RoadLoad, Tyre};
-use geartrain::{Change, Finding, Shift};
+use geartrain::Finding;
 
 use super::{CarFile, VehicleFile};
 
@@ -102,37 +102,8 @@ impl CarFile {
         .implausible()
         .into_iter()
         .chain(self.slipping_elements())
-        .chain(self.held_one_way_clutches())
         .chain(self.gearbox.warnings.iter().map(of_gearbox))
         .collect()
-    }
-}
-
-impl CarFile {
-    /// The shifts through which a one-way clutch is held that holds one of their gears, as a sprag in series with a brake: it overruns when
-    /// the car coasts, which neither the simulated controller nor the filter expects.
-    fn held_one_way_clutches(&self) -> Option<String> {
-        let gearbox = &self.gearbox;
-        let holds = |gear: usize, element: usize| {
-            gearbox.gears[gear].holding.iter().any(|of| of.element == element && of.per_turbine_torque > 0.0)
-        };
-        let overruns = |shift: &&Shift| match &shift.change {
-            Change::Single { held, .. } => held.iter().any(|&element| {
-                gearbox.is_one_way(element) && (holds(shift.from, element) || holds(shift.to, element))
-            }),
-            _ => false,
-        };
-        let name = |gear: usize| gearbox.gears[gear].name.as_str();
-        let shifts = gearbox.shifts.iter().filter(overruns);
-        let names: Vec<String> = shifts.map(|shift| format!("{}-{}", name(shift.from), name(shift.to))).collect();
-        (!names.is_empty()).then(|| {
-            format!(
-                "a one-way clutch is held through shifts of which it holds a gear: {}. While the car coasts it overruns: then the simulated shift does \
-                 not end, and the guaranteed ranges do not hold\nhint: with power these shifts are simulated and estimated as others; put a brake or \
-                 clutch in its place in the gears of the gearbox file for shifts without power",
-                names.join(", ")
-            )
-        })
     }
 }
 
@@ -323,18 +294,6 @@ mod tests {
             let said = VehicleFile::from_source(Source::built_in("x.toml", &text)).unwrap().implausible();
             assert_eq!(said, Vec::<String>::new(), "{mass_kg} kg");
         }
-    }
-
-    #[test]
-    fn a_sprag_in_series_with_a_brake_is_said_with_the_shifts_in_which_it_overruns() {
-        let car = |gearbox: &str| {
-            let source = Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
-            CarFile::from_sources(source, Source::built_in("g.toml", gearbox)).unwrap().implausible()
-        };
-        let said = car(include_str!("../../tests/gearboxes/th400.toml"));
-        assert_eq!(said.len(), 1, "{said:?}");
-        assert!(said[0].contains("of which it holds a gear: 1-2, L-2, 2-1, 2-L. While"), "{}", said[0]);
-        assert_eq!(car(include_str!("../../../../gearboxes/ravigneaux_4_one_way.toml")), Vec::<String>::new());
     }
 
     #[test]

@@ -67,8 +67,9 @@ impl<'c> GearSpeeds<'c> {
         let is_rightly_slow =
             matches!(health, Health::TooSlow | Health::ClutchOpen) && turbine / ratio <= RATIO_FROM_RAD_S;
         let moves = is_at_speed || output > MOVES_RAD_S && turbine > RATIO_FROM_RAD_S;
-        // Where one of both is lost, the other shows no ratio.
-        let is_compared = is_at_speed && !(turbine - ratio * output).is_nan();
+        // Where one of both is lost, the other shows no ratio; behind a one-way clutch that overruns the turbine turns freely.
+        let is_tied = health != Health::OneWayOverruns && !(turbine - ratio * output).is_nan();
+        let is_compared = is_at_speed && is_tied;
         Some(RowInGear { gear, ratio, moves: moves && !is_rightly_slow, is_compared })
     }
 }

@@ -96,7 +96,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let in_gear = self.slip_in_gear(gear, speeds).is_some_and(|slip| !slip.is_over() || slip.value < T::zero())
             && self.tables.is_one_way(gear.to);
         let coasts = running.phase.phase == ShiftPhase::BothSlip && running.slow_n_m <= T::zero();
-        in_gear || coasts && running.shift.is_some_and(|shift| shift.clutches.iter().any(ShiftClutch::is_one_way))
+        in_gear || coasts && running.shift.is_some_and(|shift| shift.clutches.iter().any(ShiftClutch::may_overrun))
     }
 
     /// Whether the newest reading of the output speed is too slow to be used.
@@ -146,7 +146,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         // Behind a one-way clutch that overruns the turbine turns freely.
         let is_free = |shift: &ShiftRow<T>| {
             let [off, _] = &shift.clutches;
-            off.is_one_way() && self.slip(off.ratio, [turbine, output]).value < T::zero()
+            off.may_overrun() && self.slip(off.ratio, [turbine, output]).value < T::zero()
         };
         let held = held.or(shift.as_ref().filter(|shift| is_free(shift)).map(|_| (T::zero(), ShiftPhase::BothSlip)));
         let Some((ratio, phase)) = held else { return (None, known && gear.is_steady()) };

@@ -347,6 +347,10 @@ impl<T: Real> ElementState<T> {
         [slip_rad_s, direction]: [T; 2],
         wrong: &PressureError<T>,
     ) -> ClutchTorque<T> {
+        if shift.element.is_one_sided() && direction <= T::zero() {
+            // The one-way clutch of its gear overruns.
+            return ClutchTorque { ratio: shift.ratio, ..ClutchTorque::none() };
+        }
         let (clutch, u) = (&element.clutch, &element.uncertainty);
         let slip = shift.alpha * slip_rad_s;
         let size = shift.alpha.abs() * direction;

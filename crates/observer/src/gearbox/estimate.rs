@@ -363,10 +363,14 @@ impl<T: Real> GearboxFilter<'_, T> {
         (clutch, is_tied): (&ShiftClutch<T>, bool),
         newest: &[Option<Newest<T>>; SPEEDS],
     ) -> ClutchEstimate<T> {
-        let slip = self.bounded_slip(clutch.ratio, newest).filter(|_| is_tied).map(|[slip, error]| {
-            let (middle, half) = (clutch.alpha * slip, clutch.alpha.abs() * error);
-            [middle - half, middle + half]
-        });
+        // Behind a one-way clutch that overruns an element has another slip.
+        let is_tied = |slip: T, error: T| is_tied && (!clutch.element.is_one_sided() || slip > error);
+        let slip = self.bounded_slip(clutch.ratio, newest).filter(|[slip, error]| is_tied(*slip, *error)).map(
+            |[slip, error]| {
+                let (middle, half) = (clutch.alpha * slip, clutch.alpha.abs() * error);
+                [middle - half, middle + half]
+            },
+        );
         let element = self.element(elements, clutch.element);
         let ranges = element.and_then(|(memory, element)| memory.ranges(element, slip));
         if let Some((pressure, torque)) = ranges {

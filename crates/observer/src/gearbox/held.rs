@@ -10,6 +10,8 @@
 //!
 //! It holds where the upper bound of this torque is below the lower bound of its capacity. The inertia of shafts inside the gearbox is left out.
 //! An element whose command was never read is taken to hold.
+//!
+//! A one-way clutch that is engaged in both gears holds while `L > 0`, and overruns where the lower bound of `L` is not.
 
 use car::ShiftCommand;
 use drivetrain::Real;
@@ -29,7 +31,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let may_slip = match self.tables.commanded(command) {
             None => false,
             Some(_) if state.held_may_slip || state.slips => true,
-            Some(shift) => !self.all_hold(state, shift, torque),
+            Some(shift) => self.held_may_overrun(state, shift, torque) || !self.all_hold(state, shift, torque),
         };
         state.held_may_slip = may_slip;
     }
@@ -55,10 +57,7 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// Upper bounds of the torque of both clutches together, and of the smaller one of both, at the turbine, N m.
     fn loads(&self, state: &GearboxState<T>, shift: &ShiftRow<T>, torque: Option<&Found<T>>) -> [T; 2] {
-        let [turbine, output] = [&state.newest[TURBINE], &state.newest[OUTPUT]]
-            .map(|newest| newest.and_then(|newest| newest.rate()).map_or(T::zero(), |(rate, _)| rate));
-        let [by_turbine, by_output] = shift.mass_kg_m2[0];
-        let inertia_n_m = by_turbine * turbine + by_output * output;
+        let inertia_n_m = Self::inertia_n_m(state, shift);
         let turbine_n_m = torque.map_or(T::zero(), |found| {
             found.turbine_n_m.abs() * (T::one() + T::of(BOUND) * found.fraction) + T::of(NOISE) * found.noise.sqrt()
         });
@@ -69,5 +68,23 @@ impl<T: Real> GearboxFilter<'_, T> {
             ranges.map_or(T::zero(), |(_, [_, torque_max_n_m])| clutch.alpha.abs() * torque_max_n_m)
         });
         [turbine_n_m + inertia_n_m.abs(), off.at_most(on)]
+    }
+
+    /// Whether a one-way clutch that is engaged in both gears may overrun.
+    fn held_may_overrun(&self, state: &GearboxState<T>, shift: &ShiftRow<T>, torque: Option<&Found<T>>) -> bool {
+        let is_held = shift.clutches.iter().any(|clutch| clutch.element.is_one_sided());
+        let load_min_n_m = |found: &Found<T>| {
+            let error_n_m = found.turbine_n_m.abs() * T::of(BOUND) * found.fraction + T::of(NOISE) * found.noise.sqrt();
+            found.turbine_n_m - error_n_m - Self::inertia_n_m(state, shift)
+        };
+        is_held && torque.is_none_or(|found| load_min_n_m(found) <= T::zero())
+    }
+
+    /// Torque of the turbine's inertia by the newest readings, N m.
+    fn inertia_n_m(state: &GearboxState<T>, shift: &ShiftRow<T>) -> T {
+        let [turbine, output] = [&state.newest[TURBINE], &state.newest[OUTPUT]]
+            .map(|newest| newest.and_then(|newest| newest.rate()).map_or(T::zero(), |(rate, _)| rate));
+        let [by_turbine, by_output] = shift.mass_kg_m2[0];
+        by_turbine * turbine + by_output * output
     }
 }

@@ -181,6 +181,9 @@ impl<T: Real> GearboxFilter<'_, T> {
                 let holds_n_m = if needed_n_m * clutch.alpha > T::zero() { T::infinity() } else { T::zero() };
                 return Contact { slip, needed_n_m, holds_n_m };
             }
+            if clutch.element.is_one_sided() && needed_n_m < T::zero() {
+                return Contact { slip, needed_n_m, holds_n_m: T::zero() };
+            }
             let (factor, wrong) = (running.x.mean[FRICTION[c.min(1)]], running.x.pressure_error(c));
             let holds_n_m = self
                 .element(elements, clutch.element)

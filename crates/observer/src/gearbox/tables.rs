@@ -93,6 +93,9 @@ pub struct GearRow<T> {
 pub enum ShiftElement {
     /// A clutch or brake, by its place in [`GearboxTables::elements`].
     Friction(u8),
+    /// The same where a one-way clutch holds its gear too, as a sprag behind it: it holds the turbine in one direction alone, and carries nothing
+    /// while the one-way clutch overruns.
+    OneSided(u8),
     /// A one-way clutch, which has no pressure and is in no table.
     OneWay,
     /// Of the gearbox the ratios alone are known.
@@ -106,11 +109,19 @@ impl ShiftElement {
         if place < MAX_ELEMENTS { Self::Friction(place as u8) } else { Self::Unknown }
     }
 
+    /// The same of one that holds the turbine in one direction alone.
+    pub const fn one_sided(place: usize) -> Self {
+        match Self::at(place) {
+            Self::Friction(place) => Self::OneSided(place),
+            other => other,
+        }
+    }
+
     /// The place of a clutch or brake in [`GearboxTables::elements`].
     #[inline]
     pub const fn place(self) -> Option<usize> {
         match self {
-            Self::Friction(place) => Some(place as usize),
+            Self::Friction(place) | Self::OneSided(place) => Some(place as usize),
             Self::OneWay | Self::Unknown => None,
         }
     }
@@ -119,6 +130,12 @@ impl ShiftElement {
     #[inline]
     pub const fn is_one_way(self) -> bool {
         matches!(self, Self::OneWay)
+    }
+
+    /// Whether it is a clutch or brake whose gear a one-way clutch holds too.
+    #[inline]
+    pub const fn is_one_sided(self) -> bool {
+        matches!(self, Self::OneSided(_))
     }
 }
 
@@ -138,6 +155,11 @@ impl<T> ShiftClutch<T> {
     /// Whether it is a one-way clutch: it holds any torque in one direction, and carries none while it overruns.
     pub fn is_one_way(&self) -> bool {
         self.element.is_one_way()
+    }
+
+    /// Whether a one-way clutch holds its gear, itself or beside it: the turbine may turn slower than in the gear.
+    pub fn may_overrun(&self) -> bool {
+        self.element.is_one_way() || self.element.is_one_sided()
     }
 }
 
@@ -276,7 +298,7 @@ impl<'a, T: Real> GearboxTables<'a, T> {
         let holds = |gear| {
             self.shifts.iter().any(|row| {
                 let [off, on] = &row.clutches;
-                (row.from == gear && off.is_one_way()) || (row.to == gear && on.is_one_way())
+                (row.from == gear && off.may_overrun()) || (row.to == gear && on.may_overrun())
             })
         };
         gear.place().is_some_and(holds)
@@ -310,6 +332,7 @@ mod tests {
         assert_eq!(ShiftElement::at(MAX_ELEMENTS - 1).place(), Some(MAX_ELEMENTS - 1));
         assert_eq!([MAX_ELEMENTS, 256, usize::MAX].map(ShiftElement::at), [ShiftElement::Unknown; 3]);
         assert_eq!([ShiftElement::OneWay, ShiftElement::Unknown].map(ShiftElement::place), [None; 2]);
+        assert_eq!([3, MAX_ELEMENTS].map(|place| ShiftElement::one_sided(place).place()), [Some(3), None]);
         // As small as the number of a place: the tables have two for each shift.
         assert!(size_of::<ShiftClutch<f32>>() <= 12);
     }

@@ -105,6 +105,8 @@ pub struct BeyondGears {
     ratios: [f64; 2],
     /// Whether a one-way clutch is to catch the turbine. It may fall before, and cannot go beyond.
     catches: bool,
+    /// Whether a one-way clutch that is held lets the turbine turn slower than in the gear before and after.
+    is_one_sided: [bool; 2],
     /// Whether the turbine has been on the side of the old gear. Behind a one-way clutch that overruns it may begin on the other.
     was_before: bool,
 }
@@ -114,7 +116,11 @@ impl BeyondGears {
     pub fn new(car: &Car, shift: ShiftCommand, ratios: [f64; 2]) -> Self {
         let single = car.single_shift(shift);
         let [overruns, catches] = single.map_or([false; 2], |elements| elements.map(|at| car.gearbox.is_one_way(at)));
-        Self { ratios, catches, was_before: !overruns }
+        let found = shift.from.place().zip(shift.to.place()).and_then(|(from, to)| car.gearbox.shift(from, to));
+        let is_one_sided = single
+            .zip(found)
+            .map_or([false; 2], |(elements, shift)| elements.map(|element| shift.is_one_sided(&car.gearbox, element)));
+        Self { ratios, catches, is_one_sided, was_before: !(overruns || is_one_sided[0]) }
     }
 
     /// Takes the speeds of turbine and output, rad/s.
@@ -123,7 +129,11 @@ impl BeyondGears {
             return;
         }
         let direction = (self.ratios[0] - self.ratios[1]).signum();
-        let [old, new] = self.ratios.map(|ratio| direction * (turbine - ratio * output));
+        let slip = |gear: usize| {
+            let slip = turbine - self.ratios[gear] * output;
+            direction * if self.is_one_sided[gear] { slip.max(0.0) } else { slip }
+        };
+        let [old, new] = [slip(0), slip(1)];
         quality.flare_rad_s = quality.flare_rad_s.max(old);
         self.was_before |= new > 0.0;
         if self.was_before {
@@ -157,7 +167,8 @@ impl CarShiftRating {
             ([r.ratio_offgoing(), r.ratio_oncoming()], [r.slip_offgoing[0], r.slip_oncoming[0]])
         });
         let held = match found.map(|shift| &shift.change) {
-            Some(Change::Single { held, .. }) => held.clone(),
+            // A one-way clutch overruns.
+            Some(Change::Single { held, .. }) => held.iter().copied().filter(|&at| !gearbox.is_one_way(at)).collect(),
             _ => Vec::new(),
         };
         Self {

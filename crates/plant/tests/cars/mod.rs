@@ -23,6 +23,7 @@ mod energy;
 mod garage;
 mod one_way;
 mod sequences;
+mod series;
 mod shifts;
 mod two_speed;
 

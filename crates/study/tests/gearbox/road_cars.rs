@@ -12,9 +12,11 @@ use study::gearbox::recording::Recording;
 use super::cars::sensors;
 
 /// The vehicle files with a gearbox that is on the road, but for those that other tests drive.
-const CARS: [&str; 8] = [
+const CARS: [&str; 10] = [
     "five_speed_722_6",
     "three_speed_c6",
+    "three_speed_th400",
+    "four_speed_4l60e",
     "eight_speed_8hp45",
     "eight_speed_a8lr1",
     "four_speed_fn4a",

@@ -29,7 +29,7 @@ use std::collections::VecDeque;
 
 use car::{Car, ShiftClutch};
 use drivetrain::ReducedShift;
-use geartrain::{Change, ElementKind};
+use geartrain::{Change, ElementKind, Shift};
 
 use super::integrate::CarError;
 use crate::gear_train::MAX_ELEMENTS;
@@ -47,7 +47,7 @@ use track::Track;
 
 /// Offgoing and oncoming clutch of a shift, with their places among the elements, and the reduced shift. One of them may be a
 /// one-way clutch, which has no valve.
-type Single<'c> = ([(usize, Option<ShiftClutch>); 2], &'c ReducedShift<f64>);
+type Single<'c> = ([(usize, Option<ShiftClutch>); 2], &'c Shift, &'c ReducedShift<f64>);
 
 /// Speed of the gearbox output below which a gear of the other direction may be engaged, rad/s \[chosen\].
 const AT_REST_RAD_S: f64 = 10.0;
@@ -284,7 +284,7 @@ impl CarShiftController {
             (clutch.is_some() || self.car.gearbox.is_one_way(element)).then_some((element, clutch))
         };
         let clutches = [clutch(*offgoing)?, clutch(*oncoming)?];
-        clutches.iter().any(|(_, clutch)| clutch.is_some()).then_some((clutches, reduced))
+        clutches.iter().any(|(_, clutch)| clutch.is_some()).then_some((clutches, shift, reduced))
     }
 
     /// The gears to go through, each one further on than the one before, by the fewest shifts between two clutches.
@@ -340,10 +340,13 @@ impl CarShiftController {
 
     /// A shift between two clutches.
     fn leg(&self, from: usize, to: usize, time_s: f64) -> Option<ActiveShift> {
-        let ([(offgoing, off), (oncoming, on)], reduced) = self.single(from, to)?;
+        let ([(offgoing, off), (oncoming, on)], shift, reduced) = self.single(from, to)?;
         let line_pa = self.car.line_pressure_pa;
-        let offgoing = Controlled::new(offgoing, off, reduced.slip_offgoing, line_pa);
+        let is_one_sided = |element: usize| shift.is_one_sided(&self.car.gearbox, element);
+        let off = Controlled::new(offgoing, off, reduced.slip_offgoing, line_pa);
         let on = Controlled::new(oncoming, on, reduced.slip_oncoming, 0.0);
+        let offgoing = off.one_sided(is_one_sided(offgoing));
+        let on = on.one_sided(is_one_sided(oncoming));
         let oncoming = on.filled_from(self.strokes.of(oncoming), &self.calibration);
         let shift = ActiveShift::new(to, [offgoing, oncoming], reduced.mass_kg_m2, line_pa, time_s);
         let (car, road) = (&self.car, &self.car.road);
@@ -408,7 +411,7 @@ impl CarShiftController {
         let mut dogs = [false; MAX_ELEMENTS];
         let line_pa = self.car.line_pressure_pa;
         let partner = self.partner(self.gear).filter(|_| self.is_neutral);
-        let opened = partner.and_then(|partner| self.single(self.gear, partner)).map(|(clutches, _)| clutches[0].0);
+        let opened = partner.and_then(|partner| self.single(self.gear, partner)).map(|(clutches, ..)| clutches[0].0);
         // The clutches of a shift get their commands from it.
         let next = self.active.as_ref().map_or(self.preselected, |shift| Some(shift.to));
         for gear in [Some(self.gear), next].into_iter().flatten() {

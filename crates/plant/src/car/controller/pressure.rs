@@ -13,6 +13,8 @@ pub(super) struct Controlled {
     pub(super) element: usize,
     /// `None` for a one-way clutch.
     clutch: Option<ShiftClutch>,
+    /// Whether a one-way clutch that is held through the shift holds its gear too: it holds the turbine in one direction alone.
+    is_one_sided: bool,
     /// Its slip per turbine speed.
     alpha: f64,
     /// Turbine speed over output speed while it sticks.
@@ -26,12 +28,22 @@ pub(super) struct Controlled {
 impl Controlled {
     pub(super) fn new(element: usize, clutch: Option<ShiftClutch>, slip_row: [f64; 2], modelled_pa: f64) -> Self {
         let [alpha, per_output] = slip_row;
-        Self { element, clutch, alpha, ratio: -per_output / alpha, modelled_pa, fill: None }
+        Self { element, clutch, is_one_sided: false, alpha, ratio: -per_output / alpha, modelled_pa, fill: None }
+    }
+
+    /// The same where a one-way clutch holds its gear too, or not.
+    pub(super) fn one_sided(self, is_one_sided: bool) -> Self {
+        Self { is_one_sided, ..self }
     }
 
     /// Whether it holds by itself, in one direction.
     pub(super) fn is_one_way(&self) -> bool {
         self.clutch.is_none()
+    }
+
+    /// Whether a one-way clutch lets the turbine turn slower than in its gear, itself or beside it.
+    pub(super) fn may_overrun(&self) -> bool {
+        self.is_one_way() || self.is_one_sided
     }
 
     /// The same, filled from this state of its piston. The plates touch gently: a clutch that counts much at the turbine has

@@ -13,6 +13,9 @@ use super::{CarCalibration, CarMeasured};
 /// Fraction of the fill after which the oncoming clutch is at its waiting pressure.
 const FILLED_AT: f64 = 0.75;
 
+/// A clutch that slips so long at line pressure is left at it, s \[chosen\]: nothing more can be commanded.
+const GIVEN_UP_S: f64 = 3.0;
+
 /// Ratios closer than this are one.
 const SAME_RATIO: f64 = 1e-6;
 
@@ -258,12 +261,13 @@ impl ActiveShift {
         self.locked_since_s =
             if now.z.abs() < c.lock_slip_rad_s { self.locked_since_s.or(Some(now.time_s)) } else { None };
         let holds = self.locked_since_s.is_some_and(|since_s| passed(since_s, c.lock_hold_s));
+        let is_filled = passed(self.since_s, self.fill_s(c));
         let next = match self.stage {
-            ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) && self.is_free(c, now) => {
-                ShiftStage::InertiaPhase
-            }
+            ShiftStage::Fill if is_filled && self.overruns(c, now) => ShiftStage::Lock,
+            ShiftStage::InertiaPhase if self.overruns(c, now) => ShiftStage::Lock,
+            ShiftStage::Fill if is_filled && self.is_free(c, now) => ShiftStage::InertiaPhase,
             ShiftStage::Fill => match self.order(now.turbine_n_m) {
-                PhaseOrder::TorqueFirst if passed(self.since_s, self.fill_s(c)) => ShiftStage::TorquePhase,
+                PhaseOrder::TorqueFirst if is_filled => ShiftStage::TorquePhase,
                 PhaseOrder::InertiaFirst if passed(self.since_s, self.lowering_s(c)) => ShiftStage::InertiaPhase,
                 _ => ShiftStage::Fill,
             },
@@ -289,9 +293,10 @@ impl ActiveShift {
                 _ => ShiftStage::InertiaPhase,
             },
             ShiftStage::HandOver if passed(self.since_s, c.hand_over_s) => ShiftStage::Lock,
-            ShiftStage::Lock if (holds || self.oncoming.is_one_way()) && passed(self.since_s, c.lock_ramp_s) => {
+            ShiftStage::Lock if (holds || self.is_caught_later(now)) && passed(self.since_s, c.lock_ramp_s) => {
                 ShiftStage::Done
             }
+            ShiftStage::Lock if passed(self.since_s, GIVEN_UP_S) => ShiftStage::Done,
             same => same,
         };
         if next == self.stage {
@@ -315,7 +320,17 @@ impl ActiveShift {
 
     /// Whether the old gear holds the turbine no longer: it is neutral, or its one-way clutch overruns.
     fn is_free(&self, c: &CarCalibration, now: &Now) -> bool {
-        self.is_from_neutral || (self.offgoing.is_one_way() && now.y < -c.release_slip_rad_s)
+        self.is_from_neutral || (self.offgoing.may_overrun() && now.y < -c.release_slip_rad_s)
+    }
+
+    /// Whether the one-way clutches of both gears let the turbine turn slower, so that neither gear brings it up: there is nothing to control.
+    fn overruns(&self, c: &CarCalibration, now: &Now) -> bool {
+        !self.is_from_neutral && self.is_free(c, now) && self.oncoming.may_overrun() && now.z < 0.0
+    }
+
+    /// Whether a one-way clutch holds the turbine in the new gear once it has come up.
+    fn is_caught_later(&self, now: &Now) -> bool {
+        self.oncoming.is_one_way() || (self.oncoming.may_overrun() && now.z < 0.0)
     }
 
     /// Pressure with which the oncoming clutch waits, Pa: just below its kiss point, or on the plan of its fill and then with
