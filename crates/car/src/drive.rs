@@ -2,7 +2,7 @@
 
 use drivetrain::Table1;
 
-use crate::{Sensors, SpeedTrace};
+use crate::{Fault, Sensors, SpeedTrace};
 
 /// A piece of a drive. Each value changes linearly from the first to the second number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,6 +80,8 @@ pub struct Drive {
     pub shifts: ShiftPlan,
     /// How it shifts.
     pub controller: ControllerCalibration,
+    /// What breaks on the way.
+    pub faults: Vec<Fault>,
     /// The sensors that the measured signals go through; without them a car measures exactly.
     pub sensors: Option<Sensors>,
 }

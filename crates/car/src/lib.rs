@@ -25,6 +25,8 @@ mod error_bounds;
 pub mod error_budget;
 #[cfg(feature = "std")]
 mod experiment;
+#[cfg(feature = "std")]
+mod fault;
 mod fill_budget;
 mod ids;
 mod input;
@@ -68,6 +70,7 @@ pub use self::{
     error_bounds::{CarErrorBounds, ElementErrorBounds, ErrorBounds},
     error_budget::{ElementErrors, ErrorBudget},
     experiment::{Experiment, FastFill, Profile, Scenario, ShiftCalibration},
+    fault::{Fault, FaultKind},
     observers::{GainMethod, GivenGains, ObserverEntry, ObserverKind, SAMPLE_TIMES_S},
     off_nominal::OffNominal,
     one_shift::OneShiftError,

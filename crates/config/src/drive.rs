@@ -10,6 +10,7 @@ use toml::Spanned;
 use crate::check::{Check, Number, Numbers, Word};
 use crate::experiment::raw::RawSensors;
 use crate::experiment::sensors::sensors;
+use crate::faults::RawFault;
 use crate::{CarFile, ConfigError, Kind, Source, file_of, speed_trace};
 
 /// Most repetitions of the segments.
@@ -97,6 +98,7 @@ impl DriveFile {
             repetitions,
             shifts,
             controller: raw.controller.into(),
+            faults: raw.fault.iter().map(|raw| raw.checked(&check)).collect::<Result<_, _>>()?,
         };
         Ok(Self { drive, vehicle, speeds, source })
     }
@@ -117,6 +119,8 @@ struct RawDrive {
     shift: Option<Spanned<Vec<RawShift>>>,
     segment: Option<Spanned<Vec<RawSegment>>>,
     trace: Option<RawTrace>,
+    #[serde(default)]
+    fault: Vec<RawFault>,
     sensors: Option<Spanned<RawSensors>>,
 }
 

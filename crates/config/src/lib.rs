@@ -14,6 +14,7 @@ mod entries;
 pub mod error;
 mod excerpt;
 pub mod experiment;
+mod faults;
 pub mod gearbox;
 pub mod learnt;
 mod near;

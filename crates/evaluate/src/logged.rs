@@ -204,6 +204,11 @@ impl<'c> LoggedDrive<'c> {
         self.came.iter().zip(came_rad_s).any(|(came, now)| came.has_come() && now.is_nan())
     }
 
+    /// Whether an element slips where it should hold, or holds without its command: then the speeds are those of the car.
+    pub fn has_slipping_element(&self) -> bool {
+        self.checks.slipping.is_found()
+    }
+
     /// Output over wheel speed in a gear at speed, in the middle; not a number where too few rows have both.
     pub fn output_over_wheel(&self) -> f64 {
         self.checks.scales.output_over_wheel()

@@ -15,6 +15,7 @@ mod other_shifts;
 pub mod ratio_histogram;
 mod ratio_scale;
 mod scales;
+mod slipping_elements;
 mod still_commands;
 pub mod swapped_speeds;
 mod unannounced;
@@ -33,6 +34,7 @@ use self::lock_up_check::LockUpCheck;
 use self::open_loop::OpenLoop;
 use self::other_shifts::OtherShifts;
 use self::scales::Scales;
+use self::slipping_elements::SlippingElements;
 use self::still_commands::StillCommands;
 use self::swapped_speeds::SwappedSpeeds;
 use self::unannounced::UnannouncedShifts;
@@ -60,6 +62,7 @@ pub(crate) struct Checks<'c> {
     pub(crate) holes: Holes,
     other: OtherShifts,
     unannounced: UnannouncedShifts,
+    pub(crate) slipping: SlippingElements<'c>,
     pub(crate) scales: Scales<'c>,
 }
 
@@ -79,12 +82,13 @@ impl<'c> Checks<'c> {
             holes: Holes::default(),
             other: OtherShifts::default(),
             unannounced: UnannouncedShifts::new(car),
+            slipping: SlippingElements::new(car),
             scales: Scales::new(car),
         }
     }
 
     /// Each of them, in the order of their warnings.
-    pub(crate) fn each(&mut self) -> [&mut dyn Check; 14] {
+    pub(crate) fn each(&mut self) -> [&mut dyn Check; 15] {
         [
             &mut self.swapped,
             &mut self.commands,
@@ -99,6 +103,7 @@ impl<'c> Checks<'c> {
             &mut self.holes,
             &mut self.other,
             &mut self.unannounced,
+            &mut self.slipping,
             &mut self.scales,
         ]
     }

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use car::{Car, Drive, ShiftCommand, ShiftPlan, ShiftSchedule};
 
 use super::controller::CarCalibration;
+use super::faults::{self, Faults};
 use super::follow::{Follower, SpeedError};
 use super::integrate::CarError;
 use super::model::CarModel;
@@ -84,7 +85,10 @@ pub fn simulate_car_drive_while(
     let driver = road.at_start();
     let state = model.in_gear(shifting.gear, None, drive.start_m_s, driver.throttle)?;
     let start = (driver, drive.sample_time_s);
-    let mut run = CarRun::new(model, nominal, calibration, shifting.gear, state, start)?;
+    let changed = faults::changed(model, &drive.faults)?;
+    let mut changes = changed.iter().peekable();
+    let run = CarRun::new(model, nominal, calibration, shifting.gear, state, start)?;
+    let mut run = run.with_faults(Faults::of(&model.car, &drive.faults)?);
     if shifting.starts_in_neutral {
         run.start_in_neutral()?;
     }
@@ -93,6 +97,9 @@ pub fn simulate_car_drive_while(
     let mut goes_on = true;
     while goes_on && run.time_s() < duration_s - SAME_INSTANT_S {
         let now_s = run.time_s();
+        while let Some((_, changed)) = changes.next_if(|(from_s, _)| now_s >= *from_s) {
+            run.go_on_as(changed);
+        }
         let driver = road.at(now_s, &run);
         let [engine_rad_s, ..] = model.speeds(run.state());
         if engine_rad_s < STALLED_RAD_S {

@@ -11,6 +11,7 @@
 //! | `contacts.rs` | which elements stick, and what follows for accelerations and torques |
 //! | `integrate.rs` | steps and events |
 //! | `energy.rs` | where the energy goes |
+//! | `faults.rs` | what breaks on a drive |
 //! | `valves.rs` | commands on their way to the valves |
 //! | `start.rs` | a car that runs steadily in a gear |
 //! | `controller/` | the shift controller |
@@ -23,6 +24,7 @@ mod contacts;
 mod controller;
 mod drive;
 mod energy;
+mod faults;
 mod follow;
 mod integrate;
 mod model;

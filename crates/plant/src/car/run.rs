@@ -3,6 +3,7 @@
 use car::Car;
 
 use super::controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController};
+use super::faults::Faults;
 use super::integrate::{CarError, CarIntegrator, CarStep};
 use super::model::{CarInputs, CarModel, CarState};
 use super::sample::CarSample;
@@ -31,6 +32,7 @@ pub struct CarRun<'m> {
     model: &'m CarModel,
     controller: CarShiftController,
     valves: CarValves,
+    faults: Faults,
     plant: CarIntegrator,
     commands: CarCommands,
     period_s: f64,
@@ -62,10 +64,11 @@ impl<'m> CarRun<'m> {
         let mut controller = CarShiftController::new(nominal, calibration, gear)?;
         let commands = controller.step(0.0, driver.throttle, &measure(model, &state, driver));
         let mut valves = CarValves::new(model, &commands.elements);
-        let inputs = inputs(model, &mut valves, &commands, driver, 0.0);
+        let faults = Faults::default();
+        let inputs = inputs(model, (&mut valves, &faults), &commands, driver, 0.0);
         let plant = CarIntegrator::new(model, 0.0, state, &inputs)?;
         let period_s = calibration.control_period_s;
-        Ok(Self { model, controller, valves, plant, commands, period_s, periods: 0, sample_time_s, samples: 0 })
+        Ok(Self { model, controller, valves, faults, plant, commands, period_s, periods: 0, sample_time_s, samples: 0 })
     }
 
     /// The same with another relative tolerance of the integration.
@@ -73,6 +76,17 @@ impl<'m> CarRun<'m> {
     pub fn with_tolerance(mut self, relative: f64) -> Self {
         self.plant = self.plant.with_tolerance(relative);
         self
+    }
+
+    /// The same with these faults.
+    #[must_use]
+    pub(super) fn with_faults(self, faults: Faults) -> Self {
+        Self { faults, ..self }
+    }
+
+    /// Goes on as this car, whose plates or valves have changed.
+    pub(super) fn go_on_as(&mut self, model: &'m CarModel) {
+        self.model = model;
     }
 
     /// Time reached, s.
@@ -144,12 +158,13 @@ impl<'m> CarRun<'m> {
         let [engine_rad_s, ..] = model.speeds(self.plant.state());
         let driver = Driver { throttle: driver.throttle.max(idle_throttle(engine_rad_s)), ..driver };
         self.commands = self.controller.step(now_s, driver.throttle, &measure(model, self.plant.state(), driver));
-        self.valves.send(model, now_s, &self.commands.elements);
+        self.valves.send(model, now_s, &self.faults.arriving(now_s, &self.commands.elements));
         self.periods += 1;
         let end_s = self.time_s();
         let shown = self.controller.shown(now_s);
         while self.plant.time_s() < end_s - SAME_INSTANT_S {
-            let inputs = inputs(model, &mut self.valves, &self.commands, driver, self.plant.time_s() + SAME_INSTANT_S);
+            let valves = (&mut self.valves, &self.faults);
+            let inputs = inputs(model, valves, &self.commands, driver, self.plant.time_s() + SAME_INSTANT_S);
             let until_s = self.valves.next_arrival_s().map_or(end_s, |arrival| arrival.min(end_s));
             let (commands, samples, sample_time_s) = (&self.commands, &mut self.samples, self.sample_time_s);
             self.plant.advance(model, &inputs, until_s, &mut |step| {
@@ -185,14 +200,20 @@ fn measure(model: &CarModel, state: &CarState, driver: Driver) -> CarMeasured {
 }
 
 /// Commands that have arrived, and what the driver does.
-fn inputs(model: &CarModel, valves: &mut CarValves, commands: &CarCommands, driver: Driver, now_s: f64) -> CarInputs {
+fn inputs(
+    model: &CarModel,
+    (valves, faults): (&mut CarValves, &Faults),
+    commands: &CarCommands,
+    driver: Driver,
+    now_s: f64,
+) -> CarInputs {
     let car = &model.car;
     CarInputs {
         throttle: driver.throttle.max(commands.engine_throttle),
         engine_share: commands.engine_share,
         brake_n_m: driver.brake * BRAKE_OVER_TYRES * car.tyre.max_force_n * car.road.wheel_radius_m,
         grade_rad: driver.grade_rad,
-        settled_pa: valves.settled_pa(model, now_s),
+        settled_pa: faults.settled_pa(model, now_s, valves.settled_pa(model, now_s)),
         dogs: commands.dogs,
         lock_up_n_m: commands.lock_up_n_m,
     }

@@ -20,6 +20,7 @@ macro_rules! car {
 
 mod drives;
 mod energy;
+mod faults;
 mod garage;
 mod one_way;
 mod sequences;

@@ -11,6 +11,7 @@ mod cars;
 mod command_delay;
 mod drives;
 mod engine_torque;
+mod faults;
 mod holes;
 mod input_clutch;
 mod late;

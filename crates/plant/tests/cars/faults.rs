@@ -1,0 +1,94 @@
+//! Faults on a drive: what the plates get and do, while the commands stay those of a sound car.
+
+use car::{Car, Drive, Fault, FaultKind};
+use config::{DriveFile, Source};
+use plant::car::{CarCalibration, CarError, CarModel, CarSample, simulate_car_drive};
+
+/// In 3rd gear for five seconds, then in 4th.
+const DRIVE: &str = "name = \"d\"\nstart = { gear = \"3\", vehicle_m_s = 12.0 }\nshift = [{ time_s = 5.0, gear = \"4\" }]\n\
+                     [[segment]]\nduration_s = 10\nthrottle = 0.4\n";
+
+fn drive(faults: &[Fault]) -> Drive {
+    let drive = DriveFile::from_source(Source::built_in("drive.toml", DRIVE)).unwrap().drive;
+    Drive { faults: faults.to_vec(), ..drive }
+}
+
+fn samples(car: &Car, faults: &[Fault]) -> Result<Vec<CarSample>, CarError> {
+    let model = CarModel::new(car.clone()).unwrap();
+    let mut samples = Vec::new();
+    simulate_car_drive(&model, car, CarCalibration::STANDARD, &drive(faults), |sample| samples.push(*sample))?;
+    Ok(samples)
+}
+
+fn element(car: &Car, name: &str) -> usize {
+    car.gearbox.elements.iter().position(|element| element.name == name).unwrap()
+}
+
+fn at(samples: &[CarSample], time_s: f64) -> &CarSample {
+    samples.iter().find(|sample| sample.time_s >= time_s).unwrap()
+}
+
+#[test]
+fn a_weak_clutch_slips_in_its_gears_from_then_on_and_the_commands_stay() {
+    let car = super::cars().swap_remove(0);
+    let weak = |factor| Fault { kind: FaultKind::Friction { element: Some("C".to_owned()), factor }, from_s: 2.0 };
+    let (sound, faulty) = (samples(&car, &[]).unwrap(), samples(&car, &[weak(0.15)]).unwrap());
+    let c = element(&car, "C");
+    assert_eq!(at(&sound, 1.9), at(&faulty, 1.9));
+    assert!(at(&sound, 4.5).slips_rad_s[c].abs() < 1e-6 && at(&faulty, 4.5).slips_rad_s[c].abs() > 20.0);
+    assert_eq!(at(&sound, 4.5).commands[c], at(&faulty, 4.5).commands[c]);
+    assert_eq!(at(&sound, 4.5).pressures_pa[c], at(&faulty, 4.5).pressures_pa[c]);
+    // Wrong oil is all elements together.
+    let all = Fault { kind: FaultKind::Friction { element: None, factor: 0.05 }, from_s: 2.0 };
+    let faulty = samples(&car, &[all]).unwrap();
+    let slips =
+        |sample: &CarSample| ["B", "C", "E"].iter().any(|name| sample.slips_rad_s[element(&car, name)].abs() > 5.0);
+    assert!(!slips(at(&sound, 4.5)) && slips(at(&faulty, 4.5)));
+}
+
+#[test]
+fn valves_that_stick_or_are_swapped_give_other_pressures_than_commanded() {
+    let car = super::cars().swap_remove(0);
+    let [c, e] = ["C", "E"].map(|name| element(&car, name));
+    let stuck = |command| Fault { kind: FaultKind::StuckSolenoid { element: "C".to_owned(), command }, from_s: 2.0 };
+    let open = car.clutches[c].unwrap().valve.command_for(0.0);
+    let off = samples(&car, &[stuck(Some(open))]).unwrap();
+    assert!(at(&off, 1.9).pressures_pa[c] > 1e6 && at(&off, 4.0).pressures_pa[c] < 1e4);
+    assert_eq!(at(&off, 4.0).commands[c], at(&off, 1.9).commands[c]);
+    // Stuck as it is, it holds on where 4th gear opens it.
+    let frozen = samples(&car, &[stuck(None)]).unwrap();
+    assert!(at(&frozen, 9.9).pressures_pa[c] > 1e6);
+    let swapped = Fault { kind: FaultKind::SwappedSolenoids(["C".to_owned(), "D".to_owned()]), from_s: 2.0 };
+    let swapped = samples(&car, &[swapped]).unwrap();
+    let d = element(&car, "D");
+    assert!(at(&swapped, 4.0).pressures_pa[c] < 1e4 && at(&swapped, 4.0).pressures_pa[d] > 1e6);
+    assert!(at(&swapped, 4.0).pressures_pa[e] > 1e6);
+}
+
+#[test]
+fn leaks_a_low_line_pressure_and_air_change_the_pressures() {
+    let car = super::cars().swap_remove(0);
+    let c = element(&car, "C");
+    let of = |kind| samples(&car, &[Fault { kind, from_s: 2.0 }]).unwrap();
+    let sound = samples(&car, &[]).unwrap();
+    let line_pa = at(&sound, 4.0).pressures_pa[c];
+    let leaks = of(FaultKind::LeakingPiston { element: "C".to_owned(), pressure_fraction: 0.6 });
+    assert!((at(&leaks, 4.0).pressures_pa[c] / line_pa - 0.6).abs() < 1e-3);
+    let line = of(FaultKind::LinePressure { pressure_pa: 0.5e6 });
+    let pressures = at(&line, 4.0).pressures_pa;
+    assert!(pressures.iter().all(|pa| *pa < 0.501e6) && pressures[c] > 0.499e6);
+    // In the shift the pressures come later.
+    let air = of(FaultKind::Aeration { lag_factor: 3.0 });
+    assert_eq!(at(&air, 1.9), at(&sound, 1.9));
+    let apart = |time_s| (at(&air, time_s).pressures_pa[c] - at(&sound, time_s).pressures_pa[c]).abs();
+    assert!((500..560).map(|at| f64::from(at) * 0.01).map(apart).fold(0.0, f64::max) > 5e4);
+}
+
+#[test]
+fn a_fault_of_an_element_that_the_gearbox_does_not_have_is_refused_with_the_names_that_it_has() {
+    let car = super::cars().swap_remove(0);
+    let fault =
+        Fault { kind: FaultKind::LeakingPiston { element: "K1".to_owned(), pressure_fraction: 0.5 }, from_s: 0.0 };
+    let error = samples(&car, &[fault]).unwrap_err().to_string();
+    assert!(error.contains("\"K1\"") && error.contains("hint: it has A, B, C, D, E"), "{error}");
+}
