@@ -1,4 +1,4 @@
-//! The gearbox filter against the Kalman filter of one shift, on the same readings.
+//! The gearbox filter against the Kalman filter of one shift and the observers that a log without a wheel speed had, on the same readings.
 //!
 //! `cargo run -p study --example one_filter -- RUNS DRAWS`: errors of pressure and torque of the oncoming clutch in the torque and the
 //! inertia phase, over so many runs of `experiments/combined.toml`, and in all scenarios of `experiments/field.toml` with so many draws of
@@ -19,30 +19,54 @@ use trace::{Trace, signal};
 const SAMPLE_S: f64 = 0.01;
 const PHASES: [Phase; 2] = [Phase::TorquePhase, Phase::InertiaPhase];
 
-/// An observer, with the sensors given or not, and with the command of the offgoing clutch or not.
+/// An observer, with the sensors given or not, and a channel that the log does not have.
 struct Compared {
     name: &'static str,
     kind: ObserverKind,
     has_sensors: bool,
-    has_both_commands: bool,
+    without: Option<&'static str>,
 }
 
-const fn compared(name: &'static str, kind: ObserverKind, has_sensors: bool, has_both_commands: bool) -> Compared {
-    Compared { name, kind, has_sensors, has_both_commands }
+const fn compared(
+    name: &'static str,
+    kind: ObserverKind,
+    has_sensors: bool,
+    without: Option<&'static str>,
+) -> Compared {
+    Compared { name, kind, has_sensors, without }
 }
+
+const NO_OFFGOING: Option<&str> = Some(signal::OFFGOING_CURRENT);
+const NO_WHEEL: Option<&str> = Some(signal::WHEEL_SPEED);
 
 /// Each is compared with the one before.
-const PAIRS: [[Compared; 2]; 3] = [
+const PAIRS: [[Compared; 2]; COUNT] = [
     [
-        compared("kalman, sensors", ObserverKind::Kalman, true, true),
-        compared("gearbox, sensors", ObserverKind::Gearbox, true, true),
+        compared("kalman, sensors", ObserverKind::Kalman, true, None),
+        compared("gearbox, sensors", ObserverKind::Gearbox, true, None),
     ],
-    [compared("kalman", ObserverKind::Kalman, false, true), compared("gearbox", ObserverKind::Gearbox, false, true)],
     [
-        compared("kalman, sensors, one command", ObserverKind::Kalman, true, false),
-        compared("gearbox, sensors, one command", ObserverKind::Gearbox, true, false),
+        compared("kalman", ObserverKind::Kalman, false, None),
+        compared("gearbox over kalman", ObserverKind::Gearbox, false, None),
+    ],
+    [
+        compared("kalman, sensors, one command", ObserverKind::Kalman, true, NO_OFFGOING),
+        compared("gearbox, sensors, one command", ObserverKind::Gearbox, true, NO_OFFGOING),
+    ],
+    [
+        compared("open loop with maps", ObserverKind::OpenLoopMaps, false, None),
+        compared("gearbox over maps", ObserverKind::Gearbox, false, None),
+    ],
+    [
+        compared("rigid, no wheel speed", ObserverKind::Rigid, false, NO_WHEEL),
+        compared("gearbox over rigid, no wheel", ObserverKind::Gearbox, false, NO_WHEEL),
+    ],
+    [
+        compared("kalman, one command", ObserverKind::Kalman, false, NO_OFFGOING),
+        compared("gearbox, one command", ObserverKind::Gearbox, false, NO_OFFGOING),
     ],
 ];
+const COUNT: usize = 6;
 
 /// RMS errors of pressure, Pa, and torque, N m, each in torque and inertia phase; and samples outside the guaranteed ranges.
 #[derive(Clone, Copy)]
@@ -55,7 +79,7 @@ struct Score {
 type Statistic<'a> = &'a dyn Fn(&[f64]) -> f64;
 
 /// The scores of [`PAIRS`].
-type Scores = [[Score; 2]; 3];
+type Scores = [[Score; 2]; COUNT];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = |at: usize, default: u64| std::env::args().nth(at).map_or(Ok(default), |text| text.parse());
@@ -72,12 +96,13 @@ fn scores(vehicle: &Vehicle, experiment: &Experiment, drive: &Trace) -> Result<S
     let sensors = experiment.sensors.ok_or("the experiment has no sensors")?;
     let sample_s = experiment.observers.first().map_or(SAMPLE_S, |entry| entry.sample_time_s);
     let both = through_sensors(drive, sample_s, &sensors, vehicle);
-    let one = both.filtered(|name| name != signal::OFFGOING_CURRENT);
-    let mut scores = [[Score { errors: [0.0; 4], outside: 0 }; 2]; 3];
+    let mut scores = [[Score { errors: [0.0; 4], outside: 0 }; 2]; COUNT];
     for (of, score) in PAIRS.iter().flatten().zip(scores.iter_mut().flatten()) {
         let given = experiment.sensors_given.as_ref().filter(|_| of.has_sensors);
-        let observer = AnyObserver::designed(vehicle, of.kind, GainMethod::Iss, SAMPLE_S, given)?;
-        let columns = RunColumns::of(if of.has_both_commands { &both } else { &one }, vehicle)?;
+        let method = if of.kind == ObserverKind::Rigid { GainMethod::PeakToPeak } else { GainMethod::Iss };
+        let observer = AnyObserver::best(vehicle, of.kind, method, SAMPLE_S, given)?.0;
+        let left = both.filtered(|name| of.without != Some(name));
+        let columns = RunColumns::of(&left, vehicle)?;
         *score = Score::of(&observer.run_alone(&columns), &observer.run(vehicle, &columns), &both)?;
     }
     Ok(scores)
@@ -125,7 +150,10 @@ fn combined(runs: u64) -> Result<(), Box<dyn Error>> {
 }
 
 fn print_ratios(name: &str, runs: &[&Scores]) {
-    println!("{name}, {} runs: pressure in torque and inertia phase, torque in both; over kalman", runs.len());
+    println!(
+        "{name}, {} runs: pressure in torque and inertia phase, torque in both, over the observer before",
+        runs.len()
+    );
     for (pair, [_, own]) in PAIRS.iter().enumerate() {
         let sorted = |observer: usize, k: usize| {
             let mut errors: Vec<f64> = runs.iter().map(|scores| scores[pair][observer].errors[k]).collect();
@@ -151,7 +179,7 @@ fn field(draws: u64) -> Result<(), Box<dyn Error>> {
     for scenario in &file.scenarios {
         let mut varied = file.experiment.with_scenario(scenario);
         let seed = varied.sensors.map_or(0, |sensors| sensors.seed);
-        let mut squares = [[[0.0; 4]; 2]; 3];
+        let mut squares = [[[0.0; 4]; 2]; COUNT];
         for draw in 0..draws {
             if let Some(sensors) = &mut varied.sensors {
                 sensors.seed = seed + 1000 * draw;

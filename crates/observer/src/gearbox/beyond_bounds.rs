@@ -33,6 +33,8 @@ const HYPOTHESES: usize = LEARNT + ALIKE.len();
 const CERTAIN: f64 = 2.6;
 /// Part of the evidence that is left after each further shift \[chosen\]: the last thirty count.
 const KEPT: f64 = 0.97;
+/// Shifts that are needed: one alone may be one with wrong readings.
+const SHIFTS: u8 = 2;
 /// Evidence below which nothing follows.
 const LEAST: f64 = 0.05;
 /// Variance of the scale of all torques that the shifts have wrong alike, of 8 % \[chosen\], in that of the stiffness unlearnt.
@@ -89,13 +91,17 @@ pub(super) struct Evidence<T> {
     /// Sums of `w w`.
     #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
     squares: [T; HYPOTHESES],
+    /// Shifts that have shown something of each.
+    #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
+    shifts: [u8; HYPOTHESES],
     /// The quantity that is beyond its bound, by its place among the hypotheses; its size and standard deviation, in that unlearnt.
     found: Option<(usize, [T; 2])>,
 }
 
 impl<T: Real> Evidence<T> {
     pub(super) fn nothing() -> Self {
-        Self { products: [T::zero(); HYPOTHESES], squares: [T::zero(); HYPOTHESES], found: None }
+        let zeros = [T::zero(); HYPOTHESES];
+        Self { products: zeros, squares: zeros, shifts: [0; HYPOTHESES], found: None }
     }
 
     /// Whether a quantity is beyond its bound.
@@ -107,9 +113,12 @@ impl<T: Real> Evidence<T> {
     pub(super) fn take(&mut self, acting: &Acting<T>, shown: &Shown<T>) {
         let mut add = |at: usize, column: &[T; ACTING]| {
             let w = shown.per_quantity(column);
-            if let (Some(product), Some(square)) = (self.products.get_mut(at), self.squares.get_mut(at)) {
+            let square_now = dot(&w, &w);
+            let sums = self.products.get_mut(at).zip(self.squares.get_mut(at)).zip(self.shifts.get_mut(at));
+            if let Some(((product, square), shifts)) = sums.filter(|_| square_now > T::zero()) {
                 *product = T::of(KEPT) * *product + dot(&w, &shown.by_budget.innovation);
-                *square = T::of(KEPT) * *square + dot(&w, &w);
+                *square = T::of(KEPT) * *square + square_now;
+                *shifts = shifts.saturating_add(1);
             }
         };
         let mut alike = [[T::zero(); ACTING]; ALIKE.len()];
@@ -135,11 +144,11 @@ impl<T: Real> Evidence<T> {
     /// The most likely one of the quantities beyond their bounds, if one is for certain.
     fn beyond(&self) -> Option<usize> {
         let (mut is_certain, mut found) = (false, (None, T::zero()));
-        let sums = self.products.iter().zip(&self.squares).enumerate();
-        for (k, (product, n)) in sums.filter(|(_, (_, n))| **n > T::of(LEAST)) {
+        let sums = self.products.iter().zip(&self.squares).zip(&self.shifts).enumerate();
+        for (k, ((product, n), shifts)) in sums.filter(|(_, ((_, n), _))| **n > T::of(LEAST)) {
             let (edge, variance) = (T::of(edge(place(k))), *n * (T::one() + T::of(in_common(k)) * *n));
             let above = product.abs() - edge * *n;
-            is_certain |= above > T::of(CERTAIN) * variance.sqrt();
+            is_certain |= *shifts >= SHIFTS && above > T::of(CERTAIN) * variance.sqrt();
             let likelihood = self.likelihood(k);
             if above > T::zero() && (found.0.is_none() || likelihood > found.1) {
                 found = (Some(k), likelihood);
