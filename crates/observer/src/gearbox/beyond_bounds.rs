@@ -29,7 +29,7 @@ use super::{FrictionElement, GearboxFilter, GearboxState, MAX_ELEMENTS};
 /// Hypotheses beside the quantities themselves: torque factors, kiss points, lags and delays of all elements alike.
 const ALIKE: [usize; 4] = [0, KISS_AT, LAG_AT, DELAY_AT];
 const HYPOTHESES: usize = LEARNT + ALIKE.len();
-/// Standard deviations beyond the bound \[chosen\]: in 500 drives of cars within their budgets the largest were 2.3.
+/// Standard deviations beyond the bound \[chosen\]: by chance in one of 200 cases of a quantity that is at its bound.
 const CERTAIN: f64 = 2.6;
 /// Part of the evidence that is left after each further shift \[chosen\]: the last thirty count.
 const KEPT: f64 = 0.97;
