@@ -77,16 +77,12 @@ class File:
         """The file with another value at a place."""
         return File(self.path, self.replaced(place, value))
 
-    def range_of(self, place, value, root=None):
-        """The range of a number, by the error of an absurd one."""
-        said = [error for error in self.errors(place, value, root) if error["expected"] and error["value"] == ABSURD]
-        return said[0]["expected"] if said else None
-
     def fixed_range(self, place, value):
-        """The range of a number, and its ends if it is the same with other values of the file."""
-        expected = self.range_of(place, value)
+        """The range of a number, by the error of an absurd one, and its ends if it is the same with other values of the file."""
+        errors = self.errors(self.replaced(place, value), self.replaced(place, value, self.others))
+        expected, with_others = map(expected_of_absurd, errors)
         ends = RANGE.fullmatch(expected or "")
-        is_fixed = ends and self.range_of(place, value, self.others) == expected
+        is_fixed = ends and with_others == expected
         return expected, [float(ends.group(1)), float(ends.group(2))] if is_fixed else None
 
     def replaced(self, place, value, root=None):
@@ -98,12 +94,17 @@ class File:
         inner[place[-1]] = value
         return root
 
-    def errors(self, place, value, root=None):
-        """The errors of the file, or of one with other numbers, with another value at a place."""
-        root = self.replaced(place, value, root)
-        probe = self.path.with_name("probe.toml")
-        probe.write_text("".join(f"{json.dumps(key)} = {toml(of)}\n" for key, of in root.items()))
-        return check(str(probe))[0]["errors"]
+    def errors(self, *roots):
+        """The errors of files with these tables, beside the file; the program starts once for all, which is most of the time."""
+        probes = [self.path.with_name(f"probe_{at}.toml") for at in range(len(roots))]
+        for probe, root in zip(probes, roots):
+            probe.write_text("".join(f"{json.dumps(key)} = {toml(of)}\n" for key, of in root.items()))
+        return [found["errors"] for found in check(*map(str, probes))]
+
+
+def expected_of_absurd(errors):
+    """The range that an error names of a number outside every range; none where no error does."""
+    return next((error["expected"] for error in errors if error["expected"] and error["value"] == ABSURD), None)
 
 
 def quoted(message):
@@ -112,7 +113,8 @@ def quoted(message):
 
 def keys_of(file, place):
     """The keys that a table may have; none where any name is a key."""
-    for error in file.errors([*place, UNKNOWN], 1):
+    [errors] = file.errors(file.replaced([*place, UNKNOWN], 1))
+    for error in errors:
         found = quoted(error["message"])
         if error["message"].startswith("unknown ") and UNKNOWN in found:
             return [key for key in found if key != UNKNOWN] or None
@@ -143,8 +145,7 @@ def numbers_of(file, place, value):
 
 def schema_of_value(file, place, value):
     types, words = set(), []
-    for probe, name in TYPES:
-        errors = file.errors(place, probe)
+    for (_, name), errors in zip(TYPES, file.errors(*(file.replaced(place, probe) for probe, _ in TYPES))):
         refused = [error["message"] for error in errors if error["message"].startswith(REFUSED)]
         variants = [quoted(error["message"])[1:] for error in errors if error["message"].startswith("unknown variant `?`")]
         words += variants[0] if variants else []
