@@ -7,6 +7,7 @@
 pub mod campaign;
 pub mod car_log;
 pub mod channels;
+pub mod gear_numbers;
 mod gear_signal;
 pub mod influence;
 pub mod learnt_coverage;

@@ -238,6 +238,23 @@ pub(super) fn dot<T: Real, const L: usize>(a: &[T; L], b: &[T; L]) -> T {
     a.iter().zip(b).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
 }
 
+/// A matrix with one value on its diagonal.
+fn diagonal<T: Real>(x: T) -> [[T; CORE]; CORE] {
+    core::array::from_fn(|row| core::array::from_fn(|column| if row == column { x } else { T::zero() }))
+}
+
+/// The product of a row and a matrix.
+#[inline]
+fn product<T: Real, const L: usize>(row: &[T], matrix: &[[T; L]]) -> [T; L] {
+    let mut sums = [T::zero(); L];
+    for (x, of) in row.iter().zip(matrix) {
+        for (sum, of) in sums.iter_mut().zip(of) {
+            *sum = *sum + *x * *of;
+        }
+    }
+    sums
+}
+
 /// The solution over one step under constant torques.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -254,37 +271,21 @@ pub(super) struct Motion<T> {
 impl<T: Real> Motion<T> {
     /// By the series of the matrix exponential.
     pub(super) fn new(g: Response<T>, line: &Driveline<T>, wheels_kg_m2: T, dt_s: T, fading_s: [T; 2]) -> Self {
-        let (zero, one) = (T::zero(), T::one());
         let Equations { a, b } = Equations::new(&g, line, wheels_kg_m2);
-        // sum of (A h)^n/n!, and of h (A h)^n/(n+1)!.
-        let mut power = [[zero; CORE]; CORE];
-        for (k, row) in power.iter_mut().enumerate() {
-            row[k] = one;
-        }
-        let (mut phi, mut integral) = (power, power.map(|row| row.map(|x| x * dt_s)));
-        for n in 1..TERMS {
+        // sum of (A h)^n/n!, and of h (A h)^n/(n+1)!. The turbine speed acts on no rate, which leaves its column out of the products.
+        let mut power = a.map(|row| row.map(|x| dt_s * x));
+        let (mut phi, mut integral) = (diagonal(T::one()), diagonal(dt_s));
+        for n in 2..=TERMS {
             let per = dt_s / T::of(n as f64);
-            let mut next = [[zero; CORE]; CORE];
-            for (next, row) in next.iter_mut().zip(&power) {
-                for (c, x) in next.iter_mut().enumerate() {
-                    *x = per * row.iter().zip(&a).fold(zero, |sum, (p, a)| sum + *p * a[c]);
-                }
-            }
-            power = next;
-            let fraction = dt_s / T::of((n + 1) as f64);
-            for ((phi, integral), power) in phi.iter_mut().zip(&mut integral).zip(&power) {
-                for ((phi, integral), power) in phi.iter_mut().zip(integral.iter_mut()).zip(power) {
+            for ((phi, integral), power) in phi.iter_mut().zip(&mut integral).zip(&mut power) {
+                for ((phi, integral), power) in phi.iter_mut().zip(integral.iter_mut()).zip(power.iter()) {
                     *phi = *phi + *power;
-                    *integral = *integral + fraction * *power;
+                    *integral = *integral + per * *power;
                 }
+                *power = product(&power[OUTPUT..], &a[OUTPUT..]).map(|x| per * x);
             }
         }
-        let mut gamma = [[zero; DRIVES]; CORE];
-        for (gamma, integral) in gamma.iter_mut().zip(&integral) {
-            for (c, x) in gamma.iter_mut().enumerate() {
-                *x = integral.iter().zip(&b).fold(zero, |sum, (i, b)| sum + *i * b[c]);
-            }
-        }
+        let gamma = integral.map(|row| product(&row, &b));
         Self { of: (g, dt_s), phi, gamma, stay: fading_s.map(|time_s| (-dt_s / time_s).exp()) }
     }
 

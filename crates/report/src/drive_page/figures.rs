@@ -37,7 +37,11 @@ fn gear_number(car: &Car, gear: Gear) -> f64 {
 /// The gear over time. A step takes `wide_s`, because a figure draws only one of points that lie closer.
 fn gear_steps(drive: &ScoredDrive, car: &Car, wide_s: f64) -> Vec<(f64, f64)> {
     let mut steps: Vec<(f64, f64)> = Vec::new();
+    let mut last = None;
     for state in &drive.states {
+        if last.replace(state.gear) == Some(state.gear) {
+            continue;
+        }
         let gear = gear_number(car, state.gear);
         match steps.last() {
             Some(&(_, before)) if before == gear => {}

@@ -3,8 +3,8 @@
 //! Turbine and output speed, gear, target gear and the command of every element's valve are needed, without a converter the engine torque
 //! too. With one the estimate is the open loop where there is no engine speed. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
 
+use car::Car;
 use car::columns::{element_column, element_commands, element_pressures, pressure_command_column};
-use car::{Car, Gear};
 use drivetrain::CommandKind;
 use logs::{ChannelMap, Log, LogError, Mapped, OnChange, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
@@ -12,6 +12,7 @@ use observer::ShiftTables;
 use observer::gearbox::{LONGEST_DELAY_S, MAX_ELEMENTS, ShiftInput};
 
 use super::car_log::LogStep;
+use super::gear_numbers::GearNumbers;
 use super::gear_signal::Gears;
 use super::pressure_command::command_for;
 
@@ -57,6 +58,7 @@ struct Entry {
 /// A log by its channel map, step by step.
 pub struct CarChannels<'a> {
     car: &'a Car,
+    numbers: GearNumbers,
     tables: &'a ShiftTables<f64>,
     steps: Steps<'a, Newest>,
     entries: Vec<Entry>,
@@ -98,6 +100,7 @@ impl<'a> CarChannels<'a> {
         let (lock_up_applied, pedal, vehicle_m_s, oil_degc) = (false, f64::NAN, None, None);
         Ok(Self {
             car,
+            numbers: GearNumbers::of(car),
             tables,
             steps,
             entries,
@@ -134,7 +137,7 @@ impl<'a> CarChannels<'a> {
     pub fn check_gears(&self) -> Result<Vec<String>, LogError> {
         let hint = format!(
             "gears are numbers from 1 to {}, 0 for none, and negative for reverse; use `scale` and `offset` of the channel map",
-            self.car.gearbox.forward_gears().len()
+            self.numbers.highest()
         );
         self.gears.notes(&hint).map_err(LogError::map)
     }
@@ -190,7 +193,7 @@ impl<'a> CarChannels<'a> {
         }
         for (which, number) in changed_gear.into_iter().enumerate() {
             let Some(number) = number else { continue };
-            self.gears.take(which, gear_of(self.car, number), || format!("{number}"));
+            self.gears.take(which, self.numbers.gear(number), || format!("{number}"));
         }
         let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, engine_n_m] = of_role;
         let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);
@@ -305,36 +308,6 @@ fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(),
         keys.join(", "),
         missing[0]
     )))
-}
-
-/// The places of the gears in reverse.
-fn reverse_gears(car: &Car) -> Vec<usize> {
-    let gears = car.gearbox.gears.iter().enumerate();
-    gears.filter(|(_, gear)| gear.ratio < 0.0).map(|(at, _)| at).collect()
-}
-
-/// The number of a gear, by its place: 1 is the first forward gear, 0 none, -1 reverse, -2 a second reverse gear.
-pub fn gear_number(car: &Car, gear: Gear) -> f64 {
-    let place =
-        |gears: Vec<usize>| gears.iter().position(|&known| Gear::at(known) == gear).map(|place| place as f64 + 1.0);
-    place(car.gearbox.forward_gears()).or_else(|| place(reverse_gears(car)).map(|place| -place)).unwrap_or(0.0)
-}
-
-/// The place of a gear with this number; none where the gearbox has no such gear. A negative number that no gear has is the first reverse
-/// gear.
-fn gear_of(car: &Car, number: f64) -> Option<Gear> {
-    let forward = car.gearbox.forward_gears();
-    let whole = number.round();
-    match whole {
-        _ if (number - whole).abs() > 0.01 => None,
-        0.0 => Some(Gear::Neutral),
-        _ if whole < 0.0 => {
-            let reverse = reverse_gears(car);
-            let named = reverse.iter().copied().map(Gear::at).find(|&gear| gear_number(car, gear) == whole);
-            named.or_else(|| reverse.first().copied().map(Gear::at))
-        }
-        _ => forward.get(whole as usize - 1).copied().map(Gear::at),
-    }
 }
 
 /// The map of a log whose channels have the names of the program, as it writes them itself.

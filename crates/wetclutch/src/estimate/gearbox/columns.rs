@@ -4,7 +4,7 @@ use car::columns::element_column;
 use car::{Car, Gear, ShiftCommand};
 use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftPhase};
 use observer::{ChannelHealth, Channels, Health};
-use study::gearbox::channels::gear_number;
+use study::gearbox::gear_numbers::GearNumbers;
 use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
 
@@ -14,6 +14,7 @@ use crate::Error;
 #[derive(Clone, Copy)]
 pub(crate) struct Row<'a> {
     pub(crate) car: &'a Car,
+    pub(crate) numbers: &'a GearNumbers,
     pub(crate) places: &'a [(usize, &'a str)],
     pub(crate) gears: ShiftCommand,
     pub(crate) estimate: ShiftEstimate<f64>,
@@ -165,7 +166,7 @@ impl Value {
             Self::Clutch(which, what) => row.clutch_cell(which, what),
             Self::Valve(place) => Cell::Number(row.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
             Self::Range(place, end) => of(row.ranges_pa[place.min(MAX_ELEMENTS - 1)].map(|range| range[end] + 0.0)),
-            Self::GearNumber(which) => Cell::Number(gear_number(row.car, row.of(which))),
+            Self::GearNumber(which) => Cell::Number(row.numbers.number(row.of(which))),
             Self::Reading(at) => row.reading(at),
             Self::Command(place) => Cell::Word(row.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
         }

@@ -14,6 +14,7 @@ use evaluate::drive::ScoredDrive;
 use evaluate::logged::LoggedDrive;
 use observer::ShiftTables;
 use report::drive_page::{DrivePage, MAX_DRAWN, findings, shift_words};
+use study::gearbox::gear_numbers::GearNumbers;
 use trace::{Cell, ShownPath as _};
 
 use self::checks::{RowTimes, refused};
@@ -132,6 +133,7 @@ pub fn estimate(
     let elements = car.gearbox.elements.iter().enumerate();
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
+    let numbers = GearNumbers::of(car);
     let columns = chosen(columns(&places, Knows::of(car)), &options.columns)?;
     let (before_readings, mut said, mut named_before) = (before_readings(&columns), None, None);
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
@@ -150,7 +152,8 @@ pub fn estimate(
         }
         let estimate = drive.push(&step);
         drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, shift.gears));
-        let row = Row { car, places: &places, gears: step.input.gear, estimate, ranges_pa: drive.pressure_ranges_pa() };
+        let (gears, ranges_pa) = (step.input.gear, drive.pressure_ranges_pa());
+        let row = Row { car, numbers: &numbers, places: &places, gears, estimate, ranges_pa };
         passing.push(step.time_s, row, |time_s, row| {
             let same = Same {
                 readings: said.replace(row.said()) == Some(row.said()),
