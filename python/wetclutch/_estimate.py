@@ -12,6 +12,7 @@ from . import _wetclutch as native
 from ._car import Car
 from ._errors import check_range, of_files
 from ._executor import each
+from ._foreign import columns_of
 from ._progress import Progress, Report, reported
 from ._sensors import Sensors, file_or_sensors
 from ._table import Table
@@ -23,7 +24,7 @@ class Log:
 
     Attributes:
         path: The file; None for a table in memory.
-        table: The table in memory, or None.
+        table: The table in memory, or that of a file which another library has read; None for a file.
         map: Channel map, a file as ``wetclutch inspect --suggest`` writes it.
         dbc: Messages and signals of a CAN log.
         mapped: Channels by signals, such as ``{"engine_speed": "N_Eng [rpm]"}``; they replace those of the map.
@@ -77,6 +78,9 @@ def read(
 ) -> Log:
     """A log of a file (CSV, Parquet, MDF 4, CAN with a DBC) or of a data frame.
 
+    MDF 2 and 3 are read by asammdf, MAT-files by SciPy or (version 7.3) h5py, where these are installed. The vectors of a MAT-file that are as long as
+    the one that is called ``time`` (s) are its channels.
+
     A table whose columns have the names of the program (``turbine_speed_rad_s``, ``gear``, ...) needs neither map nor channels.
 
     Args:
@@ -88,10 +92,11 @@ def read(
     >>> read({"time_s": [0.0, 0.01], "turbine_speed_rad_s": [100.0, 101.0]}).table
     Table(2 rows: time_s, turbine_speed_rad_s)
     """
-    is_file = isinstance(log, (str, os.PathLike))
+    path = os.fspath(log) if isinstance(log, (str, os.PathLike)) else None
+    columns = log if path is None else columns_of(path)
     return Log(
-        path=os.fspath(log) if is_file else None,
-        table=None if is_file else Table(log),
+        path=path,
+        table=None if columns is None else Table(columns),
         map=None if map is None else os.fspath(map),
         dbc=None if dbc is None else os.fspath(dbc),
         mapped=dict(channels or {}),

@@ -48,9 +48,12 @@ const NOT_READ: &[(&[u8], &str)] = &[
     (b"Rar!\x1a\x07", "this is a RAR archive\nhint: unpack it"),
     (
         b"\x89HDF\r\n\x1a\n",
-        "this is HDF5, or a MAT-file of version 7.3\nhint: save its channels as CSV, Parquet or MDF 4",
+        "this is HDF5, or a MAT-file of version 7.3\nhint: save its channels as CSV, Parquet or MDF 4, or read the MAT-file by `wetclutch.read` of the Python package",
     ),
-    (b"MATLAB 5.0 MAT-file", "this is a MAT-file\nhint: save its channels as CSV, Parquet or MDF 4"),
+    (
+        b"MATLAB 5.0 MAT-file",
+        "this is a MAT-file\nhint: save its channels as CSV, Parquet or MDF 4, or read it by `wetclutch.read` of the Python package",
+    ),
     (
         b"ARROW1",
         "this is an Arrow or Feather file\nhint: save it as Parquet; with pyarrow: `pq.write_table(feather.read_table(IN), OUT)`",
