@@ -21,6 +21,9 @@ const DRIVEN_RAD_S: f64 = 80.0;
 const SLOW_RAD_S2: f64 = 40.0;
 /// Time that is said, s \[chosen\].
 const ENOUGH_S: f64 = 3.0;
+/// Time without a break from which on more torque than the pump takes counts, s \[chosen\]: when the accelerator is pressed, the torque is above that of the
+/// pump for some tenths of a second, and an hour has many of them.
+const LASTING_S: f64 = 1.0;
 
 /// The time in which it was closed, so far.
 pub(crate) struct LockUpCheck<'c> {
@@ -30,7 +33,7 @@ pub(crate) struct LockUpCheck<'c> {
     /// By the reported torque, s; by the speeds alone, and since the last break.
     by_torque_s: f64,
     alike_s: f64,
-    since_s: f64,
+    since_s: [f64; 2],
     /// Engine speed, rad/s, when it was taken, s, and whether it changed slowly up to then.
     before: Option<(f64, f64)>,
     is_slow: bool,
@@ -44,7 +47,7 @@ impl<'c> LockUpCheck<'c> {
             reported_n_m: None,
             by_torque_s: 0.0,
             alike_s: 0.0,
-            since_s: 0.0,
+            since_s: [0.0; 2],
             before: None,
             is_slow: false,
         }
@@ -67,18 +70,11 @@ impl<'c> LockUpCheck<'c> {
         let dt_s = step.input.dt_s.clamp(0.0, 1.0);
         let is_driven = turbine > DRIVEN_RAD_S && turbine >= MIN_SPEED_RATIO * engine;
         let pump_n_m = converter.torques(engine, turbine).pump_n_m.max(0.0);
-        if let Some(reported_n_m) = self.reported_n_m
-            && is_driven
-            && self.is_slow
-            && reported_n_m - pump_n_m > MORE_N_M + MORE_FRACTION * pump_n_m
-        {
-            self.by_torque_s += dt_s;
-        }
-        self.since_s = if is_driven && (engine - turbine).abs() <= ALIKE_RAD_S { self.since_s + dt_s } else { 0.0 };
-        if self.since_s >= ALIKE_S {
-            // With the time up to now once.
-            self.alike_s += if self.since_s - dt_s < ALIKE_S { self.since_s } else { dt_s };
-        }
+        let is_more = self.reported_n_m.is_some_and(|n_m| n_m - pump_n_m > MORE_N_M + MORE_FRACTION * pump_n_m);
+        let is_alike = is_driven && (engine - turbine).abs() <= ALIKE_RAD_S;
+        let [by_torque_s, alike_s] = &mut self.since_s;
+        self.by_torque_s += lasting_s(by_torque_s, is_driven && self.is_slow && is_more, dt_s, LASTING_S);
+        self.alike_s += lasting_s(alike_s, is_alike, dt_s, ALIKE_S);
     }
 
     /// What the log leaves out, in a sentence.
@@ -95,6 +91,18 @@ impl<'c> LockUpCheck<'c> {
                  `reported_engine_torque`, which is the torque at the gearbox input then"
             )
         })
+    }
+}
+
+/// What a step adds to the time in which something lasts for `least_s` and longer; `since_s` is the time since its last break.
+fn lasting_s(since_s: &mut f64, lasts: bool, dt_s: f64, least_s: f64) -> f64 {
+    let before_s = *since_s;
+    *since_s = if lasts { before_s + dt_s } else { 0.0 };
+    match *since_s >= least_s {
+        false => 0.0,
+        // With the time up to now once.
+        true if before_s < least_s => *since_s,
+        true => dt_s,
     }
 }
 
@@ -122,6 +130,16 @@ mod tests {
 
     /// What is said of so long a log with this slip, rad/s, an engine that reports the pump's torque and more, N m, and a flag.
     fn said(seconds: u32, slip: f64, more_n_m: Option<f64>, lock_up_applied: bool) -> Option<String> {
+        said_of(seconds, slip, &|_| more_n_m, lock_up_applied)
+    }
+
+    /// The same of a torque over time, s.
+    fn said_of(
+        seconds: u32,
+        slip: f64,
+        more_n_m: &dyn Fn(f64) -> Option<f64>,
+        lock_up_applied: bool,
+    ) -> Option<String> {
         let car = CarFile::eight_speed().unwrap();
         let mut check = LockUpCheck::new(&car);
         for row in 0..100 * seconds {
@@ -140,7 +158,7 @@ mod tests {
                 gear: ShiftCommand::between(1, 1),
             };
             let pump_n_m = car.converter.unwrap().torques(speeds[0], turbine).pump_n_m;
-            let reported_n_m = more_n_m.map(|more_n_m| Reading::now(pump_n_m + more_n_m));
+            let reported_n_m = more_n_m(time_s).map(|more_n_m| Reading::now(pump_n_m + more_n_m));
             check.push(&LogStep { reported_n_m, ..LogStep::of(time_s, input) }, speeds);
         }
         check.warning()
@@ -165,5 +183,13 @@ mod tests {
         for (slip, more_n_m) in [(10.0, 10.0), (40.0, 40.0), (0.0, 5.0), (0.0, -80.0)] {
             assert_eq!(said(60, slip, Some(more_n_m), false), None, "{slip} {more_n_m}");
         }
+    }
+
+    #[test]
+    fn short_times_of_more_torque_than_the_pump_takes_do_not_add_up() {
+        let pressed = |time_s: f64| Some(if time_s % 5.0 < 0.5 { 80.0 } else { 10.0 });
+        assert_eq!(said_of(600, 8.0, &pressed, false), None);
+        let closed = |time_s: f64| Some(if time_s % 5.0 < 2.0 { 80.0 } else { 10.0 });
+        assert!(said_of(20, 8.0, &closed, false).is_some());
     }
 }
