@@ -117,6 +117,8 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
         Quantity::Pressure => Role::ElementPressure,
         _ => return None,
     };
+    // `I_EDS_A`, `MV1`: the solenoid of an element, with the letter of the element or its own number.
+    const BANK: &[&str] = &["eds", "edc", "mv", "dr", "pcs", "ssv", "vbs", "nfs"];
     // `I_A`, `I_K1`: a current and a letter, with or without a number.
     let is_lettered = match &words[..] {
         [i, letter, number @ ..] => {
@@ -126,7 +128,9 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
         _ => false,
     };
     let is_of_element = match role {
-        Role::ElementCurrent => is_lettered || is_about(CURRENT) && (is_about(CLUTCH) || is_about(ELEMENT)),
+        Role::ElementCurrent => {
+            is_lettered || is_about(BANK) || is_about(CURRENT) && (is_about(CLUTCH) || is_about(ELEMENT))
+        }
         _ => is_about(PRESSURE),
     };
     const OTHERS: &[&str] = &[
@@ -141,6 +145,10 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
         ![CURRENT, CLUTCH, ELEMENT, TARGET, ACTUAL, PRESSURE, COMMAND].iter().any(|list| met(list, word))
     };
     let mut named: Vec<&str> = words.iter().filter(is_name).map(String::as_str).collect();
+    // The letter alone is the element; a number is one of its bank.
+    if named.len() > 1 && named.iter().any(|word| word.len() == 1 && word.starts_with(char::is_alphabetic)) {
+        named.retain(|word| !BANK.contains(word));
+    }
     if named.len() > 1 && named.last().is_some_and(|word| UNITS.contains(word)) {
         named.pop();
     }
@@ -177,6 +185,21 @@ fn elements(channels: &[Channel]) -> Vec<(String, usize)> {
     found
 }
 
+/// The channel with the fraction of the values of another one, whose name it has with a word more: `v` and `v_frac`.
+fn fraction_of(whole: usize, channels: &[Channel]) -> Option<usize> {
+    const FRACTION: &[&str] = &["frac", "fraction", "fract", "nachkomma", "nk", "dec", "decimals", "fine"];
+    let channel = &channels[whole];
+    let of_whole = words(&channel.name);
+    let is_fraction = |other: &Channel| {
+        let mut of_other = words(&other.name);
+        let last = of_other.pop();
+        last.is_some_and(|last| FRACTION.contains(&&*last))
+            && of_other == of_whole
+            && (&other.unit, &other.group) == (&channel.unit, &channel.group)
+    };
+    channels.iter().position(is_fraction)
+}
+
 /// Unused channels that are named at most; a bus has hundreds.
 const UNUSED: usize = 20;
 
@@ -190,6 +213,8 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     let mut taken = vec![false; channels.len()];
     let elements = elements(channels);
     elements.iter().for_each(|(_, at)| taken[*at] = true);
+    let fractions: Vec<Option<usize>> = (0..channels.len()).map(|at| fraction_of(at, channels)).collect();
+    fractions.iter().flatten().for_each(|at| taken[*at] = true);
     for entry in TABLE {
         let mut found: Vec<(Fit, usize)> = channels
             .iter()
@@ -205,7 +230,10 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
             continue;
         };
         taken[best] = true;
-        let table = table_of(entry.role.name(), entry.role, best, channels);
+        let table = match fractions[best] {
+            Some(fraction) => sum_of([best, fraction], entry.role, channels),
+            None => table_of(entry.role.name(), entry.role, best, channels),
+        };
         text += &if best_fit == Fit::Fraction { of_fraction(&table) } else { table };
         let others = found.iter().skip(1).filter(|(fit, _)| (*fit == Fit::Fraction) == (best_fit == Fit::Fraction));
         let others: Vec<String> = others.take(4).map(|(_, i)| error::shown(&channels[*i].name)).collect();
@@ -268,11 +296,18 @@ fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
     text
 }
 
+/// The table of a signal in two channels, whose sum it is.
+fn sum_of([whole, fraction]: [usize; 2], role: Role, channels: &[Channel]) -> String {
+    let name = |at: usize| quoted(&channels[at].name);
+    let both = format!("names = [{}, {}]\ncombine = \"sum\"\n", name(whole), name(fraction));
+    table_of(role.name(), role, whole, channels).replacen(&format!("name = {}\n", name(whole)), &both, 1)
+}
+
 /// The table of a channel that is per cent of a torque, as a comment: without a scale it would be wrong by a factor.
 fn of_fraction(table: &str) -> String {
     let lines: String = table.lines().filter(|line| !line.is_empty()).map(|line| format!("# {line}\n")).collect();
     format!(
-        "\n# In per cent of a torque that the log does not tell. To use it, take the signs away and write how many N m one per cent is.\n\
+        "\n# In per cent of a torque that is not in the log. To use it, remove the signs and write how many N m one per cent is.\n\
          {lines}# scale =\n"
     )
 }

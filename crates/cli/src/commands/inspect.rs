@@ -12,6 +12,7 @@ use trace::units::rpm;
 use crate::args::{Inspect, available_threads};
 use crate::commands::inspect_drive::{Drive, has_command, page, write_converter};
 use crate::commands::inspect_json;
+use crate::commands::suggested::by_values;
 use crate::commands::written::{head, is_page, replaces_only};
 use crate::commands::{channel_map, check_output, not_an_input, shown_from_s};
 use crate::failure::Failure;
@@ -38,12 +39,14 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         let dbc = options.mapping.dbc.as_ref().filter(|_| has_frames);
         let dbc =
             dbc.map(|dbc| std::path::absolute(dbc).unwrap_or_else(|_| dbc.clone()).to_string_lossy().into_owned());
-        return Ok(output::toml(logs::suggest(log.channels(), dbc.as_deref()).trim_end())?);
+        let by_names = logs::suggest(log.channels(), dbc.as_deref());
+        let by_values = by_values(&options.log, &by_names);
+        return Ok(output::toml(format!("{by_names}{by_values}").trim_end())?);
     }
     if options.shifts {
         if map.channels.is_empty() {
             return Err(Failure::Input(
-                "--shifts needs to know the channels\nhint: give --map MAP.toml (`inspect --suggest` writes a first one) or --channel"
+                "--shifts needs the channels of the signals\nhint: give --map MAP.toml (`inspect --suggest` writes a first one) or --channel"
                     .to_owned(),
             ));
         }

@@ -31,6 +31,7 @@ mod shell;
 mod simulate;
 mod simulate_drive;
 mod study;
+mod suggested;
 mod worst_case;
 mod written;
 
@@ -79,7 +80,7 @@ fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
 }
 
 /// Warns of an option that changes nothing here, and says why.
-fn warn_without_effect(option: &str, why: &str) {
+pub(crate) fn warn_without_effect(option: &str, why: &str) {
     output::note(&without_effect(option, why));
 }
 

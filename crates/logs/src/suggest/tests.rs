@@ -222,3 +222,26 @@ fn pressures_that_are_asked_of_elements_are_commands_of_a_gearbox() {
     let found = suggested(&channels).into_iter().filter(|(role, _)| role.starts_with("element_"));
     assert_eq!(found.collect::<Vec<_>>(), wanted);
 }
+
+#[test]
+fn solenoids_by_the_letter_of_their_element_or_their_number_are_commands() {
+    let keys = |names: &[&str]| {
+        let channels: Vec<Channel> = names.iter().map(|name| channel(name, "mA")).collect();
+        suggested(&channels).into_iter().map(|(role, _)| role).collect::<Vec<_>>()
+    };
+    let lettered = ["I_EDS_A", "I_EDS_B", "I_EDS_C", "I_EDS_D", "I_EDS_E"];
+    assert_eq!(keys(&lettered), ["a", "b", "c", "d", "e"].map(|name| format!("element_{name}_current")));
+    assert_eq!(keys(&["MV1", "MV2", "DR2"]), ["dr2", "mv1", "mv2"].map(|name| format!("element_{name}_current")));
+    assert_eq!(keys(&["EDS_Line", "MV_TCC", "DR_Main"]), [""; 0]);
+}
+
+#[test]
+fn a_speed_in_two_channels_is_their_sum() {
+    let channels = [channel("VehicleSpeed_frac", "km/h"), channel("VehicleSpeed", "km/h"), channel("N_Eng", "rpm")];
+    let text = suggest(&channels, None);
+    let both = "[channel.vehicle_speed]\nnames = [\"VehicleSpeed\", \"VehicleSpeed_frac\"]\ncombine = \"sum\"\n# unit of the log: km/h\n";
+    assert!(text.contains(both) && !text.contains("not used"), "{text}");
+    // Of another unit it is another signal.
+    let other = suggest(&[channel("VehicleSpeed_frac", "m/s"), channel("VehicleSpeed", "km/h")], None);
+    assert!(!other.contains("sum"), "{other}");
+}

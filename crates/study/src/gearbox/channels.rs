@@ -235,6 +235,10 @@ fn entry_of(entry: &Mapped, car: &Car, tables: &ShiftTables<f64>) -> Result<Entr
     let clutch = at.and_then(|at| car.clutches.get(at)?.as_ref());
     let is_measured = entry.role == Role::ElementPressure;
     let Some((at, clutch)) = at.zip(clutch) else {
+        // Ratios alone have no elements: a map with commands fits, and they are not used.
+        if car.gearbox.has_ratios_alone() {
+            return Ok(Entry { role: entry.role, element: None });
+        }
         let commands = || element_commands(car).into_iter().map(|(_, name)| name).collect::<Vec<_>>();
         let (what, names) = if is_measured {
             ("pressures", element_pressures(car).map(|(_, name)| name).collect())
