@@ -188,6 +188,19 @@ fn an_estimate_of_a_drive_has_both_clutches_of_every_shift_and_does_not_read_the
     assert!(!page.contains("Kinds of shift") && !page.contains(">true<") && page.contains("<figure>"));
     said(&estimate(&folder, "sim/short.csv", &["-o", &folder.path("few.csv"), "--columns", "health,gear"]));
     assert_eq!(folder.read("few.csv").lines().next(), Some("time_s,health,gear"));
+    // The readings too, where they are asked for; a table with them is an estimate that may be replaced.
+    let log = folder.read("sim/short.csv");
+    let is_command = |name: &&str| name.starts_with("element_") && name.ends_with("_current_a");
+    let command = log.lines().next().unwrap().split(',').find(is_command).unwrap();
+    let measured = ["turbine_speed_rad_s", command, "reported_engine_torque_n_m"];
+    for _ in 0..2 {
+        let columns = format!("health,{}", measured.join(","));
+        said(&estimate(&folder, "sim/short.csv", &["-o", &folder.path("with.csv"), "--columns", &columns]));
+    }
+    let with = folder.read("with.csv");
+    for name in measured {
+        assert!(column(&with, name) == column(&log, name) && column(&with, name).len() > 1000, "{name}");
+    }
     for name in ["e.parquet", "e.mf4"] {
         said(&estimate(&folder, "sim/short.csv", &["-o", &folder.path(name)]));
         assert!(std::fs::metadata(folder.path(name)).unwrap().len() > 10_000, "{name}");

@@ -5,7 +5,7 @@ use std::path::Path;
 use logs::{Log, OpenOptions};
 use study::EstimateColumns;
 use trace::{ShownPath as _, signal};
-use wetclutch::estimate::gearbox::is_car_column;
+use wetclutch::estimate::gearbox::{is_car_column, is_measured_column};
 
 use super::outputs::beside;
 use crate::commands::written::{head, holds_something, is_forced, replaces_only};
@@ -44,10 +44,10 @@ fn is_estimate(path: &Path) -> bool {
         }
         names.map(str::to_owned).collect()
     };
-    // A log may have both gears, and nothing else.
+    // A log may have both gears and the readings, and nothing else.
     let gears = [signal::GEAR, signal::TARGET_GEAR, signal::GEAR_NUMBER, signal::TARGET_GEAR_NUMBER];
-    let is_gear = |name: &str| gears.contains(&name);
-    names.iter().all(|name| is_estimate_column(name)) && names.iter().any(|name| !is_gear(name))
+    let is_of_log = |name: &str| gears.contains(&name) || is_measured_column(name);
+    names.iter().all(|name| is_estimate_column(name) || is_of_log(name)) && names.iter().any(|name| !is_of_log(name))
 }
 
 /// Whether an estimate of any observer and of any car may have a column of this name.

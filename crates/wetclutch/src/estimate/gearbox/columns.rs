@@ -1,11 +1,11 @@
 //! The columns of an estimate of a car with any gearbox.
 
-use car::columns::element_column;
+use car::columns::{element_column, element_commands};
 use car::{Car, Gear, ShiftCommand};
-use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftPhase};
-use observer::{ChannelHealth, Channels, Health};
+use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftInput, ShiftPhase};
+use observer::{ChannelHealth, Channels, Health, Reading, ShiftTables};
 use study::gearbox::gear_numbers::GearNumbers;
-use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
+use trace::signal::{self, OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
 
 use crate::Error;
@@ -20,6 +20,10 @@ pub(crate) struct Row<'a> {
     pub(crate) estimate: ShiftEstimate<f64>,
     /// Guaranteed ranges of the pressures of the elements, Pa.
     pub(crate) ranges_pa: [Option<[f64; 2]>; MAX_ELEMENTS],
+    /// The readings of the row.
+    pub(crate) input: ShiftInput<f64>,
+    /// The reported engine torque, N m.
+    pub(crate) reported_n_m: Option<Reading<f64>>,
 }
 
 /// What the columns of readings say of a row: of channels, of the commands of elements, and which of these are those of the shift.
@@ -157,6 +161,10 @@ pub(crate) enum Value {
     Reading(usize),
     /// The same of the command of an element, by its place in the filter's tables.
     Command(usize),
+    /// The reading itself.
+    Measured(fn(&Row<'_>) -> Option<Reading<f64>>),
+    /// That of the command of an element, by its place in the filter's tables.
+    MeasuredCommand(usize),
 }
 
 impl Value {
@@ -169,6 +177,10 @@ impl Value {
             Self::GearNumber(which) => Cell::Number(row.numbers.number(row.of(which))),
             Self::Reading(at) => row.reading(at),
             Self::Command(place) => Cell::Word(row.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
+            Self::Measured(reading) => of(reading(row).map(|reading| reading.value)),
+            Self::MeasuredCommand(place) => {
+                of(row.input.commands[place.min(MAX_ELEMENTS - 1)].map(|reading| reading.value))
+            }
         }
     }
 }
@@ -221,9 +233,9 @@ fn number(name: impl Into<String>, value: Value) -> Column {
 /// The columns of a car whose elements have these places in the filter's tables.
 pub(crate) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
     let mut columns = vec![
-        word(trace::signal::GEAR, |row| row.gear(0)),
-        word(trace::signal::TARGET_GEAR, |row| row.gear(1)),
-        word(trace::signal::PHASE, |row| Cell::Word(row.estimate.phase.map_or("", |phase| phase.name()))),
+        word(signal::GEAR, |row| row.gear(0)),
+        word(signal::TARGET_GEAR, |row| row.gear(1)),
+        word(signal::PHASE, |row| Cell::Word(row.estimate.phase.map_or("", |phase| phase.name()))),
     ];
     if knows.elements {
         columns.extend([word(ROLES[0], |row| row.element(0)), word(ROLES[1], |row| row.element(1))]);
@@ -239,8 +251,8 @@ pub(crate) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
             ELEMENT.iter().zip(values).map(|(what, value)| number(format!("{}_{what}", element_column(name)), value)),
         );
     }
-    columns.push(word(trace::signal::HEALTH, |row| Cell::Word(row.estimate.health.name())));
-    let gears = [(trace::signal::GEAR_NUMBER, 0), (trace::signal::TARGET_GEAR_NUMBER, 1)];
+    columns.push(word(signal::HEALTH, |row| Cell::Word(row.estimate.health.name())));
+    let gears = [(signal::GEAR_NUMBER, 0), (signal::TARGET_GEAR_NUMBER, 1)];
     columns.extend(gears.map(|(name, which)| number(name, Value::GearNumber(which))));
     columns.extend(readings(places, knows));
     columns
@@ -259,7 +271,7 @@ fn torques(knows: Knows) -> Vec<Column> {
             Value::Of(|row| of(row.estimate.at_turbine.map(|sum| sum.std_dev_n_m))),
         ));
     }
-    columns.push(number(trace::signal::SHAFT_ESTIMATE, Value::Of(|row| of(row.estimate.shaft_n_m))));
+    columns.push(number(signal::SHAFT_ESTIMATE, Value::Of(|row| of(row.estimate.shaft_n_m))));
     let clutch = if knows.converter { "lock_up" } else { "launch_clutch" };
     columns.push(number(
         format!("{clutch}_torque_estimate_n_m"),
@@ -284,6 +296,31 @@ fn readings(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
     channels.chain(places.iter().map(command)).collect()
 }
 
+/// A measured channel: its column, and its reading in a row.
+type Channel = (&'static str, fn(&Row<'_>) -> Option<Reading<f64>>);
+
+/// The measured channels that an estimate may have too.
+const MEASURED: [Channel; 5] = [
+    (signal::ENGINE_SPEED, |row| row.input.engine_rad_s),
+    (signal::TURBINE_SPEED, |row| row.input.turbine_rad_s),
+    (signal::OUTPUT_SPEED, |row| row.input.output_rad_s),
+    (signal::WHEEL_SPEED, |row| row.input.wheel_rad_s),
+    (signal::REPORTED_ENGINE_TORQUE, |row| row.reported_n_m),
+];
+
+/// The columns of the readings of a car, which an estimate has where they are asked for.
+pub(crate) fn measured(car: &Car, tables: &ShiftTables<f64>) -> Vec<Column> {
+    let channels = MEASURED.iter().map(|(name, reading)| number(*name, Value::Measured(*reading)));
+    let command = |(at, name)| Some(number(name, Value::MeasuredCommand(tables.place(at)?)));
+    channels.chain(element_commands(car).into_iter().filter_map(command)).collect()
+}
+
+/// Whether a table of estimates may have a column of this name that logs have too.
+pub fn is_measured_column(name: &str) -> bool {
+    let of_element = |what: &str| name.starts_with("element_") && name.ends_with(what);
+    MEASURED.iter().any(|(known, _)| *known == name) || of_element("_current_a") || of_element("_duty_percent")
+}
+
 /// Whether the estimate of some car may have a column of this name.
 pub fn is_car_column(name: &str) -> bool {
     let of_element = |what: &str| {
@@ -301,13 +338,14 @@ fn of(value: Option<f64>) -> Cell<'static> {
     Cell::Number(value.unwrap_or(f64::NAN))
 }
 
-/// The columns of these names in their order, or all.
-pub(crate) fn chosen(mut all: Vec<Column>, names: &[String]) -> Result<Vec<Column>, Error> {
+/// The columns of these names in their order, also those of readings, or all but those of readings.
+pub(crate) fn chosen(mut all: Vec<Column>, measured: Vec<Column>, names: &[String]) -> Result<Vec<Column>, Error> {
     if names.is_empty() {
         return Ok(all);
     }
+    all.extend(measured);
     let mut chosen = Vec::new();
-    for name in names.iter().map(|name| name.trim()).filter(|name| *name != trace::signal::TIME) {
+    for name in names.iter().map(|name| name.trim()).filter(|name| *name != signal::TIME) {
         let Some(at) = all.iter().position(|column| column.name == name) else {
             let known: Vec<&str> = all.iter().map(|column| column.name.as_str()).collect();
             return Err(Error::Input(format!(

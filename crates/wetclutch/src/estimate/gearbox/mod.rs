@@ -18,8 +18,8 @@ use study::gearbox::gear_numbers::GearNumbers;
 use trace::{Cell, ShownPath as _};
 
 use self::checks::{RowTimes, refused};
-pub use self::columns::is_car_column;
-use self::columns::{Knows, Row, Same, before_readings, chosen, columns};
+use self::columns::{Knows, Row, Same, before_readings, chosen, columns, measured};
+pub use self::columns::{is_car_column, is_measured_column};
 pub use self::learnt::LearntOfDrive;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
@@ -134,7 +134,7 @@ pub fn estimate(
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
     let numbers = GearNumbers::of(car);
-    let columns = chosen(columns(&places, Knows::of(car)), &options.columns)?;
+    let columns = chosen(columns(&places, Knows::of(car)), measured(car, tables), &options.columns)?;
     let (before_readings, mut said, mut named_before) = (before_readings(&columns), None, None);
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(destination, named)?;
@@ -153,7 +153,8 @@ pub fn estimate(
         let estimate = drive.push(&step);
         drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, shift.gears));
         let (gears, ranges_pa) = (step.input.gear, drive.pressure_ranges_pa());
-        let row = Row { car, numbers: &numbers, places: &places, gears, estimate, ranges_pa };
+        let (input, reported_n_m) = (step.input, step.reported_n_m);
+        let row = Row { car, numbers: &numbers, places: &places, gears, estimate, ranges_pa, input, reported_n_m };
         passing.push(step.time_s, row, |time_s, row| {
             let same = Same {
                 readings: said.replace(row.said()) == Some(row.said()),
