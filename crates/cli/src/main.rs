@@ -26,6 +26,8 @@ fn main() -> ExitCode {
     let command = match Arguments::try_parse() {
         Ok(arguments) => {
             arguments.color.hold();
+            let typed: Vec<String> = std::env::args_os().map(|of| of.to_string_lossy().into_owned()).collect();
+            let unused = arguments.without_effect(&typed);
             if arguments.quiet {
                 output::be_quiet();
             }
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
             if arguments.verbose {
                 output::be_verbose();
             }
+            unused.into_iter().for_each(|(option, why)| commands::warn_without_effect(option, why));
             arguments.command
         }
         // The message repeats what was typed, and a shell may have completed the name of a file.

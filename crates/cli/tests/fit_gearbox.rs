@@ -55,7 +55,7 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
         "torque scale: not identified by these logs",
         "correlated: ",
         "shifts held out: ",
-        "better one in ",
+        "which is better in ",
         "mass and road load from ",
         "the reported engine torque is used in ",
     ] {
@@ -78,7 +78,9 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let first = folder.path("first.toml");
     let numbers = ["--mass-kg", "1500", "--wheel-radius-m", "0.3", "--final-ratio", "3", "--engine-torque-n-m", "190"];
     said(&wetclutch(&[&["init", "--gearbox", "8hp"], &numbers[..], &["-o", &first]].concat()));
-    let output = wetclutch(&["fit", &log, "--vehicle", &first, "-o", &folder.path("own.toml")]);
+    let output = wetclutch(&["fit", &log, "--vehicle", &first, "-o", &folder.path("own.toml"), "--units", "rpm,bar"]);
+    let text = printed(&output);
+    assert!(text.contains(" rpm with the given file") && !text.contains("rad/s") && !text.contains("kPa"), "{text}");
     let own = factor(&printed(&output), "E: friction x valve gain");
     assert!((own[0] / clutch_e[0] - 1.0).abs() < 0.01, "{own:?} {clutch_e:?}");
     assert!(folder.read("own.toml").contains("[converter]\n# fit: "), "{}", folder.read("own.toml"));

@@ -167,6 +167,11 @@ fn a_friction_above_the_file_is_said_in_words() {
         let [kiss_kpa, std_dev] = of_element(&text, "learnt kiss points", element);
         assert!(kiss_kpa.abs() < 3.0 * std_dev, "{element}: {text}");
     }
+    let again = ["--learnt", &folder.path("again.toml"), "-o", &folder.path("again.csv"), "--units", "bar"];
+    let in_bar = said(&estimate(&folder, &["sim/city_measured.csv"], &again));
+    assert!(in_bar.contains("learnt kiss points in bar, ") && !in_bar.contains("kPa"), "{in_bar}");
+    let [kpa, bar] = [&text, &in_bar].map(|text| of_element(text, "learnt kiss points", "C")[1]);
+    assert!((0.01 * kpa - bar).abs() < 0.001, "{kpa} kPa, {bar} bar");
     assert!(text.contains("\nlearnt scale of the wheel speed: it reads "), "{text}");
     // The converter is that of the file, and the simulated engine reports its torque as it is.
     for name in ["learnt torque at the gearbox input: ", "learnt reported engine torque: "] {

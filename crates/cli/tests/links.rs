@@ -1,4 +1,4 @@
-//! Links between the pages of the documentation.
+//! Links between the pages of the documentation, and its size.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -51,4 +51,26 @@ fn every_link_between_pages_leads_to_a_file_and_a_place_in_it() {
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
+}
+
+/// The words of a page that somebody wrote: none of a code block or of the target of a link, and no numbers and signs.
+fn words(page: &str) -> usize {
+    let prose = page.split("```").step_by(2).collect::<String>();
+    let (first, links) = prose.split_once("](").unwrap_or((&prose, ""));
+    let after = links.split("](").map(|rest| rest.split_once(')').map_or("", |(_, after)| after));
+    let text = std::iter::once(first).chain(after).collect::<Vec<_>>().join("] ");
+    text.split_whitespace().filter(|word| word.contains(char::is_alphabetic)).count()
+}
+
+/// Longer documentation is read by nobody. Pages that a program writes, and the index of equations, which a test compares with the code, are apart.
+#[test]
+fn the_written_pages_have_at_most_25_000_words() {
+    let mut all = 0;
+    for path in pages(&PathBuf::from(ROOT).join("docs")) {
+        let page = std::fs::read_to_string(&path).unwrap();
+        if !page.starts_with("<!-- Written by") && !path.ends_with("reference/equations.md") {
+            all += words(&page);
+        }
+    }
+    assert!((10_000..=25_000).contains(&all), "{all} words");
 }

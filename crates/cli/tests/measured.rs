@@ -148,7 +148,7 @@ fn a_misspelt_channel_is_named_before_what_the_shift_finder_lacks() {
         stderr(&output)
     );
     let output = wetclutch(&["inspect", &log, "--shifts", "--channel", "engine_speed=N [rpm]"]);
-    assert!(stderr(&output).contains("nothing in the channel map tells a shift"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("no channel of the map shows a shift"), "{}", stderr(&output));
 }
 
 #[test]

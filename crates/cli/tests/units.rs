@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, said, shown, wetclutch};
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, said, shown, stderr, wetclutch};
 
 /// The first number behind these words.
 fn number_behind(text: &str, words: &str) -> f64 {
@@ -59,4 +59,42 @@ fn units_come_from_the_environment_too_and_wrong_ones_are_named() {
         assert!(text.contains(words) && text.contains("--units"), "{text}");
         assert!(refused(&inspect(units, &[])).contains(words));
     }
+}
+
+#[test]
+fn units_and_force_that_change_nothing_are_said() {
+    let folder = Folder::new("unused");
+    let car = format!("{ROOT}vehicles/eight_speed.toml");
+    let log = folder.write("log.csv", "time_s,turbine_speed_rad_s\n0,1\n0.1,2\n0.2,3\n");
+    let table = folder.path("table.csv");
+    let cases: [(&[&str], &str); 6] = [
+        (&["sensitivity", "--json", "--units", "bar"], "--units has no effect: JSON has SI units"),
+        (&["check", VEHICLE, "--json", "--units=bar"], "--units has no effect: JSON has SI units"),
+        (&["convert", &log, "-o", &table, "--units", "bar"], "--units has no effect: files have SI units"),
+        (&["check", VEHICLE, "--force"], "--force has no effect: no file is written"),
+        (&["inspect", &log, "--force"], "--force has no effect: no file is written"),
+        (
+            &["export", &car, "--all", "-o", &folder.path("export")],
+            "--all has no effect: all shifts of the car are exported without it too",
+        ),
+    ];
+    for (arguments, words) in cases {
+        let text = said(&wetclutch(arguments));
+        let warning = format!("warning: {words}\nhint: leave it out\n");
+        assert!(text.contains(&warning) && text.matches("no effect").count() == 1, "{arguments:?}: {text}");
+    }
+    let page = folder.path("page.html");
+    let used: [&[&str]; 3] = [
+        &["check", VEHICLE, "--units", "bar"],
+        &["check", VEHICLE, "--page", &page, "--force"],
+        &["design", VEHICLE, "--json", "--page", &folder.path("design.html"), "--units", "bar"],
+    ];
+    for arguments in used {
+        let text = stderr(&wetclutch(arguments));
+        assert!(!text.contains("no effect"), "{arguments:?}: {text}");
+    }
+    // Those of the environment are for all commands alike.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_wetclutch"));
+    let output = command.env("WETCLUTCH_UNITS", "psi").args(["check", VEHICLE, "--json"]).output().unwrap();
+    assert!(!stderr(&output).contains("no effect"));
 }

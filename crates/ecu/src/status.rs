@@ -42,7 +42,7 @@ pub const ALL: [(&str, u32, &str); 15] = [
     ("IMAGE_CONTENT", IMAGE_CONTENT, "a value is not a number, or a breakpoint not above the one before it"),
     ("MEMORY_SIZE", MEMORY_SIZE, "the memory is too small"),
     ("TIME_REFUSED", TIME_REFUSED, "time step zero, negative or not a number; the last estimate is held"),
-    ("TIME_GAP", TIME_GAP, "time step longer than 0.25 s; the filter begins anew with what it has learnt"),
+    ("TIME_GAP", TIME_GAP, "time step longer than 0.25 s; the filter restarts with what it has learnt"),
     ("GEAR_REFUSED", GEAR_REFUSED, "a gear is in no table; the last gear is taken"),
     ("READING_REFUSED", READING_REFUSED, "a reading is impossible or contradicts the others"),
     ("CHANNEL_LOST", CHANNEL_LOST, "a channel has given no usable reading for 0.25 s"),

@@ -68,7 +68,7 @@ pub enum EvaluateError {
     NoTables(String),
     /// Bytes are no memory of an estimator of this version and car.
     #[error(
-        "this memory of an observer {0}\nhint: make the observer anew, with what was learnt of the car, and save that: it lasts over versions"
+        "this memory of an observer {0}\nhint: make a new observer with what was learnt of the car, and save that: it is valid for all versions"
     )]
     Memory(String),
 }

@@ -102,7 +102,7 @@ pub fn collect(source: LogSource<'_>, given: &Given) -> Result<Collected, FitErr
     let vehicle = &given.vehicle;
     let LogSource { path, map, .. } = source;
     if path == Path::new("-") {
-        return Err(FitError::input("a fit reads a log twice\nhint: give a file in place of standard input"));
+        return Err(FitError::input("a fit reads a log twice\nhint: give a file instead of standard input"));
     }
     let ratios = vec![vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
     let mut log = (source.open)()?;

@@ -61,7 +61,7 @@ impl ShiftKinds {
             _ => format!("shifts used: {} of {upshifts}", self.upshifts[0]),
         };
         if self.unknown_load > 0 {
-            text += &format!(" ({} of them by direction alone: no channel tells the load)", self.unknown_load);
+            text += &format!(" ({} of them by direction alone: no channel shows the load)", self.unknown_load);
         }
         let others = named(&[
             (self.power_off_upshifts, ShiftKind::PowerOffUp.name()),
@@ -99,7 +99,7 @@ mod tests {
         more.count(Direction::Up, Load::Unknown, true);
         kinds.add(more);
         let text = kinds.statement();
-        let begin = "shifts used: 3 of 4 power-on upshifts (1 of them by direction alone: no channel tells the load). Not used: \
+        let begin = "shifts used: 3 of 4 power-on upshifts (1 of them by direction alone: no channel shows the load). Not used: \
                      1 power-on downshift, 2 coast downshifts. The fit";
         assert!(text.starts_with(begin), "{text}");
     }

@@ -120,7 +120,7 @@ impl Fit {
             change.rms_n_m
         );
         if change.rms_n_m <= open {
-            text += ". These logs are too few, or tell too little, to show that the fitted file is better than the given one";
+            text += ". These logs are too few, or contain too little information, to show that the fitted file is better than the given one";
         }
         text
     }
@@ -134,8 +134,8 @@ impl Fit {
         };
         if self.driving_s == 0.0 {
             return format!(
-                "driving between shifts is not fitted: no log has enough of it with the engine pulling in the gears of the file{reasons}. It would tell \
-                 of the mass"
+                "driving between shifts is not fitted: no log has enough of it with the engine pulling in the gears of the file{reasons}. It would identify \
+                 the mass"
             );
         }
         let [_, mass] = self.combination_sd(&[(Parameter::Mass, 1.0), (Parameter::Capacity, -1.0)]);
@@ -229,7 +229,7 @@ impl Fit {
         );
         when(
             !self.available.pressure,
-            "for valve gain, spring and friction singly, measure the pressure of the oncoming clutch in one shift; one tells what ten tell",
+            "for valve gain, spring and friction singly, measure the pressure of the oncoming clutch in one shift; ten show no more",
         );
         when(
             self.fill.is_some_and(|fill| fill.verdict() == Verdict::NotIdentifiable),

@@ -113,7 +113,7 @@ pub(crate) fn reason_to_keep(at_limit: &[String], checked: Option<(usize, [f64; 
     let is_better = fitted < given;
     (!is_better).then(|| {
         format!(
-            "on {shifts} shifts that were held out {error} is {given:.3} rad/s with the given file and {fitted:.3} with the fitted one"
+            "on {shifts} shifts that were held out {error} is {given:.3} rad/s with the given file and {fitted:.3} rad/s with the fitted one"
         )
     })
 }

@@ -63,7 +63,7 @@ fn a_file_that_is_the_car_is_not_made_worse() {
     assert!(after < given + 2.0 * sd * 100.0, "{given} {after} {sd}");
     let said = fit.statements();
     assert!(said.iter().any(|line| line.contains("do not ask for another file")), "{:#?}", fit.report());
-    assert!(said.iter().any(|line| line.contains("too few, or tell too little, to show")), "{said:#?}");
+    assert!(said.iter().any(|line| line.contains("too few, or contain too little information, to show")), "{said:#?}");
     assert!(fit.at_limit.is_empty() && fit.freed.is_empty(), "{:?} {:?}", fit.at_limit, fit.freed);
 }
 

@@ -296,7 +296,7 @@ impl Log {
         let groups: Vec<String> =
             found.iter().filter(is_alone).take(8).map(|i| format!("group = \"{}\"", error::shown(group(i)))).collect();
         if groups.is_empty() {
-            return "nothing in the log tells them apart: rename one of them".to_owned();
+            return "the log has nothing to distinguish them: rename one of them".to_owned();
         }
         format!("choose one by its group in the channel map: {}", groups.join(" or "))
     }

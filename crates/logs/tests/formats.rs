@@ -403,7 +403,7 @@ fn channels_with_one_name_are_told_apart_or_not() {
     let log = Log::open(&folder.write("log.csv", "time_s,n,n,m\n0,1,2,3\n1,1,2,3\n"), &OpenOptions::default()).unwrap();
     let error = log.find("n", None).unwrap_err().to_string();
     assert!(
-        error.ends_with("there are 2 channels `n`\nhint: nothing in the log tells them apart: rename one of them"),
+        error.ends_with("there are 2 channels `n`\nhint: the log has nothing to distinguish them: rename one of them"),
         "{error}"
     );
 }

@@ -375,7 +375,7 @@ fn a_log_that_cannot_tell_a_shift_is_refused() {
     let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };
     for roles in [vec![Role::EngineSpeed], vec![Role::TurbineSpeed, Role::VehicleSpeed], vec![]] {
         let error = ShiftFinder::new(&gearbox, |role| roles.contains(&role)).map(|_| ()).unwrap_err().to_string();
-        assert!(error.starts_with("nothing in the channel map tells a shift\nhint: map `gear`"), "{error}");
+        assert!(error.starts_with("no channel of the map shows a shift\nhint: map `gear`"), "{error}");
     }
     let wrong = Gearbox { ratios: vec![1.0, 2.0], ..Gearbox::default() };
     assert!(ShiftFinder::new(&wrong, |_| true).is_err());

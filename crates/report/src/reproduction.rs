@@ -248,7 +248,7 @@ Estimation and Control of Automotive Drivetrains*, Springer 2014, chapter 2.
 
 The chapter's plant, its shift controller and some of its parameters are not published, and the available scan of it drops
 the digit 1. Statements about the rigid observer are therefore tested with three torque-phase gains: the gain designed
-here, and both readings of the chapter's. *Settings* is the share of the settings of `experiments/plausible.toml` in which
+here, and both readings of the chapter's. *Settings* is the fraction of the settings of `experiments/plausible.toml` in which
 a row agrees or holds: there every value that is chosen or has more than one reading varies, and the observers are built for the
 setting.
 ";
@@ -297,7 +297,7 @@ fn markdown(chapter: &Chapter) -> String {
 pub(crate) const OFFSETS: &str = "A certificate bounds the error that remains, Eq. (2.42) and (2.81), for a valve that behaves as its \
     model; delay and lag of the real valve are not included. Each offset is tested in three ways. After decay: the largest error \
     from 4/kappa2 on, the settling time of the certificate, after which 2 % of the initial error remain. With the initial error: the \
-    error at all times, as a share of the bound (2.40) that contains the initial error. From the start: the largest error of \
+    error at all times, as a fraction of the bound (2.40) that contains the initial error. From the start: the largest error of \
     the whole phase, which the theorem does not bound by the offset. With H of Eq. (2.86) the error is that of the chapter’s printed \
     gain, which is within 2 % of the certified one.";
 

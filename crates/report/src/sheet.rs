@@ -2,7 +2,7 @@
 
 use config::Source;
 use minijinja::{Value, context};
-use trace::shown_units::convert_table;
+use trace::shown_units::{convert_table, sentence};
 
 use crate::figure::Figure;
 use crate::page::{PageError, inline, origin, render};
@@ -75,7 +75,7 @@ impl Sheet<'_> {
                 title => self.title,
                 version => env!("CARGO_PKG_VERSION"),
                 lead => &self.lead,
-                found => found(&self.sentences),
+                found => found(&self.sentences.iter().map(|text| sentence(text)).collect::<Vec<_>>()),
                 parts => self.parts.iter().map(Part::view).collect::<Vec<_>>(),
                 inputs => origin(&self.sources),
             },

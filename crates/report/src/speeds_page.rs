@@ -182,7 +182,7 @@ impl SpeedsPage<'_> {
         if !self.has_command {
             said.push("No pressure: the log has no valve current, duty cycle or pressure command. With one of them and a vehicle file, the command estimate gives it with its range.");
         }
-        said.push("No torque of a clutch itself: ratios alone do not say which share of the turbine's torque a clutch holds. U is that torque as felt at the turbine; friction work does not need the share.");
+        said.push("No torque of a clutch itself: ratios alone do not give the fraction of the turbine torque that a clutch holds. U is that torque at the turbine; friction work does not need it.");
         said.push(
             "Not how offgoing and oncoming clutch divide U while both carry: that needs the torque on the output side.",
         );

@@ -48,6 +48,26 @@ impl ShownUnits {
         Some((format!("{}{}{}", &title[..place.start], conversion.to.name, &title[place.end..]), conversion))
     }
 
+    /// A sentence with each number that has its unit behind it in the wanted unit.
+    fn sentence(&self, text: &str) -> String {
+        let mut shown = String::with_capacity(text.len());
+        let mut rest = text;
+        while let Some((numbers, place, unit)) = numbers_with_unit(rest) {
+            match self.conversion(unit) {
+                Some(to) => {
+                    let space = &rest[numbers.end..place.start];
+                    shown += &rest[..numbers.start];
+                    shown += &to.cell(&rest[numbers]);
+                    shown += space;
+                    shown += to.to.name;
+                }
+                None => shown += &rest[..place.end],
+            }
+            rest = &rest[place.end..];
+        }
+        shown + rest
+    }
+
     /// A value in a unit, with decimals for it, in the wanted unit.
     fn quantity(&self, value: f64, unit: &str, decimals: usize) -> String {
         match Unit::parse(unit).and_then(|unit| self.conversion(unit)) {
@@ -121,6 +141,11 @@ pub fn with_unit(text: String) -> String {
         Some((shown, conversion)) => conversion.cell(&shown),
         None => text,
     }
+}
+
+/// A sentence in which numbers with a unit behind them, as `2.4 +-0.5 kPa` or `3 to 5 rad/s`, are in the wanted unit.
+pub fn sentence(text: &str) -> String {
+    held().map_or_else(|| text.to_owned(), |units| units.sentence(text))
 }
 
 /// From the unit of a column or an axis to the one that is wanted.
@@ -205,6 +230,43 @@ fn first_number(text: &str) -> Option<Range<usize>> {
     None
 }
 
+/// The first unit of a sentence with numbers before it: the place of the numbers, that of the unit, and the unit.
+fn numbers_with_unit(text: &str) -> Option<(Range<usize>, Range<usize>, Unit)> {
+    let mut places = text.match_indices([' ', '\u{a0}']).map(|(at, space)| (at, at + space.len()));
+    places.find_map(|(end, at)| {
+        let spelt = SPELT.iter().find(|spelt| text[at..].starts_with(*spelt))?;
+        // Rates such as rad/s^2 and N m/rad are other quantities; a point may end the sentence.
+        let behind = &text[at + spelt.len()..];
+        let is_whole =
+            behind.trim_start_matches(['.', ',', ';', ':', ')']).chars().next().is_none_or(char::is_whitespace);
+        let start = start_of_numbers(&text[..end])?;
+        is_whole.then_some((start..end, at..at + spelt.len(), Unit::parse(spelt)?))
+    })
+}
+
+/// Where the numbers begin with which a text ends: `-3.0`, `2.4 +-0.5`, `1 to 2`.
+fn start_of_numbers(text: &str) -> Option<usize> {
+    let mut start = None;
+    let mut end = text.len();
+    loop {
+        let before = text[..end].trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
+        if before.len() == end || !text[before.len()..].starts_with(|c: char| c.is_ascii_digit()) {
+            return start;
+        }
+        let signed = before.trim_end_matches(['+', '-']);
+        if !(signed.is_empty() || signed.ends_with([' ', '(', '\u{a0}'])) {
+            return start;
+        }
+        start = Some(signed.len());
+        let is_width = before[signed.len()..] == *"+-";
+        let joint = if is_width { " " } else { " to " };
+        match signed.strip_suffix(" +- ").or_else(|| signed.strip_suffix(joint)) {
+            Some(left) => end = left.len(),
+            None => return start,
+        }
+    }
+}
+
 /// The unit at the end of a title, before a comma or in brackets, and its place.
 fn unit_in(title: &str) -> Option<(Range<usize>, Unit)> {
     let is_before = |text: &str| text.is_empty() || text.ends_with([' ', '(', '\u{a0}']);
@@ -257,6 +319,26 @@ mod tests {
             "jerk m/s^3",
         ] {
             assert!(units.converted(title).is_none(), "{title}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_a_sentence_are_converted_with_their_unit_and_nothing_else() {
+        let units = units("bar,rpm,lb ft,mph");
+        for (text, shown) in [
+            (
+                "off by 1.00 rad/s, of the fitted one by 0.50 rad/s; 12 shifts",
+                "off by 9.55 rpm, of the fitted one by 4.77 rpm; 12 shifts",
+            ),
+            ("reads +2.0 kPa (95 % -1.0 to +5.0 kPa).", "reads +0.020 bar (95 % -0.010 to +0.050 bar)."),
+            ("a kiss point 58 +-5 kPa above, 3 +- 1 kPa", "a kiss point 0.58 +-0.05 bar above, 0.03 +- 0.01 bar"),
+            ("3 shifts of 20 km/h, in 2 10.0 N m", "3 shifts of 12.4 mph, in 2 7.38 lb ft"),
+            ("2 rad/s^2, 3 N m/rad, 4 Pas, kPa, x5 kPa, 1-2 kPa", "2 rad/s^2, 3 N m/rad, 4 Pas, kPa, x5 kPa, 1-2 kPa"),
+            ("", ""),
+            ("é 1 kPa", "é 0.01 bar"),
+        ] {
+            assert_eq!(units.sentence(text), shown);
+            assert_eq!(units.sentence(&units.sentence(text)), units.sentence(text));
         }
     }
 

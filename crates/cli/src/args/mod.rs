@@ -3,6 +3,7 @@
 mod design;
 mod logs;
 mod studies;
+mod unused;
 
 use std::ops::RangeInclusive;
 use std::path::PathBuf;

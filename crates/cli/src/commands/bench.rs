@@ -150,7 +150,7 @@ fn consistent(filter: &BenchConsistency) -> String {
     let (all, (scenario, minimum)) = (&filter.all, &filter.minimum);
     let [turbine, output, wheel] = all.nis();
     format!(
-        "\n{}: the true pressure is in its own 95 % band at {} of the samples of the shifts, least in `{scenario}` with {}\n\
+        "\n{}: the true pressure is in its own 95 % band at {} of the samples of the shifts, lowest in `{scenario}` with {}\n\
          mean square over variance: error of the pressure {:.2}; innovations of turbine {turbine:.2}, output {output:.2}, \
          wheel {wheel:.2}\n\
          in single precision: within {} of double precision at {} of the samples, at most {}; RMS error {:+.2} %; \

@@ -80,7 +80,7 @@ pub(super) fn describe_gearbox(car: &Car) -> Result<(), Failure> {
     if car.gearbox.has_ratios_alone() {
         let [minimum, maximum] = TURBINE_SIDE_INERTIA_KG_M2;
         output::line(&format!(
-            "ratios alone: `wetclutch estimate` gives the torque of all clutches together, as the turbine feels it, with its standard deviation.\n\
+            "ratios alone: `wetclutch estimate` gives the torque of all clutches together at the turbine, with its standard deviation.\n\
              Without `shift_mass` in the gearbox file, M11 is assumed, somewhere from {minimum} to {maximum} kg m2 for an engine of {}, and makes most of that\n\
              deviation in a shift. The torque of a clutch needs the holding torques (level = \"shares\"), its pressure plates and piston besides (`pack`)",
             quantity(190.0, "N m", 0)

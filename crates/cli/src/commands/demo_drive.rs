@@ -94,11 +94,11 @@ fn say_left_out(left_out: &[LeftOut], car: &Car) {
     for left in left_out {
         let sentence = match left.speeds_m_s {
             Some([wanted_m_s, reached_m_s]) => format!(
-                "left out: {}, made at {:.0} km/h, which the car does not get near in gear {}: {:.0} km/h at full throttle",
+                "left out: {}, made at {}, which the car does not reach in gear {}: {} at full throttle",
                 shift(left),
-                3.6 * wanted_m_s,
+                quantity(3.6 * wanted_m_s, "km/h", 0),
                 name(left.leg.from),
-                3.6 * reached_m_s
+                quantity(3.6 * reached_m_s, "km/h", 0)
             ),
             None => {
                 behind.push(shift(left));

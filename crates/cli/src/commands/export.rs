@@ -7,12 +7,15 @@ use serde_json::json;
 use trace::{ShownPath as _, WholeFile};
 use wetclutch::{ExportOptions, ExportedFile, VehicleFile, read_sensors};
 
-use super::{not_an_input, replaceable};
+use super::{not_an_input, replaceable, warn_without_effect};
 use crate::args::Export;
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn export(options: &Export) -> Result<(), Failure> {
+    if options.all {
+        warn_without_effect("--all", "all shifts of the car are exported without it too");
+    }
     let vehicle = VehicleFile::read(&options.vehicle)?;
     let sensors = options.sensors.as_deref().map(read_sensors).transpose()?;
     let program = options.check_elf.as_deref().map(read_program).transpose()?;

@@ -6,7 +6,7 @@ use config::{Kind, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use trace::ShownPath as _;
-use trace::shown_units::with_unit;
+use trace::shown_units::{sentence, with_unit};
 use wetclutch::fitted::{MapChange, ReportRow};
 use wetclutch::{FitOptions, FitProgress, Fitted, LogInput, VehicleFile, fit as fitted, read_sensors};
 
@@ -65,7 +65,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
         print_json(options, &found)?;
     } else {
         table(&found.parameters)?;
-        found.channels.iter().chain(&found.statements).try_for_each(|line| output::line(line))?;
+        found.channels.iter().chain(&found.statements).try_for_each(|line| output::line(&sentence(line)))?;
     }
     report_file(options, &found);
     report_map(options, &found, &left_out);
@@ -158,8 +158,9 @@ fn report_file(options: &Fit, found: &Fitted) {
     output::note(&match &found.kept {
         None => format!("fitted to {shifts}: {output}"),
         Some(reason) => format!(
-            "warning: the given values are kept: {reason}. {output} is the given file with this reason in its first line; do not use other values \
-             before the reason is known"
+            "warning: the given values are kept: {}. {output} is the given file with this reason in its first line; do not use other values \
+             before the reason is known",
+            sentence(reason)
         ),
     });
 }

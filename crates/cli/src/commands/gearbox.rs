@@ -113,7 +113,7 @@ pub(super) fn capacities(gearbox: &Gearbox, capacities: &[Capacity]) -> Result<(
             format!("{:.2}", capacity.ratio()),
         ]);
     }
-    output::line("\ncapacity at line pressure beside the largest torque asked")?;
+    output::line("\ncapacity at line pressure and the largest torque of the gears")?;
     output::table(2, titles, rows)?;
     Ok(())
 }

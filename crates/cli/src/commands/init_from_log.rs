@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use logs::{Log, Readings, Role, SeenGear, SeenGears};
-use trace::ShownPath as _;
+use trace::{ShownPath as _, quantity};
 
 use crate::args::{Init, available_threads};
 use crate::commands::channel_map;
@@ -68,8 +68,8 @@ impl Numbers {
         }
         if options.engine_torque_n_m.is_none() {
             found.push(format!(
-                "engine torque {:.0} N m, the largest in the log: the engine may have more",
-                self.engine_torque_n_m
+                "engine torque {}, the largest in the log: the engine may have more",
+                quantity(self.engine_torque_n_m, "N m", 0)
             ));
         }
         if !found.is_empty() {

@@ -44,18 +44,19 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     let summary = simulate_rows(&car, drive, |row| tables.write(&car, row))?;
     let paths = tables.finish(&options.output)?;
     output::note(&format!(
-        "drive: {:.0} s, {:.2} km{}, {} shifts, at most {:.0} km/h",
+        "drive: {:.0} s, {:.2} km{}, {} shifts, at most {}",
         summary.duration_s,
         1e-3 * summary.distance_m,
         backwards(1e-3 * summary.backwards_m),
         summary.shifts,
-        km_h(summary.fastest_m_s),
+        quantity(km_h(summary.fastest_m_s), "km/h", 0),
     ));
     if let Some(error) = summary.speed_error {
         output::note(&format!(
-            "speed: error {:.2} km/h (root mean square), at most {:.1} km/h; outside the tolerance of 2 km/h and 1 s for {:.2} % of the time",
-            km_h(error.rms_m_s),
-            km_h(error.largest_m_s),
+            "speed: error {} (root mean square), at most {}; outside the tolerance of {} and 1 s for {:.2} % of the time",
+            quantity(km_h(error.rms_m_s), "km/h", 2),
+            quantity(km_h(error.largest_m_s), "km/h", 1),
+            quantity(2.0, "km/h", 0),
             100.0 * error.beyond,
         ));
     }

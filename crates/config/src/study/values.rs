@@ -149,7 +149,7 @@ fn sometimes(check: &Check<'_>, key: &str, raw: &RawFactor, values: Values) -> R
             wrong(chance, "a factor with a `chance` needs its value in the other runs, `otherwise`", hint)
         }
         (None, Some(otherwise)) => {
-            let hint = "add the share of the runs with the factor, such as chance = 0.5";
+            let hint = "add the fraction of the runs with the factor, such as chance = 0.5";
             wrong(otherwise, "`otherwise` is for a factor with a `chance`", hint)
         }
         (Some(chance), Some(otherwise)) => {

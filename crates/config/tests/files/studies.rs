@@ -21,7 +21,7 @@ fn a_factor_by_chance_has_a_fraction_of_the_runs_and_a_value_for_the_others() {
     let error = factor_error("chance-alone", "chance = 0.5\n");
     assert!(error.starts_with("s.toml:9: ") && error.contains("hint: add the value that changes nothing"), "{error}");
     let error = factor_error("otherwise-alone", "otherwise = 1.0\n");
-    assert!(error.starts_with("s.toml:9: ") && error.contains("hint: add the share of the runs"), "{error}");
+    assert!(error.starts_with("s.toml:9: ") && error.contains("hint: add the fraction of the runs"), "{error}");
     for (name, chance) in [("chance-0", "0"), ("chance-1", "1.0")] {
         let error = factor_error(name, &format!("chance = {chance}\notherwise = 1.0\n"));
         assert!(error.starts_with("s.toml:9: ") && error.contains("must be between 0 and 1"), "{error}");

@@ -67,7 +67,7 @@ impl BacklashFit {
     pub(crate) fn statement(found: &Result<Self, String>) -> String {
         match found {
             Ok(found) if found.is_identifiable() => format!(
-                "backlash of the driveline: {:.4} rad at the wheels, +- {:.4} rad, from {} reversals of its torque in a gear. The speed of one wheel tells it on \
+                "backlash of the driveline: {:.4} rad at the wheels, +- {:.4} rad, from {} reversals of its torque in a gear. The speed of one wheel shows it on \
                  straight roads, that of both driven wheels on all",
                 found.rad,
                 SIDES * found.sd_rad,

@@ -78,8 +78,8 @@ impl WheelFit {
             return format!("{found}: its scale and the final ratio fit together");
         };
         format!(
-            "{found}: {}, or the final ratio of the vehicle file is wrong. For a wheel speed in km/h it may be the wheel radius: the speeds tell the product \
-             alone",
+            "{found}: {}, or the final ratio of the vehicle file is wrong. For a wheel speed in km/h it may be the wheel radius: the speeds show only \
+             the product",
             change.instruction()
         )
     }

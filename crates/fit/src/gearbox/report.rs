@@ -97,7 +97,7 @@ impl GearboxFit {
                  factor; it comes from what was known before of {} together, and is in every interval",
                 self.anchors()
             ),
-            format!("beside that factor, friction x valve gain is known within +- {}", seen.join(", ")),
+            format!("besides that factor, friction x valve gain is known within +- {}", seen.join(", ")),
             self.said_of_gain(),
         ];
         lines.extend(correlated::statement(&self.stated, |at| {
@@ -156,7 +156,7 @@ impl GearboxFit {
         let beside = |quantity| 100.0 * SIDES * self.sd_beside_scale(quantity);
         match self.balances.reason(Balance::Car) {
             None => lines.push(format!(
-                "mass and road load from {:.0} s in gear with the engine pulling: beside the common factor of all torques the mass is known within +- \
+                "mass and road load from {:.0} s in gear with the engine pulling: besides the common factor of all torques, the mass is known within +- \
                  {:.1} %. {MEAN_GRADE}",
                 self.driving_s[0],
                 beside(Quantity::Mass)
@@ -339,7 +339,7 @@ impl GearboxFit {
         });
         if !one_way.is_empty() {
             lines.push(format!(
-                "to know more: for inertia and friction apart, shifts with the accelerator pressed and released between {}: so far there are only \
+                "to know more: to separate inertia and friction, shifts with the accelerator pressed and released between {}: so far there are only \
                  those of one of both",
                 one_way.join(", ")
             ));
@@ -366,7 +366,7 @@ impl GearboxFit {
             ));
         }
         if !torque.is_empty() {
-            lines.push(format!("to know more: for the friction of {torque}, shifts at much throttle in which it drives the change of speed"));
+            lines.push(format!("to know more: for the friction of {torque}, shifts at high throttle in which it drives the change of speed"));
         }
         lines
     }

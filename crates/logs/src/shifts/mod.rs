@@ -236,7 +236,7 @@ impl ShiftFinder {
         let speeds = gearbox.ratios.len() >= 2 && output && (has(Role::TurbineSpeed) || has(Role::EngineSpeed));
         if !speeds && !has(Role::Gear) && !has(Role::TargetGear) {
             return Err(LogError::map(
-                "nothing in the channel map tells a shift\n\
+                "no channel of the map shows a shift\n\
                  hint: map `gear` or `target_gear`, or map `turbine_speed` and `output_speed` (or `vehicle_speed`, with \
                  `gearbox.output_rad_per_m`) and give the ratios of the gears",
             ));

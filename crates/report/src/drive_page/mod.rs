@@ -15,7 +15,7 @@ use study::gearbox::matrix::Matrix;
 use study::gearbox::worth_a_look::BY_EACH;
 use study::gearbox::{ShiftDraw, TruePhase};
 use trace::quantity;
-use trace::shown_units::convert_table;
+use trace::shown_units::{convert_table, sentence};
 
 use crate::interactive::within_room;
 use crate::matrix_page::kind_rows;
@@ -116,7 +116,7 @@ impl DrivePage<'_> {
 }
 
 /// What an estimate by ratios alone is, and what is missing for more.
-const RATIOS_ALONE: &str = "Of this gearbox the ratios alone are known: torques are those of all clutches together, as the turbine feels them. The \
+const RATIOS_ALONE: &str = "Of this gearbox the ratios alone are known: torques are those of all clutches together at the turbine. The \
                             torque of a clutch needs the holding torques of the gears (level = \"shares\" in the gearbox file), its pressure \
                             plates and piston besides (`pack`).";
 
@@ -184,9 +184,10 @@ fn draw_rows(draw: &ShiftDraw, car: &Car) -> Vec<Value> {
 /// What happened, in sentences.
 pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     let shifts = &drive.shifts;
+    let warnings = drive.warnings.iter().map(|warning| sentence(warning));
     if shifts.is_empty() {
         let none = "The drive has no shift.".to_owned();
-        return drive.warnings.iter().cloned().chain([none]).collect();
+        return warnings.chain([none]).collect();
     }
     let maximum = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
     let longest = number(maximum(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2);
@@ -194,12 +195,12 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     let sum = |of: fn(&ScoredShift) -> u64| shifts.iter().map(of).sum::<u64>();
     let [all, inside] = [sum(|shift| 2 * shift.summary.clutches()[0]), sum(|shift| 2 * shift.summary.clutches()[1])];
     let good = sum(|shift| shift.summary.rows_with(Health::Good));
-    let mut sentences = drive.warnings.clone();
+    let mut sentences: Vec<String> = warnings.collect();
     let longest = if completed > 0 { format!("; the longest took {longest} s") } else { String::new() };
     sentences.push(format!("{completed} of {} shifts were completed{longest}.", shifts.len()));
     if shifts.iter().any(|shift| !shift.is_garage) {
         sentences.push(format!(
-            "Largest flare of an old gear {}, largest slip beyond a new gear {}.",
+            "Largest flare of an old gear {}, largest overshoot of a synchronous speed {}.",
             quantity(maximum(|shift| shift.quality.flare_rad_s), "rad/s", 1),
             quantity(maximum(|shift| shift.quality.past_synchronous_rad_s), "rad/s", 1),
         ));

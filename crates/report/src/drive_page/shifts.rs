@@ -46,7 +46,7 @@ const COLUMNS: &[Column] = &[
     column("flare rad/s", "largest slip of the old gear in the wrong direction, at the turbine", |s, _| {
         number(s.quality.flare_rad_s, 1)
     }),
-    column("past new gear rad/s", "largest slip of the turbine beyond the speed of the new gear", |s, _| {
+    column("overshoot rad/s", "largest slip of the turbine beyond the synchronous speed of the new gear", |s, _| {
         number(s.quality.past_synchronous_rad_s, 1)
     }),
     column("jerk m/s^3", "maximum jerk of the car, from parabolas over 0.3 s of its speed", |s, _| {
@@ -77,7 +77,7 @@ const COLUMNS: &[Column] = &[
     }),
     column(
         "in range",
-        "share of the true pressures and torques of both clutches within their ranges by the error budget",
+        "fraction of the true pressures and torques of both clutches within their ranges by the error budget",
         |s, _| {
             if s.has_truth() { s.inside().map_or(String::new(), coverage) } else { String::new() }
         },
@@ -92,11 +92,15 @@ const COLUMNS: &[Column] = &[
             })
         },
     ),
-    column("pressures in range", "share of the measured pressures within their ranges by the error budget", |s, _| {
-        let [all, inside] = s.summary.pressures;
-        let fraction = inside as f64 / all as f64;
-        if all > 0 { coverage(fraction) } else { String::new() }
-    }),
+    column(
+        "pressures in range",
+        "fraction of the measured pressures within their ranges by the error budget",
+        |s, _| {
+            let [all, inside] = s.summary.pressures;
+            let fraction = inside as f64 / all as f64;
+            if all > 0 { coverage(fraction) } else { String::new() }
+        },
+    ),
     column("controlling", "the clutch that drives the inertia phase", |s, car| {
         unscored(s, |s| Some(clutch_names(s, car)[controlling_of(&s.rows, s.kind?)].to_owned()))
     }),
@@ -112,7 +116,7 @@ const COLUMNS: &[Column] = &[
     ),
     column(
         "at the turbine N m",
-        "torque of the clutches together as the turbine feels it, mean of the inertia phase; in brackets its standard deviation",
+        "torque of all clutches together at the turbine, mean of the inertia phase; in brackets its standard deviation",
         |s, _| {
             unscored(s, |s| {
                 s.mean_at_turbine_n_m().map(|[mean, sd]| format!("{} (+-{})", number(mean, 0), number(sd, 0)))
@@ -120,15 +124,15 @@ const COLUMNS: &[Column] = &[
         },
     ),
     column(
-        "not seen",
-        "share of both phases in which the speeds show nothing of the controlling clutch's torque",
+        "hidden",
+        "fraction of both phases in which the speeds show nothing of the controlling clutch's torque",
         |s, car| match s.hidden() {
             Some(fraction) => format!("{:.0} %", 100.0 * fraction),
             None if car.gearbox.has_ratios_alone() => String::new(),
             None => "–".to_owned(),
         },
     ),
-    column("health", "the worst health of the shift and its share of the samples", |s, _| {
+    column("health", "the worst health of the shift and its fraction of the samples", |s, _| {
         s.worst_health().map_or("no tables".to_owned(), health)
     }),
 ];
@@ -154,12 +158,12 @@ pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<String>, Vec<Vec<Strin
 pub fn shift_words(drive: &ScoredDrive, car: &Car) -> Vec<(String, &'static str)> {
     const EXPLAINED: [&str; 8] = [
         "flare rad/s",
-        "past new gear rad/s",
+        "overshoot rad/s",
         "tie-up N m",
         "friction work kJ",
         "pressure kPa",
         "controlling",
-        "not seen",
+        "hidden",
         "health",
     ];
     let columns = filled_columns(drive, car).into_iter().filter(|column| EXPLAINED.contains(&column.title));

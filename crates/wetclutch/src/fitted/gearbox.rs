@@ -167,15 +167,15 @@ fn said_of(checked: &HeldOut) -> String {
     let scale = checked.valve_error_scale;
     let [low, high] = checked.valve_error_interval();
     let mut text = format!(
-        "{} shifts held out: turbine speed while both clutches slip, by the torques of the given file off by {given:.2} rad/s, of the fitted one \
-         by {fitted:.2} rad/s; the fitted file is the better one in {}\n\
-         with this file the torques of these shifts by the valves alone err by {scale:.2} (95 % {low:.2} to {high:.2}) of what its error bounds say of friction and valves; `estimate` \
-         trusts the valves by as much (`error_bounds.valve_error_scale`)",
+        "{} shifts held out: error of the turbine speed while both clutches slip {given:.2} rad/s with the given file, \
+         {fitted:.2} rad/s with the fitted one, which is better in {}\n\
+         with this file the torques of these shifts by the valve models have {scale:.2} (95 % {low:.2} to {high:.2}) of the error that its bounds of friction and valves allow; `estimate` \
+         uses this factor (`error_bounds.valve_error_scale`)",
         checked.shifts, checked.better
     );
     if scale < GOOD_VALVES {
-        text += ". With valves as good as these the speeds add little: in simulated cars the torques of `estimate` were 0.6 to 1.8 times as far off as \
-                 those of the valve model alone, which stand beside them";
+        text += ". With valves as good as these the speeds add little: in simulated cars the torque errors of `estimate` were 0.6 to 1.8 times \
+                 those of the valve model alone, which are in the same table";
     }
     text
 }

@@ -124,7 +124,7 @@ fn said_of(checked: Option<&HeldOut>) -> String {
     let Some(checked) = checked else { return nothing_held_out() };
     let [given, fitted] = checked.turbine_rad_s;
     let mut text = format!(
-        "{} shifts held out: one-step error of the turbine speed {given:.3} rad/s with the given file, {fitted:.3} with the fitted one",
+        "{} shifts held out: one-step error of the turbine speed {given:.3} rad/s with the given file, {fitted:.3} rad/s with the fitted one",
         checked.shifts
     );
     if let Some([given, fitted]) = checked.pressure_pa.map(|errors| errors.map(|error| 1e-3 * error)) {

@@ -6,6 +6,7 @@ use std::path::Path;
 use car::Car;
 use config::{ConfigError, Source, read_learnt, write_learnt};
 use observer::gearbox::Learnt;
+use trace::shown_units::with_unit;
 use trace::{ShownPath as _, WholeFile};
 use wetclutch::estimate::gearbox::LearntOfDrive;
 
@@ -69,7 +70,7 @@ impl<'a> Kept<'a> {
         }
         let [taken, all] = of_drive.shifts;
         said.push(format!("learnt: {file}, after {taken} shifts of this log ({all} in all)"));
-        said.extend(of_drive.sentences.iter().cloned());
+        said.extend(of_drive.sentences.iter().cloned().map(with_unit));
         Self { path, text: Some(write_learnt(&car.gearbox, learnt)), said }
     }
 

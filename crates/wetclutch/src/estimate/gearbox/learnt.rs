@@ -53,10 +53,10 @@ fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> V
     };
     let mut said = vec![
         format!(
-            "learnt torque at the same pressure (friction times gain), % above the vehicle file: {}",
+            "learnt torque at the same pressure (friction times gain), in %, above the vehicle file: {}",
             list(&|of| of.torque_fraction, 100.0)
         ),
-        format!("learnt kiss points, kPa above the vehicle file: {}", list(&|of| of.kiss_pa, 1e-3)),
+        format!("learnt kiss points in kPa, above the vehicle file: {}", list(&|of| of.kiss_pa, 1e-3)),
     ];
     let timing = |which: usize, per_unit: f64| {
         let of = |(at, element): (usize, &geartrain::GearboxElement)| {
@@ -66,8 +66,8 @@ fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> V
         let elements = car.gearbox.elements.iter().enumerate();
         elements.filter_map(of).collect::<Vec<_>>().join(", ")
     };
-    said.push(format!("learnt lag of the valves, % above the vehicle file: {}", timing(0, 100.0)));
-    said.push(format!("learnt delay of the valves, ms above the middle of its bounds: {}", timing(1, 1e3)));
+    said.push(format!("learnt lag of the valves in %, above the vehicle file: {}", timing(0, 100.0)));
+    said.push(format!("learnt delay of the valves in ms, above the middle of its bounds: {}", timing(1, 1e3)));
     let [input, reported] = filter.learnt_sources(learnt).map(|of| of.map(|value| 100.0 * value));
     let source =
         if car.converter.is_some() { "by the converter of the vehicle file" } else { "that the engine reports" };

@@ -65,6 +65,6 @@ impl<'a> Passing<'a> {
 
     /// Refuses a selection that no shift is in.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        self.selection.check("`gear` and `target_gear` tell a shift")
+        self.selection.check("`gear` and `target_gear` show a shift")
     }
 }

@@ -105,7 +105,7 @@ impl Ratios {
             let [offgoing, oncoming] = self.gears;
             let hint = self.contradiction().unwrap_or_else(|| {
                 "check unit and scale of turbine_speed and output_speed, and whether the vehicle file is of this car; for a log of more gears, a \
-                 channel map with `gearbox.ratios` tells them apart"
+                 channel map with `gearbox.ratios` distinguishes them"
                     .to_owned()
             });
             return Err(Error::Input(format!(
