@@ -38,7 +38,7 @@ fn a_default_requirement_that_is_not_met_is_said_and_no_failure() {
     let car = car("eight_speed");
     let design = |more: &[&str]| wetclutch(&[&["design", &car, "--shift", "6-7", "--phase", "torque"], more].concat());
     let text = printed(&design(&[]));
-    for words in [", not met)", "open loop serves: its steady-state bound", "--offset-max replaces it"] {
+    for words in [", not met)", "open loop is used: its steady-state bound", "--offset-max replaces it"] {
         assert!(text.contains(words), "{words}: {text}");
     }
     let output = design(&["--offset-max", "10000"]);
@@ -74,7 +74,7 @@ fn without_a_shift_the_upshifts_that_hide_their_pressure_are_in_a_table() {
             assert!(line.contains(&format!("{:.1}", bound("open_loop_bound_n_m"))), "{line}");
             hidden += usize::from(is_hidden);
         }
-        assert_eq!(line.matches("open loop serves").count(), hidden, "{line}");
+        assert_eq!(line.matches("open loop is used").count(), hidden, "{line}");
         assert!(line.contains(&format!("{:.2}", row["ratio_gain"].as_f64().unwrap())), "{line}");
         // Whether the gearbox output can be weighed against the turbine torque to within the budget: in no shift of this car.
         assert!(row["torque_phase"]["uses_open_loop"].as_bool().unwrap() && hidden == 1, "{row}");

@@ -43,9 +43,37 @@ fn init_takes_ratios_and_final_ratio_of_a_log_and_says_what_it_does_not_show() {
     assert!((final_ratio / 3.0 - 1.0).abs() < 0.01, "{final_ratio}");
     assert!(wetclutch(&["check", &car]).status.success());
     // Of a gearbox whose ratios alone are known no command is used, and the map may have them.
-    assert!(folder.read("map.toml").contains("[channel.element_"));
+    let suggested = folder.read("map.toml");
+    assert!(suggested.contains("[channel.element_") && suggested.contains("\n# ratios = [2.4"), "{suggested}");
+    assert!(!suggested.contains("valid_range"), "{suggested}");
+    // A value that means that there is none.
+    let text = std::fs::read_to_string(&log).unwrap();
+    let with_none = text.lines().enumerate().map(|(at, line)| {
+        let (time, rest) = line.split_once(',').unwrap();
+        let rest = rest.split_once(',').unwrap().1;
+        if at == 700 { format!("{time},16383.5,{rest}\n") } else { format!("{line}\n") }
+    });
+    let with_none = folder.write("none.csv", with_none.collect::<String>());
+    let suggested = printed(&wetclutch(&["inspect", &with_none, "--suggest"]));
+    let line = "# [channel.engine_speed] has ";
+    assert!(
+        suggested.contains(line)
+            && suggested.contains("16383.5; to leave out what no car has, add: valid_range = [-10, 1047]"),
+        "{suggested}"
+    );
     let estimate = wetclutch(&["estimate", &log, "--map", &map, "--vehicle", &car, "-o", &folder.path("out.csv")]);
     assert!(estimate.status.success(), "{}", stderr(&estimate));
+    // What changes nothing is said.
+    let all = ["--final-ratio", "3", "--engine-torque-n-m", "200", "--wheel-radius-m", "0.3"];
+    let unused = |more: &[&str], words: &str| {
+        let file = folder.path(&format!("{}.toml", words.replace([' ', '-', ':'], "_")));
+        let given = [&["init", "--from-log", &log, "--map", &map, "--mass-kg", "1500", "-o", &file], &all[..], more];
+        let text = said(&wetclutch(&given.concat()));
+        assert!(text.contains(&format!("warning: {words}")), "{text}");
+        std::fs::read_to_string(file).unwrap()
+    };
+    unused(&["--gearbox", "ravigneaux_4"], "--from-log has no effect: ");
+    assert!(!unused(&["--stroke"], "--stroke has no effect: ").contains("[fill]"));
     // A file that is there stays, and what is missing is asked for.
     assert!(refused(&init(&radius)).contains("the file is there already"));
     let other = folder.path("other.toml");

@@ -238,6 +238,14 @@ pub(crate) struct Init {
     pub(crate) json: bool,
 }
 
+impl Init {
+    /// Whether everything is given that a log could show.
+    pub(crate) fn has_all_of_a_log(&self) -> bool {
+        let numbers = [self.wheel_radius_m, self.final_ratio, self.engine_torque_n_m];
+        self.gearbox.is_some() && numbers.iter().all(Option::is_some)
+    }
+}
+
 /// What connects the engine with the gearbox.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum LaunchChoice {

@@ -49,7 +49,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("WETCLUTCH_OF_COMM
 #[derive(Debug, Parser)]
 #[command(name = "wetclutch", version = VERSION, about, after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Arguments {
-    /// Messages are errors and warnings alone; results are printed as without it
+    /// No messages but errors and warnings; results are printed as without it
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
     /// Also say which files are read and written, what is assumed, and the stages of the work, each with the time since the start
@@ -192,7 +192,7 @@ pub(crate) enum Command {
     /// Fit a vehicle file to logs of measured shifts
     ///
     /// Finds the power-on upshifts of the vehicle's gears in the logs and fits converter, clutch, valve, inertias, shafts, tyres,
-    /// mass and delays to them. Prints each value with its interval, what these logs cannot tell, and which measurement would. Writes
+    /// mass and delays to them. Prints each value with its interval, what these logs do not identify, and which measurement would. Writes
     /// the vehicle file with the fitted values; comments and all other keys stay, and the error budget follows from the fit.
     ///
     /// Needs engine, turbine and output speed and the command of the oncoming clutch's valve. Used where the log has them:
@@ -281,7 +281,7 @@ pub(crate) enum Command {
     /// and whether an observer can distinguish the error from a pressure.
     ///
     /// With the vehicle file of a car with a gearbox: what each error does to the estimate of every shift between neighbouring gears, and
-    /// in which of them the speeds show nothing of the clutch torque, so that the valve model serves.
+    /// in which of them the speeds show nothing of the clutch torque, so that the estimate is that of the valve model.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
     /// Check vehicle, gearbox, experiment, drive and study files

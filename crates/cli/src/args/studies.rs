@@ -83,7 +83,7 @@ pub(crate) struct Bench {
     /// Vehicle file with a gearbox: every shift between its neighbouring gears, in every kind
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Cars drawn for each shift, whose friction, valve gains, converter and strokes of pistons differ from those of the vehicle file
+    /// Cars sampled for each shift, whose friction, valve gains, converter and strokes of pistons differ from those of the vehicle file
     #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "vehicle")]
     pub(crate) draws: u32,
@@ -154,7 +154,7 @@ impl Threads {
 pub(crate) struct ErrorBoundOptions {
     /// Study file
     pub(crate) study: PathBuf,
-    /// File for the bounds, which `design --bounds` reads; a page is written beside it. Default: standard output
+    /// File for the bounds, which `design --bounds` reads; a page is written alongside. Default: standard output
     #[arg(short, long, value_name = "BOUNDS.toml")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]

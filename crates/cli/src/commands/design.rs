@@ -118,7 +118,7 @@ fn use_lines(use_of: &GainUse, offset_pa: f64) -> Vec<String> {
     let mut lines = vec![step_line(use_of.longest_step_s)];
     if !use_of.is_open_loop && offset_pa > use_of.open_loop_bound_pa {
         lines.push(format!(
-            "  open loop serves: its steady-state bound, with every error of the budget, is {}, less than the offset bound of this gain",
+            "  open loop is used: its steady-state bound, with every error of the budget, is {}, less than the offset bound of this gain",
             mpa(use_of.open_loop_bound_pa)
         ));
     }

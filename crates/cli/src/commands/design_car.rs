@@ -20,7 +20,7 @@ const OTHER_KINDS: &str = "Gains are designed for upshifts with a driving engine
                            estimates\n(`wetclutch estimate`): its gains follow from the variances of the readings and of the car's errors.";
 
 /// In the table, where no gain reduces the bound.
-const OPEN_LOOP: &str = "open loop serves";
+const OPEN_LOOP: &str = "open loop is used";
 
 pub(super) fn of_car(options: &Design) -> Result<(), Failure> {
     if options.bounds.is_some() {

@@ -30,6 +30,12 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     if log.is_none() && options.mapping.is_given() {
         warn_without_effect("a channel map", "it says which channels of the log of --from-log are which signals");
     }
+    if log.is_some() && options.has_all_of_a_log() {
+        warn_without_effect("--from-log", "the gearbox and all numbers are given");
+    }
+    if options.stroke && log.is_some() && options.gearbox.is_none() {
+        warn_without_effect("--stroke", "a gearbox with ratios alone has no pistons");
+    }
     let numbers = Numbers::of(options, log.as_ref())?;
     let gearbox = match (&options.gearbox, &log) {
         (Some(gearbox), _) => car(options, &numbers, gearbox)?,
@@ -100,7 +106,8 @@ fn by_ratios(options: &Init, numbers: &Numbers, log: &FromLog) -> Result<PathBuf
     let source = Source { path: path.clone(), text: log.gearbox_file(&options.name)? };
     refuse_existing(&path, &source.text)?;
     let launch = options.launch.unwrap_or(LaunchChoice::Converter);
-    let text = short_car_file(&facts(options, numbers, file, launch), &source)?;
+    let facts = CarFacts { has_stroke: false, ..facts(options, numbers, file, launch) };
+    let text = short_car_file(&facts, &source)?;
     write_text(&path, &source.text)?;
     output::note(&format!("gearbox file: {}", path.shown()));
     write_text(&options.output, &text)?;

@@ -101,7 +101,7 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     output::line(
         "standard deviation of the estimated torque of the clutch that drives the inertia phase: filter / valve model alone, and their ratio,\n\
          where each error is anywhere within its bound, independent of the others; hidden: the ratio is above 0.9, the speeds show nothing of\n\
-         this torque, and the valve model serves\n",
+         this torque, and the estimate is that of the valve model\n",
     )?;
     let (titles, rows) = sensitivity_rows(&shifts, &car);
     output::table(3, titles, rows)?;

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use config::significant;
 use logs::{Channel, ChannelMap, Log, Mapped, Readings, Role, SeenGears};
 use trace::{Quantity, Unit};
 
@@ -59,8 +60,10 @@ fn ranges(path: &Path, map: &ChannelMap) -> Option<String> {
         // Writing to a string does not fail.
         let _ = writeln!(
             text,
-            "# [channel.{}] has {minimum} to {maximum}; to leave out what no car has, add: valid_range = [{low:.0}, {high:.0}]",
-            mapped.key()
+            "# [channel.{}] has {} to {}; to leave out what no car has, add: valid_range = [{low:.0}, {high:.0}]",
+            mapped.key(),
+            significant(minimum),
+            significant(maximum)
         );
     }
     Some(text).filter(|text| !text.is_empty()).map(|text| format!("\n{text}"))
@@ -69,7 +72,7 @@ fn ranges(path: &Path, map: &ChannelMap) -> Option<String> {
 /// The values of a signal that a car has \[chosen\], in the unit of its channel.
 fn valid(mapped: &Mapped, channel: &Channel) -> Option<[f64; 2]> {
     let (range, unit) = match mapped.role {
-        Role::EngineSpeed | Role::TurbineSpeed => ([0.0, 10_000.0], "rpm"),
+        Role::EngineSpeed | Role::TurbineSpeed => ([-100.0, 10_000.0], "rpm"),
         Role::OutputSpeed => ([-5_000.0, 10_000.0], "rpm"),
         Role::WheelSpeed => ([-500.0, 4_000.0], "rpm"),
         Role::VehicleSpeed => ([-50.0, 400.0], "km/h"),
