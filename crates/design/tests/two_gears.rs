@@ -120,13 +120,13 @@ fn its_filter_has_the_tables_of_a_gearbox_file() {
 }
 
 #[test]
-fn its_filter_leaves_strokes_to_the_ranges_and_takes_limits_of_the_file() {
+fn its_filter_has_the_pistons_and_limits_of_the_file_and_no_ranges_of_its_own() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_stroke.toml");
     let vehicle = VehicleFile::read(path.as_ref()).unwrap().vehicle;
     let filter = one_shift_filter(&vehicle, None);
     for place in [OFFGOING, ONCOMING] {
         let element = &filter.tables().elements[place];
-        assert!(element.piston.is_none() && element.budget.is_none());
+        assert!(element.piston.is_some() && element.budget.is_none());
         assert_eq!(element.limits.command_max, vehicle.settings.command_max);
         assert_eq!(element.limits.pressure_max_pa, vehicle.error_bounds.pressure_max_pa);
     }

@@ -10,14 +10,13 @@ use crate::{GearboxFilter, InputLimits, OneShiftFilter, ShiftTables, Supervisor,
 /// The gearbox filter of this vehicle, for signals from these sensors; without them the readings are taken to be of the moment, with the
 /// noise of the error budget.
 ///
-/// Guaranteed ranges are those of [`crate::RangeEstimator`], the same for every observer. The strokes of the pistons are in them, and not
-/// in the estimate: a stroke is known within a quarter of its volume, and such a model of the fill errs more than none.
+/// Guaranteed ranges are those of [`crate::RangeEstimator`], the same for every observer.
 pub fn one_shift_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> OneShiftFilter<f64> {
     let (car, budget) = (vehicle.with_two_gears(), ErrorBudget::of_vehicle(vehicle));
     let tables = ShiftTables::of_car(&car, &budget).expect("a vehicle of one shift has two elements");
     let filter = gearbox_filter(&car, &tables, &budget, sensors);
     let rows = tables.tables();
-    let element = |at: usize| FrictionElement { piston: None, budget: None, ..rows.elements[at] };
+    let element = |at: usize| FrictionElement { budget: None, ..rows.elements[at] };
     let own = OneShiftTables {
         elements: [OFFGOING, ONCOMING].map(element),
         gears: [OFFGOING, ONCOMING].map(|at| rows.gears[at]),

@@ -163,6 +163,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             slow_n_m: torque.turbine_n_m,
             motion: None,
             rates: [T::zero(); SPEEDS],
+            pressures_before: [[T::zero(), T::one()]; 2],
             gates: [Gate::new(GATE); SPEEDS],
             silent_s: [T::zero(); SPEEDS],
             wheel_off_rad_s: T::zero(),

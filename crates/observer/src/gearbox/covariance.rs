@@ -106,6 +106,12 @@ impl<T: Real> Gaussian<T> {
         }
     }
 
+    /// Mean and variance of a state.
+    pub(super) fn of_state(&self, state: usize) -> [T; 2] {
+        let state = state.min(N - 1);
+        [self.mean[state], self.covariance[state][state]]
+    }
+
     /// Adds to the covariance of two states.
     pub(super) fn add(&mut self, i: usize, j: usize, covariance: T) {
         let (i, j) = (i.min(N - 1), j.min(N - 1));

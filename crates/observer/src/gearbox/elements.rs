@@ -304,6 +304,11 @@ impl<T: Real> ElementState<T> {
         self.pistons.as_ref().map(|pistons| pistons.lasts)
     }
 
+    /// Takes what the readings have shown of the error of what presses the plates: factor of that error then, and what is added.
+    pub(super) fn take_fill(&mut self, before: [T; 2], after: [T; 2]) -> Option<[T; 2]> {
+        self.pistons.as_mut()?.take_shown(before, after)
+    }
+
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
     /// moves, and at rest.
     fn std_dev_pa(&self, u: &ElementUncertainty<T>) -> T {

@@ -20,7 +20,7 @@
 //! while that may be a wrong reading, the filter goes on for both cases (`doubt.rs`). Where the speeds are noisier than stated, it takes them so (`noise.rs`). The shift command may change at any time: what
 //! is known of an element that takes part in both shifts is kept, and nothing begins anew. The valve models of all
 //! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; the
-//! time is estimated by nine piston models for each element, each with its probability.
+//! time is estimated by ten piston models for each element, each with its probability.
 //!
 //! Torque is estimated, and pressure follows: it is the valve model's, with the gain of the valve that `f` and `k` speak for.
 //!
@@ -268,6 +268,8 @@ struct Running<T> {
     motion: Option<Motion<T>>,
     /// Rates of turbine, output and wheel speed, rad/s^2.
     rates: [T; SPEEDS],
+    /// Mean and variance of the errors of both pressures before the newest readings.
+    pressures_before: [[T; 2]; 2],
     gates: [Gate; SPEEDS],
     /// Time since a reading was taken, s; of the wheel speed since one came.
     silent_s: [T; SPEEDS],
@@ -372,6 +374,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let mut channels = Channels::all(ChannelHealth::Absent);
         // Each element has a command of its own.
         channels.offgoing_command = ChannelHealth::Unused;
+        self.take_fills(state);
         let commands = self.pass_elements(state, input, dt_s);
         channels.command = self.of_commands(&commands, input.gear);
         channels.engine_torque = self.take_reported(state, input, dt_s);

@@ -4,18 +4,30 @@
 //! the pressure at its valve. What follows is no small error about a mean: the element carries all or nothing. So nine
 //! pistons of equal probability are carried by the law of [`drivetrain::Cylinder`]. They differ by two independent errors: of
 //! the time that a fill takes (volume and passages), and of the pressure at the valve against that of the return spring,
-//! on which a slow stroke at low pressure depends. From them follow the probability that the plates touch, mean
-//! and standard deviation of what presses them, and how much of an error of it lasts from step to step.
+//! on which a slow stroke at low pressure depends. A tenth has no stroke to make, as that of a clutch that was open for too short a time
+//! to empty, or of another car than the file says; its probability is what the readings of the fill show. From them follow the
+//! probability that the plates touch, mean and standard deviation of what presses them, and how much of an error of it lasts from step
+//! to step.
 
 use drivetrain::{Cylinder, Real};
 
 use super::square;
 
-/// Pistons that are carried.
-const POINTS: usize = 9;
+/// Pistons with a stroke that are carried.
+const STROKES: usize = 9;
+/// The same and one more, without a stroke.
+const POINTS: usize = STROKES + 1;
+/// Its stroke over that of the file: what is left of the clearance.
+const CLOSED: f64 = 1e-3;
+/// Probability before a fill that the piston has no stroke to make \[chosen\], and the minimum of it and of the opposite, whatever the
+/// readings show.
+const CLOSED_BEFORE: f64 = 0.1;
+const CLOSED_MIN: f64 = 1e-3;
+/// Largest logarithm of the ratio of two likelihoods in a step.
+const LARGEST_LOG: f64 = 20.0;
 /// Standard deviations of the fill's time and of the pressure of each piston: the middles of nine equal parts of a Gaussian, each once in
 /// both columns, which are not correlated. The first piston is the nominal one.
-const AWAY: [[f64; 2]; POINTS] = [
+const AWAY: [[f64; 2]; STROKES] = [
     [0.0, 0.0],
     [PARTS[0], PARTS[2]],
     [PARTS[1], -PARTS[3]],
@@ -40,7 +52,7 @@ pub struct Piston<T> {
     /// The nominal cylinder.
     pub cylinder: Cylinder<T>,
     /// Of each of the pistons that are carried the volume of the stroke, m^3, and the pressure in its standard deviations.
-    pub each: [[T; 2]; POINTS],
+    pub each: [[T; 2]; STROKES],
 }
 
 impl Piston<f64> {
@@ -59,7 +71,11 @@ impl Piston<f64> {
 impl<T: Real> Piston<T> {
     /// The cylinders of the pistons that are carried, and the errors of their pressures, Pa, with this standard deviation.
     fn cylinders(&self, error_pa: T) -> [(Cylinder<T>, T); POINTS] {
-        self.each.map(|[stroke_m3, more]| (Cylinder { stroke_m3, ..self.cylinder }, more * error_pa))
+        core::array::from_fn(|k| {
+            let [stroke_m3, more] =
+                self.each.get(k).copied().unwrap_or([T::of(CLOSED) * self.cylinder.stroke_m3, T::zero()]);
+            (Cylinder { stroke_m3, ..self.cylinder }, more * error_pa)
+        })
     }
 
     /// The same in another precision.
@@ -96,9 +112,9 @@ pub(super) struct Spread<T> {
 }
 
 impl<T: Real> Spread<T> {
-    fn of(points: &[Point<T>; POINTS], moving_pa: T) -> Self {
-        let touches = mean(points, |point| if point.touches { T::one() } else { T::zero() });
-        let fill = covariance(points, |point| point.pressed_pa).at_least(T::zero());
+    fn of(points: &[Point<T>; POINTS], closed: T, moving_pa: T) -> Self {
+        let touches = mean(points, closed, Point::touching);
+        let fill = covariance(points, closed, |point| point.pressed_pa).at_least(T::zero());
         Self { touches, fill_pa: fill.sqrt(), all_pa: (fill + square(touches * moving_pa)).sqrt() }
     }
 }
@@ -108,6 +124,8 @@ impl<T: Real> Spread<T> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Pistons<T> {
     points: [Point<T>; POINTS],
+    /// Probability of the last of them, which has no stroke. The others are alike.
+    closed: T,
     pub(super) spread: Spread<T>,
     /// Correlation of the error of what presses the plates with that at the beginning of the step.
     pub(super) lasts: T,
@@ -124,7 +142,9 @@ impl<T: Real> Pistons<T> {
         let points = piston.cylinders(error_pa).map(|(cylinder, away_pa)| {
             Point::new(&cylinder, cylinder.volume((valve_pa + away_pa).at_least(T::zero())), away_pa)
         });
-        Self { points, spread: Spread::of(&points, moving_pa), lasts: T::one(), valve_pa, moving_pa, rest: false }
+        let closed = T::of(CLOSED_BEFORE);
+        let spread = Spread::of(&points, closed, moving_pa);
+        Self { points, closed, spread, lasts: T::one(), valve_pa, moving_pa, rest: false }
     }
 
     /// Carries the pistons over a step, at whose end the valve has this pressure. `error_pa` is the standard deviation of the pressure
@@ -164,10 +184,13 @@ impl<T: Real> Pistons<T> {
     /// What follows at the end of a step, with this standard deviation of the pressure.
     fn conclude(&mut self, moving_pa: T) {
         let then = self.spread;
-        self.spread = Spread::of(&self.points, moving_pa);
+        if self.points.iter().all(|point| !point.touches || point.pressed_pa <= T::zero()) {
+            self.closed = T::of(CLOSED_BEFORE);
+        }
+        self.spread = Spread::of(&self.points, self.closed, moving_pa);
         let by_pressure = self.spread.touches * moving_pa * then.touches * self.moving_pa;
         let both = self.spread.all_pa * then.all_pa;
-        let lasts = (covariance(&self.points, |point| point.pressed_before_pa) + by_pressure) / both;
+        let lasts = (covariance(&self.points, self.closed, |point| point.pressed_before_pa) + by_pressure) / both;
         self.lasts = if both > T::zero() { lasts.at_least(T::zero()).at_most(T::one()) } else { T::zero() };
         self.moving_pa = moving_pa;
     }
@@ -179,23 +202,58 @@ impl<T: Real> Pistons<T> {
 
     /// Mean of the pressure, Pa.
     pub(super) fn mean_pa(&self) -> T {
-        mean(&self.points, |point| point.pressure_pa)
+        mean(&self.points, self.closed, |point| point.pressure_pa)
+    }
+
+    /// Takes what the readings of a step have shown of the error of what presses the plates, as mean and variance before and after them, in
+    /// its standard deviations: whether there is a stroke to make. Factor of that error then, and what is added.
+    pub(super) fn take_shown(&mut self, before: [T; 2], after: [T; 2]) -> Option<[T; 2]> {
+        let all_pa = self.spread.all_pa;
+        let precision = after[1].recip() - before[1].recip();
+        if !(precision > T::zero() && precision.is_finite() && all_pa > T::of(RESTS_PA)) {
+            return None;
+        }
+        let information = after[0] / after[1] - before[0] / before[1];
+        let then_pa = self.pressed_pa(self.closed);
+        let [strokes, none] = [T::zero(), T::one()].map(|closed| {
+            let away = (self.pressed_pa(closed) - then_pa) / all_pa;
+            let variance = square(Spread::of(&self.points, closed, self.moving_pa).all_pa / all_pa);
+            log_likelihood([away, variance], [information, precision])
+        });
+        let (log_ratio, largest) = (none - strokes, T::of(LARGEST_LOG));
+        if !log_ratio.is_finite() {
+            return None;
+        }
+        let odds = self.closed / (T::one() - self.closed) * log_ratio.at_least(-largest).at_most(largest).exp();
+        let minimum = T::of(CLOSED_MIN);
+        self.closed = (odds / (T::one() + odds)).at_least(minimum).at_most(T::one() - minimum);
+        self.spread = Spread::of(&self.points, self.closed, self.moving_pa);
+        Some([all_pa, then_pa - self.pressed_pa(self.closed)].map(|of| of / self.spread.all_pa))
+    }
+
+    /// Mean of what presses the plates where that probability is this one, Pa.
+    fn pressed_pa(&self, closed: T) -> T {
+        mean(&self.points, closed, |point| point.pressed_pa)
     }
 
     /// What presses the plates if they touch: the mean of `pressed`, which gives it and its derivative from the pressure
     /// in the cylinder, and the largest.
     pub(super) fn pressed(&self, pressed: impl Fn(T) -> (T, T)) -> ([T; 2], T) {
         let (mut sum, mut maximum) = ([T::zero(); 2], T::zero());
-        for point in self.points.iter().filter(|point| point.touches) {
+        for (point, weight) in self.points.iter().zip(weights(self.closed)).filter(|(point, _)| point.touches) {
             let (value, slope) = pressed(point.pressure_pa);
-            sum = [sum[0] + value, sum[1] + slope];
+            sum = [sum[0] + weight * value, sum[1] + weight * slope];
             maximum = maximum.at_least(value);
         }
-        (sum.map(|sum| sum / T::of(POINTS as f64)), maximum)
+        (sum, maximum)
     }
 }
 
 impl<T: Real> Point<T> {
+    fn touching(&self) -> T {
+        if self.touches { T::one() } else { T::zero() }
+    }
+
     fn new(cylinder: &Cylinder<T>, volume_m3: T, away_pa: T) -> Self {
         let touches = volume_m3 >= cylinder.stroke_m3;
         let in_cylinder_pa = cylinder.pressure(volume_m3);
@@ -207,14 +265,28 @@ impl<T: Real> Point<T> {
     }
 }
 
-fn mean<T: Real>(points: &[Point<T>; POINTS], of: impl Fn(&Point<T>) -> T) -> T {
-    points.iter().fold(T::zero(), |sum, point| sum + of(point)) / T::of(POINTS as f64)
+/// The probability of each point, where that of the one without a stroke is known.
+fn weights<T: Real>(closed: T) -> [T; POINTS] {
+    core::array::from_fn(|k| if k < STROKES { (T::one() - closed) / T::of(STROKES as f64) } else { closed })
+}
+
+/// Logarithm of the likelihood of readings that show this information and precision, for a Gaussian with this mean and variance: that of
+/// `exp(information x - precision x^2/2)` over it.
+fn log_likelihood<T: Real>([mean, variance]: [T; 2], [information, precision]: [T; 2]) -> T {
+    let (one, half) = (T::one(), T::of(0.5));
+    let spread = one + precision * variance;
+    let exponent = (information - half * precision * mean) * mean + half * square(information) * variance;
+    exponent / spread - half * spread.ln()
+}
+
+fn mean<T: Real>(points: &[Point<T>; POINTS], closed: T, of: impl Fn(&Point<T>) -> T) -> T {
+    points.iter().zip(weights(closed)).fold(T::zero(), |sum, (point, weight)| sum + weight * of(point))
 }
 
 /// Covariance of what presses the plates with the same at this time, Pa^2.
-fn covariance<T: Real>(points: &[Point<T>; POINTS], then: impl Fn(&Point<T>) -> T) -> T {
-    let means = [mean(points, |point| point.pressed_pa), mean(points, &then)];
-    mean(points, |point| (point.pressed_pa - means[0]) * (then(point) - means[1]))
+fn covariance<T: Real>(points: &[Point<T>; POINTS], closed: T, then: impl Fn(&Point<T>) -> T) -> T {
+    let means = [mean(points, closed, |point| point.pressed_pa), mean(points, closed, &then)];
+    mean(points, closed, |point| (point.pressed_pa - means[0]) * (then(point) - means[1]))
 }
 
 #[cfg(test)]
@@ -324,12 +396,45 @@ mod tests {
     fn what_is_not_known_of_the_fill_ends_with_it() {
         let steps = filled(&piston());
         let [empty, filling, full] = [5, 20, 79].map(|k| steps[k].spread);
-        assert_eq!((empty.touches, empty.fill_pa, empty.all_pa), (0.0, 0.0, 0.0));
+        assert_eq!(empty.touches, CLOSED_BEFORE, "the one without a stroke");
         assert!(filling.fill_pa > 3e3, "{filling:?}");
         assert!(full.touches > 0.999 && full.fill_pa < 500.0 && (full.all_pa - 7e3).abs() < 50.0, "{full:?}");
         // Each piston that touches more makes it another, and at the end all of it lasts.
         assert!(steps.iter().all(|step| (0.0..=1.0).contains(&step.lasts)));
         assert!(steps[8..30].iter().any(|step| step.lasts < 0.9) && steps[79].lasts > 0.999);
+    }
+
+    #[test]
+    fn readings_of_a_torque_in_the_fill_show_that_there_is_no_stroke() {
+        for (shown, is_closed) in [(1.0, true), (0.0, false)] {
+            let mut pistons = filled::<f64>(&piston())[11];
+            assert_eq!(pistons.closed, CLOSED_BEFORE);
+            let (mut x, then) = ([0.0, 1.0], pistons.pressed_pa(shown));
+            for _ in 0..10 {
+                // A reading of what presses the plates with a standard deviation of a third of its own.
+                let (mean_pa, all_pa) = (pistons.pressed_pa(pistons.closed), pistons.spread.all_pa);
+                let before = [0.9 * x[0], 0.81 * x[1] + 0.19];
+                let gain = before[1] / (before[1] + 0.1);
+                let after = [before[0] + gain * ((then - mean_pa) / all_pa - before[0]), (1.0 - gain) * before[1]];
+                let [factor, added] = pistons.take_shown(before, after).unwrap();
+                x = [factor * after[0] + added, (factor * factor * after[1]).min(1.0)];
+                let kept_pa = pistons.pressed_pa(pistons.closed) + x[0] * pistons.spread.all_pa;
+                assert!((kept_pa - mean_pa - after[0] * all_pa).abs() < 1e-6, "the pressure stays");
+            }
+            assert!((pistons.closed > 0.9) == is_closed && (pistons.closed < 0.1) != is_closed, "{}", pistons.closed);
+        }
+    }
+
+    #[test]
+    fn what_shows_nothing_of_the_fill_changes_nothing() {
+        let mut pistons = filled::<f64>(&piston())[79];
+        let then = pistons;
+        for after in [[0.0, 1.0], [0.3, 1.2], [f64::NAN, 0.5], [f64::INFINITY, 0.5], [0.0, f64::NAN], [0.0, 0.0]] {
+            assert!(pistons.take_shown([0.0, 1.0], after).is_none() && pistons == then, "{after:?}");
+        }
+        // All touch: whatever is seen is no matter of the fill.
+        let [factor, added] = pistons.take_shown([0.0, 1.0], [2.0, 0.1]).unwrap();
+        assert!((factor - 1.0).abs() < 1e-3 && added.abs() < 1e-3, "{factor} {added}");
     }
 
     #[test]

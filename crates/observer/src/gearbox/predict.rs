@@ -1,9 +1,9 @@
 //! The prediction over a step, and the phase.
 
 use super::{
-    CORE, ClutchTorque, Contact, ElementState, FRACTION, FRACTION_S, FRICTION, FrictionElement, GearboxFilter, LOAD,
-    MAX_ELEMENTS, MODEL_FRACTION, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SCALE, SPRING, ShiftElement,
-    ShiftRow, TURBINE, TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
+    CORE, ClutchTorque, Contact, ElementState, FRACTION, FRACTION_S, FRICTION, FrictionElement, GearboxFilter,
+    GearboxState, LOAD, MAX_ELEMENTS, MODEL_FRACTION, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SCALE,
+    SPRING, ShiftElement, ShiftRow, TURBINE, TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
 };
 use crate::gearbox::elements::positive_part;
 use drivetrain::Real;
@@ -87,6 +87,7 @@ impl<T: Real> GearboxFilter<'_, T> {
                 self.predict(running, &mean, noise, piece_s);
             }
         }
+        running.pressures_before = PRESSURE.map(|state| running.x.of_state(state));
         for silent_s in &mut running.silent_s {
             *silent_s = *silent_s + dt_s;
         }
@@ -155,6 +156,28 @@ impl<T: Real> GearboxFilter<'_, T> {
         match (&running.shift, running.phase.phase.holding()) {
             (Some(shift), held) => held.map(|held| shift.clutches[held.min(1)].ratio),
             (None, _) => self.tables.gear(running.gear).map(|gear| gear.ratio),
+        }
+    }
+
+    /// Takes what the readings of the step before have shown of the fills of a shift: whether a piston has a stroke to make. The estimate of
+    /// what presses the plates stays, and is another error of another mean.
+    pub(super) fn take_fills(&self, state: &mut GearboxState<T>) {
+        let (Some(running), true) = (&mut state.running, state.strokes) else { return };
+        let Some(shift) = running.shift else { return };
+        for (c, pressure) in PRESSURE.into_iter().enumerate() {
+            let c = c.min(1);
+            let at = shift.clutches[c].element.place();
+            let Some(Some(memory)) = at.and_then(|at| state.elements.get_mut(at)) else { continue };
+            let after = running.x.of_state(pressure);
+            let Some([factor, added]) = memory.take_fill(running.pressures_before[c], after) else { continue };
+            for x in core::iter::once(&mut running.x).chain(state.slipping.as_mut().map(|running| &mut running.x)) {
+                x.fade(pressure, factor);
+                let [mean, variance] = x.of_state(pressure);
+                x.mean[pressure.min(N - 1)] = mean + added;
+                if variance > T::one() {
+                    x.replace(pressure, mean + added, T::one());
+                }
+            }
         }
     }
 

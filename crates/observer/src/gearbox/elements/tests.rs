@@ -104,9 +104,10 @@ fn an_element_holds_what_it_carries_by_the_estimate() {
     }
 }
 
-/// While its piston strokes it carries nothing, whatever the pressure at the valve; then it is as one without a stroke.
+/// While its piston strokes it carries what one without a stroke would, times the probability that there is none to make, whatever the
+/// pressure at the valve; then it is as one without a stroke.
 #[test]
-fn an_element_whose_plates_do_not_touch_carries_nothing() {
+fn an_element_whose_plates_do_not_touch_carries_little() {
     let (with, without) = (with_stroke(), element());
     let shift = ShiftClutch { element: ShiftElement::Friction(0), alpha: 1.0, ratio: 2.0 };
     let wrong = PressureError { pressure: 0.4, kiss: 0.3, variance: [0.8, 0.9], covariance: 0.0 };
@@ -126,7 +127,9 @@ fn an_element_whose_plates_do_not_touch_carries_nothing() {
         });
         *carried = stroke.0;
         if k < 20 {
-            assert_eq!((stroke.0, stroke.1), (0.0, 0.0), "{k}");
+            // The probability, and 0.4 of the standard deviation that comes with it.
+            assert!((0.0..=(0.1 + 0.4 * 0.3) * none.0 + 1e-9).contains(&stroke.0), "{k}: {stroke:?} {none:?}");
+            assert_eq!(stroke.1, 0.0, "{k}");
         }
         if k > 200 {
             assert!((stroke.0 - none.0).abs() < 0.01 * none.0, "{k}: {stroke:?} {none:?}");
