@@ -70,6 +70,6 @@ pub use samples::{Clock, Quality, QualityCounts, Sample, Samples};
 pub use seen_gears::{SeenGear, SeenGears};
 pub use shifts::{Direction, GearsOfShift, Load, Shift, ShiftFinder, ShiftPhase, ShiftQuality};
 pub use speed_faults::SpeedFaults;
-pub use speed_watch::{SpeedReading, SpeedWatch, Withdrawn};
+pub use speed_watch::{AllWithdrawn, SpeedReading, SpeedWatch, Withdrawn};
 pub use steps::{Places, Step, Steps};
 pub use suggest::suggest;

@@ -305,7 +305,7 @@ impl<'a> Readings<'a> {
             let reading = SpeedReading { role: kind, value, time_s: sample.time_s, may_be_held: true };
             let (judged, withdrawn) = self.speeds.judge(reading);
             quality = judged;
-            self.withdrawn.extend(withdrawn);
+            self.withdrawn.extend(withdrawn.into_iter().flatten());
         }
         channels.counts.push(quality);
         let [first_s, last_s] = self.span_s;

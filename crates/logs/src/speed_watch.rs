@@ -16,6 +16,9 @@ pub struct Withdrawn {
     pub quality: Quality,
 }
 
+/// What a reading shows to be wrong: of two speeds at most.
+pub type AllWithdrawn = [Option<Withdrawn>; 2];
+
 /// A reading to be judged.
 #[derive(Debug, Clone, Copy)]
 pub struct SpeedReading {
@@ -58,10 +61,10 @@ impl SpeedWatch {
         }
     }
 
-    /// What the next reading is worth, and which are refused because of it: of its speed or of another one, itself included.
-    pub fn judge(&mut self, reading: SpeedReading) -> (Quality, Option<Withdrawn>) {
+    /// What the next reading is worth, and which are refused because of it: of its speed or of others, itself included.
+    pub fn judge(&mut self, reading: SpeedReading) -> (Quality, AllWithdrawn) {
         let SpeedReading { role, value, time_s, may_be_held } = reading;
-        let Some((frozen, held)) = self.speeds.get_mut(role as usize) else { return (Quality::Good, None) };
+        let Some((frozen, held)) = self.speeds.get_mut(role as usize) else { return (Quality::Good, [None; 2]) };
         let is_fault = self.faults.is_fault(role, value, time_s);
         let was_frozen = frozen.is_known();
         let is_held = !is_fault && may_be_held && held.is_held(value);
@@ -71,13 +74,14 @@ impl SpeedWatch {
         {
             self.faults.disbelieve_after(role, right, after_s);
             let withdrawn = Withdrawn { role, after_s, quality: Quality::Frozen };
-            return (Quality::Frozen, Some(withdrawn).filter(|_| !was_frozen));
+            return (Quality::Frozen, [Some(withdrawn).filter(|_| !was_frozen), None]);
         }
-        let copied = self.copies.push(role, [value, time_s], is_fault).map(|(role, [right, after_s])| {
+        let copied = self.copies.push(role, [value, time_s], is_fault).map(|copied| {
+            let (role, [right, after_s]) = copied?;
             self.faults.disbelieve_after(role, right, after_s);
-            Withdrawn { role, after_s, quality: Quality::Impossible }
+            Some(Withdrawn { role, after_s, quality: Quality::Impossible })
         });
-        if is_fault || copied.is_some_and(|copied| copied.role == role) {
+        if is_fault || copied.iter().flatten().any(|copied| copied.role == role) {
             return (Quality::Impossible, copied);
         }
         self.newest[role as usize] = value;

@@ -1,13 +1,13 @@
 //! Speeds of the rows of a table that are no readings of their shaft: frozen and impossible ones, and those that the table holds.
 
-use logs::{Quality, Role, SpeedReading, SpeedWatch, Withdrawn};
+use logs::{AllWithdrawn, Quality, Role, SpeedReading, SpeedWatch, Withdrawn};
 use observer::Reading;
 
 /// The speeds of a row, in the order of [`WATCHED`].
 pub(crate) type SpeedReadings<'a> = [&'a mut Option<Reading<f64>>; WATCHED.len()];
 
 /// Readings of earlier rows, and of the row itself, that a row shows to be wrong.
-pub(crate) type AllWithdrawn = [Option<Withdrawn>; WATCHED.len()];
+pub(crate) type WithdrawnByRow = [AllWithdrawn; WATCHED.len()];
 
 /// The speeds of the rows, of which frozen and impossible ones are refused by the rules of [`logs::speed_watch`], and held ones are left out.
 pub(crate) struct FrozenRows {
@@ -66,8 +66,8 @@ impl FrozenRows {
 
     /// Refuses the readings of a row that are frozen or impossible, by a value that is not a number, and leaves out those of a row before
     /// that a table holds. Returns which readings up to this row are wrong, for [`Self::withdraw`].
-    pub(crate) fn take_out(&mut self, speeds: SpeedReadings<'_>, time_s: f64) -> AllWithdrawn {
-        let mut all_withdrawn = [None; WATCHED.len()];
+    pub(crate) fn take_out(&mut self, speeds: SpeedReadings<'_>, time_s: f64) -> WithdrawnByRow {
+        let mut all_withdrawn = [[None; 2]; WATCHED.len()];
         for (i, speed) in speeds.into_iter().enumerate() {
             let Some(Reading { value, age_s }) = *speed else { continue };
             let measured_s = time_s - age_s;
@@ -77,7 +77,7 @@ impl FrozenRows {
             let reading = SpeedReading { role: WATCHED[i], value, time_s: measured_s, may_be_held: age_s == 0.0 };
             let (quality, withdrawn) = match before {
                 _ if !is_same => self.speeds.judge(reading),
-                before => (before.unwrap_or(Quality::Good), None),
+                before => (before.unwrap_or(Quality::Good), [None; 2]),
             };
             let refused = Some(quality).filter(|quality| matches!(quality, Quality::Frozen | Quality::Impossible));
             self.newest_s[i] = (measured_s, refused);

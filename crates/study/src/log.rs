@@ -10,7 +10,7 @@ use observer::{Input, Phase};
 use trace::{CsvRows, TraceError, signal};
 
 use crate::Signals;
-use crate::frozen_rows::{AllWithdrawn, FrozenRows, SpeedReadings};
+use crate::frozen_rows::{FrozenRows, SpeedReadings, WithdrawnByRow};
 use crate::row_clock::{RowClock, RowTime};
 use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
@@ -236,7 +236,7 @@ impl Log {
             match self.read_row() {
                 Ok(Some((next, withdrawn))) => {
                     self.ahead.push(next.1.time_s, next);
-                    for withdrawn in withdrawn.into_iter().flatten() {
+                    for withdrawn in withdrawn.into_iter().flatten().flatten() {
                         for (input, row) in self.ahead.waiting() {
                             self.frozen.withdraw(withdrawn, speeds(input), row.time_s);
                         }
@@ -249,7 +249,7 @@ impl Log {
     }
 
     /// The next row of the file, and the readings that it shows to be wrong; `None` at its end.
-    fn read_row(&mut self) -> Result<Option<(InputRow, AllWithdrawn)>, TraceError> {
+    fn read_row(&mut self) -> Result<Option<(InputRow, WithdrawnByRow)>, TraceError> {
         let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
         let rows = &self.rows;
         let Ok(mut input) = self.signals.input(dt_s, |column| Ok::<f64, Infallible>(self.samples.number(rows, column)));

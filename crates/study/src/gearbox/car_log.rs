@@ -17,7 +17,7 @@ pub use evaluate::LogStep;
 
 use super::gear_signal::Gears;
 use super::pressure_command::command_for;
-use crate::frozen_rows::{AllWithdrawn, FrozenRows, SpeedReadings};
+use crate::frozen_rows::{FrozenRows, SpeedReadings, WithdrawnByRow};
 use crate::row_clock::{RowClock, RowTime};
 use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
@@ -210,7 +210,7 @@ impl<'c> CarLog<'c> {
             match self.read_step() {
                 Ok(Some((step, withdrawn))) => {
                     self.ahead.push(step.time_s, step);
-                    for withdrawn in withdrawn.into_iter().flatten() {
+                    for withdrawn in withdrawn.into_iter().flatten().flatten() {
                         for step in self.ahead.waiting() {
                             self.frozen.withdraw(withdrawn, speeds(&mut step.input), step.time_s);
                         }
@@ -223,7 +223,7 @@ impl<'c> CarLog<'c> {
     }
 
     /// The next row of the file, and the readings that it shows to be wrong; `None` at its end.
-    fn read_step(&mut self) -> Result<Option<(LogStep, AllWithdrawn)>, TraceError> {
+    fn read_step(&mut self) -> Result<Option<(LogStep, WithdrawnByRow)>, TraceError> {
         let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
         self.take_gears();
         let (rows, columns, samples) = (&self.rows, &self.columns, &self.samples);
