@@ -109,8 +109,8 @@ impl<T: Real> Evidence<T> {
         self.found.is_some()
     }
 
-    /// Takes what a shift has shown.
-    pub(super) fn take(&mut self, acting: &Acting<T>, shown: &Shown<T>) {
+    /// Takes what a shift has shown, with a wheel speed or without. Without one the load of the road and the stiffness of the drive shafts look alike.
+    pub(super) fn take(&mut self, acting: &Acting<T>, shown: &Shown<T>, has_wheels: bool) {
         let mut add = |at: usize, column: &[T; ACTING]| {
             let w = shown.per_quantity(column);
             let square_now = dot(&w, &w);
@@ -134,7 +134,9 @@ impl<T: Real> Evidence<T> {
                 }
             }
         }
-        add(STIFFNESS_AT, acting.by_stiffness());
+        if has_wheels {
+            add(STIFFNESS_AT, acting.by_stiffness());
+        }
         for (k, column) in alike.iter().enumerate() {
             add(LEARNT + k, column);
         }

@@ -437,7 +437,8 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Follows the shift command.
     fn take_gear(&self, state: &mut GearboxState<T>, command: ShiftCommand) -> Health {
         let opens = self.is_open(state, command);
-        let evidence = &mut state.evidence;
+        let has_wheels = state.newest[WHEEL].is_some_and(|newest| newest.age_s <= T::of(LOST_S));
+        let evidence = (&mut state.evidence, has_wheels);
         let (learnt, fading_s, elements) = (&mut state.learnt, &mut state.fading_s, &mut state.elements);
         let Some(running) = &mut state.running else { return Health::Good };
         let in_gear = command.is_steady();
