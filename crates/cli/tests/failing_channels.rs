@@ -222,8 +222,14 @@ fn a_speed_that_ends_before_the_first_shift_leaves_the_open_loop() {
         for value in ["", "0", &stuck] {
             let log = case.with(&column_name, [*from_s, f64::INFINITY], value);
             for more in [&[][..], &["--map", &map]] {
-                let (note, table, _) = case.estimate(&log, more);
+                let (note, table, shifts) = case.estimate(&log, more);
                 assert_eq!(table.lines().count(), case.log.lines().count(), "{speed} `{value}`: {note}");
+                if *speed != "engine_speed" {
+                    // Nothing is known of the slips.
+                    assert!(column(&shifts, "flare_rad_s").iter().all(|flare| flare.is_empty()), "{speed}: {shifts}");
+                    let work = column(&shifts, "oncoming_friction_work_j");
+                    assert_eq!(work.last().map(String::as_str), Some(""), "{speed}: {shifts}");
+                }
                 assert!(
                     note.contains("came no more, or was refused, in "),
                     "{speed} from {from_s} s `{value}`: {note}"

@@ -1,7 +1,7 @@
 //! The filter of a car with any gearbox on its way through a log, and what it says of the shifts.
 
 use car::{Car, Sensors};
-use car::{ErrorBudget, Gear, ShiftCommand};
+use car::{ErrorBudget, Gear, LOST_S, ShiftCommand};
 use observer::gearbox::{ClutchEstimate, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftPhase};
 use observer::{Health, Reading};
 use observer::{ShiftTables, gearbox_filter};
@@ -22,6 +22,9 @@ use crate::{ClutchRow, EvaluateError, ROUNDING_N_M, ROUNDING_PA, ShiftScoreRow};
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
 
+/// Without turbine or output speed for so long, s, the slips are not known \[chosen\]: a shift is found over a speed that is refused for so long.
+const UNREAD_S: f64 = 3.0;
+
 /// The filter of a car on its way through a log.
 pub struct LoggedDrive<'c> {
     car: &'c Car,
@@ -33,7 +36,11 @@ pub struct LoggedDrive<'c> {
     /// Newest speeds of engine, turbine and output, rad/s: as they came, with the time, and those that the filter did not refuse.
     came: [CameSpeed; 3],
     speeds_rad_s: [f64; 3],
+    /// When these came, s.
+    read_s: [f64; 3],
     begun_s: f64,
+    /// Whether turbine or output speed was lost in the shift that goes on.
+    is_unread: bool,
     /// Where the turbine is in it.
     beyond: BeyondGears,
     gear_speeds: GearSpeeds<'c>,
@@ -72,7 +79,9 @@ impl<'c> LoggedDrive<'c> {
             passing: PassingShifts::default(),
             came: [CameSpeed::default(); 3],
             speeds_rad_s: [f64::NAN; 3],
+            read_s: [f64::NEG_INFINITY; 3],
             begun_s: f64::NAN,
+            is_unread: false,
             beyond: BeyondGears::new(car, ShiftCommand::NEUTRAL, [f64::NAN; 2]),
             gear_speeds: GearSpeeds::new(car),
             checks: Checks::new(car, tables, &budget),
@@ -122,7 +131,7 @@ impl<'c> LoggedDrive<'c> {
             let Some(Reading { value, .. }) = reading.filter(|reading| reading.value.is_finite()) else { continue };
             self.came[at].push(step.time_s, value);
             if !health.is_refused() {
-                self.speeds_rad_s[at] = value;
+                (self.speeds_rad_s[at], self.read_s[at]) = (value, step.time_s);
             }
         }
         self.carried.push(step.time_s, &estimate.valve_pa);
@@ -241,11 +250,14 @@ impl<'c> LoggedDrive<'c> {
             self.checks.each().into_iter().for_each(|check| check.begin());
             let ratios = [gears.from, gears.to].map(|gear| self.car.ratio(gear).unwrap_or(f64::NAN));
             self.beyond = BeyondGears::new(self.car, gears, ratios);
+            self.is_unread = false;
         }
+        let [_, fresh @ ..] = self.speeds_at(step.time_s, LOST_S);
+        self.is_unread |= fresh.iter().any(|speed| speed.is_nan());
+        let [engine, turbine, output] = self.speeds_at(step.time_s, UNREAD_S);
         let Some(shift) = &mut self.passing.open else { return };
         shift.time_s[1] = step.time_s;
-        let [_, turbine, output] = self.speeds_rad_s;
-        self.beyond.push(&mut shift.quality, [turbine, output]);
+        self.beyond.push(&mut shift.quality, fresh);
         let found = estimate.clutches.filter(|found| Some(found.map(|clutch| clutch.element)) == elements);
         let at_turbine_n_m = estimate.at_turbine.map(|clutches| [clutches.torque_n_m, clutches.std_dev_n_m]);
         let clutches = match (found.zip(row), self.car.gearbox.has_ratios_alone()) {
@@ -274,13 +286,18 @@ impl<'c> LoggedDrive<'c> {
             clutches,
             turbine_n_m: [f64::NAN, estimate.turbine_n_m.unwrap_or(f64::NAN)],
             at_turbine_n_m,
-            speeds_rad_s: [self.speeds_rad_s[0], turbine, output, f64::NAN],
+            speeds_rad_s: [engine, turbine, output, f64::NAN],
             phase: estimate.phase.map_or("-", |phase| phase.name()),
             health: estimate.health,
             flare_rad_s: estimate.flare_rad_s,
         };
         self.checks.each().into_iter().for_each(|check| check.shift_row(shift.elements, &row));
         shift.rows.push(row);
+    }
+
+    /// The newest speeds of engine, turbine and output that the filter used, rad/s; not a number of one that came longer ago than this, s.
+    fn speeds_at(&self, time_s: f64, longest_s: f64) -> [f64; 3] {
+        core::array::from_fn(|at| if time_s - self.read_s[at] <= longest_s { self.speeds_rad_s[at] } else { f64::NAN })
     }
 
     /// Ends the open shift: at the time, s, of the first row after it, and in its gear; `None` where the log does not have it.
@@ -294,8 +311,11 @@ impl<'c> LoggedDrive<'c> {
         });
         let complete_s = completed_s.map(|time_s| time_s - self.begun_s);
         // A log has no slip of the held elements.
-        let unknown =
+        let mut unknown =
             CarShiftQuality { jerk_m_s3: f64::NAN, held_slip_rad_s: f64::NAN, tie_up_n_m: f64::NAN, ..shift.quality };
+        if self.is_unread {
+            (unknown.flare_rad_s, unknown.past_synchronous_rad_s) = (f64::NAN, f64::NAN);
+        }
         self.passing.end(self.car, self.oil_degc, CarShiftQuality { complete_s, ..unknown });
         if let Some(shift) = self.passing.drive.shifts.last() {
             let ended = EndedShift { shift, completed };

@@ -108,7 +108,7 @@ fn pressures(rows: &[ShiftScoreRow]) -> [u64; 2] {
     measured.fold([0; 2], |[all, inside], clutch| [all + 1, inside + u64::from(clutch.in_range)])
 }
 
-/// Torque of a clutch times its slip over the shift, with the estimated torque and with the ends of its range, J; none where no slip is
+/// Torque of a clutch times its slip over the shift, with the estimated torque and with the ends of its range, J; none where its slip is not
 /// known.
 fn friction_work_j(rows: &[ShiftScoreRow], clutch: usize) -> Option<[f64; 3]> {
     let power_w = |row: &ShiftScoreRow| {
@@ -122,8 +122,13 @@ fn friction_work_j(rows: &[ShiftScoreRow], clutch: usize) -> Option<[f64; 3]> {
         let at_least_zero = |power: f64| if power < 0.0 { 0.0 } else { power };
         (row.time_s, [torque * slip_rad_s, low, high].map(at_least_zero))
     };
-    let shown = rows.iter().filter(|row| row.at_turbine_n_m.is_none());
-    let known: Vec<_> = shown.map(power_w).filter(|(_, [power, ..])| power.is_finite()).collect();
+    let shown = || rows.iter().filter(|row| row.at_turbine_n_m.is_none());
+    let is_unread =
+        |clutch: &ClutchRow| !clutch.sticks && clutch.slip_rad_s.is_nan() && clutch.torque_n_m[1].is_finite();
+    if shown().any(|row| is_unread(&row.clutches[clutch])) {
+        return None;
+    }
+    let known: Vec<_> = shown().map(power_w).filter(|(_, [power, ..])| power.is_finite()).collect();
     let work = known.windows(2).fold([0.0; 3], |work, pair| {
         let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
         core::array::from_fn(|end| work[end] + 0.5 * (to_s - from_s) * (from[end] + to[end]))
