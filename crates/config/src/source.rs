@@ -186,6 +186,10 @@ impl Source {
         if let Some((key, known)) = misspelt(tables.keys().map(String::as_str), &KINDS_KEYS) {
             return Err(self.unknown_key(key, known));
         }
+        // The shifts of a study of cars are a text or a list; the [shift] of an experiment is a table.
+        if has("runs") && tables.get("shift").is_some_and(|shift| !shift.is_table()) {
+            return Err(self.unknown_key("shift", "shifts"));
+        }
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
             (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
@@ -365,6 +369,13 @@ mod tests {
             let table: toml::Table = toml::from_str(&format!("# {quoted}\ntext = {quoted}\n")).unwrap();
             assert_eq!(table["text"].as_str(), Some(text), "{quoted}");
         }
+    }
+
+    #[test]
+    fn the_shift_of_a_study_of_cars_is_a_misspelt_key() {
+        let text = "name = \"a\"\nvehicle = \"car.toml\"\nshift = \"neighbouring\"\nruns = 3\n";
+        let error = Source::built_in("x.toml", text).kind().unwrap_err().to_string();
+        assert!(error.contains("x.toml:3") && error.contains("did you mean `shifts`?"), "{error}");
     }
 
     /// The keys that each reader names where it does not know one.

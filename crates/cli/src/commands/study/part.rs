@@ -185,7 +185,7 @@ impl<R: Runs> Part<'_, R> {
         if let Some(failure) = failed {
             return Err(failure);
         }
-        let hint = "the table has been changed since it was written; make its runs again in another folder";
+        let hint = "the table has been changed or removed since it was written; make its runs again in another folder";
         read.map_err(|error| Failure::Input(format!("{error}\nhint: {hint}")))?;
         if count != all.end - all.start {
             let message = format!("{}: contains {count} of {} runs", table.shown(), all.end - all.start);
