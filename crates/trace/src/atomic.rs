@@ -13,11 +13,12 @@ use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::ShownPath as _;
 use crate::early_sync::EarlySync;
+use crate::folders::{check_folder, create_folder, remove_with_folders};
 use crate::watch::{FileUse, file_used};
 
-/// A file under construction. If it is dropped before [`Self::finish`], the file at its path is unchanged.
+/// A file under construction. If it is dropped before [`Self::finish`], the file at its path is unchanged, and folders that were made
+/// for it go away.
 #[derive(Debug)]
 pub struct WholeFile {
     writer: BufWriter<File>,
@@ -54,10 +55,8 @@ pub fn left_by_killed() -> Vec<PathBuf> {
 
 /// Removes the partial files of this program, which is about to end on a signal. The files at their paths stay as they were.
 pub fn remove_unfinished() {
-    for partial in unfinished().drain(..) {
-        // The next run removes what cannot be removed now.
-        let _ = fs::remove_file(partial);
-    }
+    // The next run removes what cannot be removed now.
+    unfinished().drain(..).for_each(|partial| remove_with_folders(&partial));
 }
 
 impl WholeFile {
@@ -159,8 +158,7 @@ impl Write for WholeFile {
 impl Drop for WholeFile {
     fn drop(&mut self) {
         if let Some(replaces) = &self.replaces {
-            // The caller already reports the error that ended the writing.
-            let _ = fs::remove_file(&replaces.partial);
+            remove_with_folders(&replaces.partial);
             unfinished().retain(|other| *other != replaces.partial);
         }
     }
@@ -195,23 +193,6 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     let probe = folder.join(format!("{PROBE}.{}.partial", std::process::id()));
     drop(locked(&probe)?);
     fs::remove_file(probe)
-}
-
-/// Makes a folder and those above it.
-pub(crate) fn create_folder(folder: &Path) -> io::Result<()> {
-    fs::create_dir_all(folder).map_err(|error| match folder.ancestors().find(|part| part.exists()) {
-        Some(part) => check_folder(part).err().unwrap_or(error),
-        None => error,
-    })
-}
-
-/// Refuses a file where a folder is expected.
-fn check_folder(folder: &Path) -> io::Result<()> {
-    if folder.is_dir() {
-        return Ok(());
-    }
-    let message = format!("{} is a file, expected a folder\nhint: choose another name after -o", folder.shown());
-    Err(io::Error::new(ErrorKind::NotADirectory, message))
 }
 
 /// The metadata of the file at the path of an output, if there is one.
@@ -326,6 +307,14 @@ mod tests {
         assert!(failed.is_err());
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(folder.names(), ["out.txt"]);
+        let files = ["new/deep/a", "new/deep/b"].map(|name| WholeFile::create(&folder.0.join(name)).unwrap());
+        assert!(folder.0.join("new/deep").is_dir());
+        drop(files);
+        assert_eq!(folder.names(), ["out.txt"]);
+        let [left, whole] = ["new/deep/a", "new/b"].map(|name| WholeFile::create(&folder.0.join(name)).unwrap());
+        whole.finish().unwrap();
+        drop(left);
+        assert_eq!(Folder(folder.0.join("new")).names(), ["b"]);
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub mod atomic;
 pub mod csv_file;
 mod early_sync;
 pub mod error;
+mod folders;
 pub mod follow;
 #[cfg(not(target_family = "wasm"))]
 pub mod mdf_file;

@@ -8,8 +8,8 @@ use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use crate::TraceError;
-use crate::atomic::create_folder;
 use crate::csv_file::LONGEST_ROW;
+use crate::folders::create_folder;
 use crate::text_file::open_regular;
 use crate::watch::{FileUse, file_used};
 
