@@ -1,5 +1,6 @@
 //! Estimates of logs with many shifts: shift by shift, in other formats, several at a time, and while they are written.
 
+use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -38,7 +39,7 @@ impl Folder {
 }
 
 /// The rows of a table as maps from its names.
-fn rows(text: &str) -> Vec<std::collections::HashMap<String, String>> {
+fn rows(text: &str) -> Vec<HashMap<String, String>> {
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let row = |line: &str| names.iter().map(|&name| name.to_owned()).zip(line.split(',').map(str::to_owned)).collect();
@@ -156,6 +157,29 @@ fn columns_come_in_the_order_that_is_asked_for() {
     said(&output);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.starts_with("time_s,health,oncoming_pressure_estimate_pa\n0,good,0\n"), "{}", &text[..200]);
+    for twice in ["health,health", "oncoming_duty_percent"] {
+        assert!(refused(&estimate(&log, &["--columns", twice])).contains("there is no column `"), "{twice}");
+    }
+}
+
+#[test]
+fn an_estimate_has_the_readings_that_are_asked_for() {
+    let folder = Folder::new("readings");
+    let log = folder.drives("log.csv", 1, None);
+    let measured = ["turbine_speed_rad_s", "wheel_speed_rad_s", "oncoming_current_a"];
+    let columns = format!("{},health", measured.join(","));
+    let of_log: Vec<_> = rows(&folder.read("log.csv"));
+    // The whole log twice, of which the second estimate replaces the first, then a shift alone.
+    for more in [&[][..], &[], &["--shift", "1"]] {
+        said(&estimate(&log, &[&["--columns", &columns, "-o", &folder.path("with.csv")], more].concat()));
+        let with = rows(&folder.read("with.csv"));
+        let number = |row: &HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
+        let start = of_log.iter().position(|row| number(row, "time_s") == number(&with[0], "time_s")).unwrap();
+        assert!(with.len() > 100 && (!more.is_empty() || with.len() == of_log.len()));
+        for (row, of_log) in with.iter().zip(&of_log[start..]) {
+            assert!(measured.iter().all(|name| number(row, name) == number(of_log, name)), "{row:?} {of_log:?}");
+        }
+    }
 }
 
 #[test]

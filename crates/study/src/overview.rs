@@ -117,13 +117,14 @@ impl Overview {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use observer::{ChannelHealth, Channels, Estimate, Phase};
+    use observer::{ChannelHealth, Channels, Estimate, Input, Phase};
 
     fn sample(time_s: f64, engine_rad_s: f64, health: Health) -> LogSample {
         LogSample {
             time_s,
             speeds_rad_s: [engine_rad_s, f64::NAN, f64::NAN],
             command: f64::NAN,
+            input: Input::none(0.01),
             estimate: Estimate {
                 pressure_pa: 1.0,
                 clutch_torque_n_m: 0.0,

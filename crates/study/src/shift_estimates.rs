@@ -20,6 +20,8 @@ pub struct LogSample {
     pub speeds_rad_s: [f64; 3],
     /// Command of the oncoming clutch's valve, A or %, likewise.
     pub command: f64,
+    /// The readings of the step as they came, refused ones too.
+    pub input: Input<f64>,
     /// What it estimates.
     pub estimate: Estimate<f64>,
     /// Measured pressure of the oncoming clutch, Pa.
@@ -43,6 +45,7 @@ impl LogSample {
             time_s,
             speeds_rad_s,
             command: value(input.command, command),
+            input: *input,
             estimate,
             pressure_pa: None,
             torque_n_m: None,
@@ -491,6 +494,7 @@ mod tests {
             time_s: 0.01 * f64::from(at),
             speeds_rad_s: [f64::NAN, turbine.unwrap_or(f64::NAN), output.unwrap_or(f64::NAN)],
             command: f64::NAN,
+            input: NO_INPUT,
             estimate: Estimate { clutch_torque_n_m: 50.0, ..no_estimate() },
             pressure_pa: None,
             torque_n_m: None,

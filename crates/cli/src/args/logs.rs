@@ -113,7 +113,7 @@ pub(crate) struct Estimate {
     /// Several logs are then estimated one after the other, each with what the logs before it have left
     #[arg(long, value_name = "LEARNT.toml")]
     pub(crate) learnt: Option<PathBuf>,
-    /// Columns of the estimate, in this order; time_s is always the first. With a gearbox also readings by the names of a table, such as
+    /// Columns of the estimate, in this order; time_s is always the first. Readings too, by the names of a table, such as
     /// turbine_speed_rad_s
     #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,

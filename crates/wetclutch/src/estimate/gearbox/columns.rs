@@ -315,10 +315,10 @@ pub(crate) fn measured(car: &Car, tables: &ShiftTables<f64>) -> Vec<Column> {
     channels.chain(element_commands(car).into_iter().filter_map(command)).collect()
 }
 
-/// Whether a table of estimates may have a column of this name that logs have too.
+/// Whether a table of estimates, of any kind of car, may have a column of this name that logs have too.
 pub fn is_measured_column(name: &str) -> bool {
     let of_element = |what: &str| name.starts_with("element_") && name.ends_with(what);
-    MEASURED.iter().any(|(known, _)| *known == name) || of_element("_current_a") || of_element("_duty_percent")
+    signal::MEASURABLE.contains(&name) || of_element("_current_a") || of_element("_duty_percent")
 }
 
 /// Whether the estimate of some car may have a column of this name.

@@ -116,7 +116,8 @@ pub fn estimate(
     let mut opened = None;
     let log = open((setup, input), &mut opened, say)?;
     let observer = observer::choose(options, vehicle, &log, say)?;
-    let columns = chosen(observer.observer.columns(log.has_wheel_speed()), &options.columns)?;
+    let columns = observer.observer.columns(log.has_wheel_speed());
+    let columns = chosen(columns, vehicle.settings.valve.command_kind(), &options.columns)?;
     let rows = Rows {
         table: EstimateTable::create(destination, columns)?,
         shifts: Shifts::new(&options.shifts, vehicle, &log.ratios),
@@ -242,15 +243,13 @@ impl Rows<'_> {
         }
         let Step { time_s, input, pressure_pa, torque_n_m, .. } = *step;
         let sample = LogSample::new(time_s, &input, estimate.copied().unwrap_or_else(no_estimate));
-        self.shifts.push(LogSample { pressure_pa, torque_n_m, ..sample });
+        let sample = LogSample { pressure_pa, torque_n_m, ..sample };
+        self.shifts.push(sample);
         for shift in std::mem::take(&mut step.shifts) {
             self.shift(shift)?;
         }
         if !self.shifts.is_selective() {
-            match estimate {
-                Some(estimate) => self.table.row(time_s, estimate)?,
-                None => self.table.empty_row(time_s)?,
-            }
+            self.table.row(&sample)?;
             if self.is_followed {
                 self.table.flush()?;
             }
@@ -266,11 +265,7 @@ impl Rows<'_> {
             for sample in samples.iter().filter(|_| is_selective) {
                 if sample.time_s > *written_s {
                     *written_s = sample.time_s;
-                    if sample.is_estimated() {
-                        table.row(sample.time_s, &sample.estimate)?;
-                    } else {
-                        table.empty_row(sample.time_s)?;
-                    }
+                    table.row(sample)?;
                 }
             }
             if *is_followed { table.flush() } else { Ok(()) }
