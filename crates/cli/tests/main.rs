@@ -40,6 +40,7 @@ mod open_page;
 mod other_cars;
 mod own_car;
 mod pages;
+mod piped_bus;
 mod pressure_commands;
 mod provoked;
 mod replaced;
