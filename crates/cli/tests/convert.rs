@@ -112,6 +112,25 @@ fn all_channels_of_a_log_are_converted_with_names_and_units() {
 }
 
 #[test]
+fn a_table_that_is_estimated_without_a_map_stays_one_through_all_formats() {
+    let folder = Folder::new("convert-names");
+    said(&wetclutch(&["simulate", crate::support::EXPERIMENT, "-o", &folder.path("drive")]));
+    let mut log = folder.path("drive/e1_measured.csv");
+    let estimate = |log: &str| {
+        let output = folder.path("out.csv");
+        said(&wetclutch(&["estimate", log, "--vehicle", crate::support::VEHICLE, "-o", &output]));
+        folder.read("out.csv")
+    };
+    let expected = estimate(&log);
+    for name in ["a.parquet", "b.mf4", "c.csv"] {
+        let output = folder.path(name);
+        said(&wetclutch(&["convert", &log, "-o", &output]));
+        log = output;
+    }
+    assert!(estimate(&log) == expected);
+}
+
+#[test]
 fn no_file_is_replaced_and_no_name_is_guessed() {
     let folder = Folder::new("convert-refused");
     let log = folder.write("log.csv", "time_s,a [bar]\n0,1\n1,2\n");

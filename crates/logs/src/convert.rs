@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use trace::toml_string;
+use trace::{Unit, toml_string};
 
 use crate::map::Resolved;
 use crate::samples::Quality;
@@ -26,6 +26,7 @@ impl ConvertedColumn {
             // What stands in brackets at the end of a name is no unit.
             "" if self.name.ends_with([')', ']']) => format!("{} []", self.name),
             "" => self.name.clone(),
+            unit if Unit::of_name(&self.name).is_some_and(|of_name| of_name.name == unit) => self.name.clone(),
             unit => format!("{} [{unit}]", self.name),
         }
     }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use config::significant;
 use logs::{Log, Readings, Role, SeenGear, SeenGears};
 use trace::{ShownPath as _, quantity};
 
@@ -38,7 +39,9 @@ impl Numbers {
             let log = log.map_or(String::new(), |log| format!("{}: ", log.path.shown()));
             Failure::Input(format!("{log}the log does not show this: {needs}\nhint: give it with {option}"))
         };
-        let within = |value: Option<f64>, [low, high]: [f64; 2]| value.filter(|value| (low..=high).contains(value));
+        let within = |value: Option<f64>, [low, high]: [f64; 2]| {
+            value.map(significant).filter(|value| (low..=high).contains(value))
+        };
         let numbers = Self {
             final_ratio: within(final_ratio, [0.5, 10.0]).ok_or_else(|| {
                 missing(
