@@ -6,6 +6,25 @@ use crate::support::{EXPERIMENT, Folder, VEHICLE, printed, stderr, wetclutch};
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../logs/tests/data");
 
 #[test]
+fn inspect_takes_several_logs_and_one_that_fails_does_not_stop_the_others() {
+    let [plain, packed, none] = ["plain_410.mf4", "deflate.mf4", "none.mf4"].map(|name| format!("{DATA}/{name}"));
+    let one = |log: &str, more: &[&str]| printed(&wetclutch(&[&["inspect", log], more].concat()));
+    let both = printed(&wetclutch(&["inspect", &plain, &packed]));
+    assert_eq!(both, format!("{}\n{}", one(&plain, &[]), one(&packed, &[])));
+    let output = wetclutch(&["inspect", &none, &plain, "--json"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("error: 1 of 2 logs are not inspected: ") && stderr(&output).contains("none.mf4"));
+    let of_all: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let mut of_one: serde_json::Value = serde_json::from_str(&one(&plain, &["--json"])).unwrap();
+    of_one.as_object_mut().unwrap().remove("json_version");
+    assert_eq!((&of_all["logs"][0], of_all["logs"].as_array().unwrap().len()), (&of_one, 1));
+    let suggested = wetclutch(&["inspect", &plain, &packed, "--suggest"]);
+    assert!(stderr(&suggested).contains("--suggest takes one log\nhint: "), "{}", stderr(&suggested));
+    let shifts = wetclutch(&["inspect", &plain, &packed, "--shifts", "--channel", "gear=Gear"]);
+    assert!(printed(&shifts).contains(&format!("{packed}:\n")), "{}", stderr(&shifts));
+}
+
+#[test]
 fn inspect_lists_the_channels_of_every_format() {
     let bus = ["bus.log", "bus.asc", "bus.blf"].map(|name| (name, Some("bus.dbc")));
     let plain = ["plain_410.mf4", "deflate.mf4", "unsorted.mf4", "snappy.parquet"].map(|name| (name, None));

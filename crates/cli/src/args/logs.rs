@@ -37,8 +37,9 @@ impl Mapping {
 
 #[derive(Debug, Args)]
 pub(crate) struct Inspect {
-    /// Log
-    pub(crate) log: PathBuf,
+    /// Logs; `-` is standard input
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) mapping: Mapping,
     /// Print a first channel map from names and units
@@ -84,7 +85,7 @@ pub(crate) struct Convert {
 
 #[derive(Debug, Args)]
 pub(crate) struct Estimate {
-    /// Logs; `-` is standard input. Several are estimated at a time, each into a file of its own
+    /// Logs; `-` is standard input. Several are estimated at a time, each into a separate file
     #[arg(required = true, value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
@@ -126,7 +127,7 @@ pub(crate) struct Estimate {
     /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV or a bus log as text, a file or `-`
     #[arg(long)]
     pub(crate) follow: bool,
-    /// Format of files in a folder [default: csv]; the ending of a file after -o says its format
+    /// Format of files in a folder [default: csv]; the ending of the file after -o sets its format
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatChoice>,
     /// Print the shifts of each log as JSON, in place of the table; needs -o
@@ -281,7 +282,7 @@ pub(crate) struct Fit {
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) mapping: Mapping,
-    /// Vehicle file to start from; its error budget says how far off its values may be
+    /// Vehicle file to start from; its error budget bounds the errors of its values
     #[arg(long)]
     pub(crate) vehicle: PathBuf,
     /// File whose table `sensors` describes the teeth of the speed sensors, such as an experiment file

@@ -30,7 +30,7 @@ Examples:
   wetclutch study experiments/settings.toml -o out            two thousand shifts: errors and sensitivities
   wetclutch simulate experiments/e1.toml -o out               a drive as CSV
   wetclutch design vehicles/two_speed_at.toml                 gains with their certificate
-  wetclutch design vehicles/eight_speed.toml                  which upshifts of a gearbox hide their pressure
+  wetclutch design vehicles/eight_speed.toml                  in which upshifts the pressure is not observable
   wetclutch inspect drive.mf4                                 channels, units, rates and gaps of a log
   wetclutch estimate log.csv --vehicle my_car.toml            pressure from measured signals
   wetclutch fit log.csv --vehicle my_car.toml -o fitted.toml  a vehicle file that fits the car
@@ -87,7 +87,7 @@ pub(crate) enum Command {
     /// filter reads its speeds by toothed wheels and estimates pressure and torque of both clutches. Prints every shift with its
     /// quality and the errors of filter and open loop, and writes:
     ///
-    ///   report.html    the drive, the shifts, each shift drawn
+    ///   report.html    the drive, the shifts, a figure of each shift
     ///   shifts.csv     the shifts as numbers
     ///   drive.csv, drive_measured.csv    the signals, as `simulate` writes them
     ///
@@ -146,7 +146,7 @@ pub(crate) enum Command {
     /// Writes the decoded channels of a log of any format that is read, with their names and units. A row has the values of one time; a channel
     /// that has none there is empty. Samples that are not good, such as repeated ones, are left out.
     ///
-    /// With --map or --channel only the mapped channels, under the names of their signals and in SI, and beside the table OUT_map.toml: a channel map
+    /// With --map or --channel only the mapped channels, under the names of their signals and in SI, and next to the table OUT_map.toml: a channel map
     /// with the delays and ranges, by which the table is estimated as the log.
     ///
     ///   wetclutch convert drive.blf --dbc bus.dbc -o drive.parquet
@@ -200,7 +200,7 @@ pub(crate) enum Command {
     /// the names of `estimate` need no channel map. The last fifth of the shifts is held out to check the result.
     ///
     /// Where the fitted values are worse on those, or end at the limit of what is held possible, the new file has the given values
-    /// and the reason in its first line; a warning says so, and the exit code is 0. Without a fit no file is written; the exit code
+    /// and the reason in its first line; a warning reports it, and the exit code is 0. Without a fit no file is written; the exit code
     /// is 1 or 2.
     ///
     ///   wetclutch fit drive1.mf4 drive2.mf4 --map map.toml --vehicle car.toml -o fitted.toml
@@ -210,13 +210,13 @@ pub(crate) enum Command {
     ///
     /// Writes a short vehicle file: with --gearbox for all gears of an automatic, with --ratios for one upshift. What is not in it is
     /// a default, scaled to the car where it depends on its size. What an estimate uses and somebody may know stands in it as comments.
-    /// `check` lists the defaults, and says which values matter most for the estimate; `fit` finds them from logs.
+    /// `check` lists the defaults, and reports which values matter most for the estimate; `fit` finds them from logs.
     ///
     ///   wetclutch init --gearbox 8hp --mass-kg 1900 --wheel-radius-m 0.33 --final-ratio 2.8 --engine-torque-n-m 400 -o car.toml
     ///   wetclutch init --ratios 4.17,2.34 --mass-kg 1650 --wheel-radius-m 0.32 --final-ratio 3.2 --engine-torque-n-m 250 -o car.toml
     ///
-    /// A shipped gearbox is written beside the vehicle file, with pistons and springs for the engine torque. With --ratios and
-    /// --complete, the file has every key, and each says where its value is from.
+    /// A shipped gearbox is written next to the vehicle file, with pistons and springs for the engine torque. With --ratios and
+    /// --complete, the file has every key, and a comment gives the source of each value.
     #[command(verbatim_doc_comment)]
     Init(Init),
     /// Run the source chapter's experiments and compare the results with its statements
@@ -319,7 +319,7 @@ pub(crate) enum Command {
     ///   wetclutch_CAR_fmi2.fmu, ...fmi3.fmu    with --fmu: the observer for co-simulation (FMI 2.0, FMI 3.0)
     ///   wetclutch_CAR_car_fmi2.fmu, ...    with --car-fmu: the car itself, which shifts
     ///
-    /// The same car gives the same bytes. The library is built from the sources, once for each controller; README.md says how.
+    /// The same car gives the same bytes. The library is built from the sources, once for each controller; README.md has the commands.
     ///
     ///   wetclutch export vehicles/eight_speed.toml -o out
     ///   wetclutch export vehicles/eight_speed.toml --shift 1-2 -o out

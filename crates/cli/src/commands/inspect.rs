@@ -6,6 +6,7 @@ use drivetrain::Real;
 use fit::drive::{DriveRecord, converter_file};
 use logs::plausibility::{likely_time_unit, too_fast_a_time};
 use logs::{Channel, ChannelMap, ChannelSummary, Inspection, Log, Reading, Readings, RoleSummary, Shift, ShiftFinder};
+use serde_json::{Value, json};
 use trace::ShownPath as _;
 use trace::units::rpm;
 
@@ -22,13 +23,57 @@ use crate::output;
 const LONGEST_NAME: usize = 40;
 
 pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
+    let [log] = options.logs.as_slice() else { return inspect_all(options) };
+    let found = inspect_log(options, log)?;
+    found.map_or(Ok(()), |found| output::json(&found))
+}
+
+/// Inspects several logs, one after the other; one that fails does not stop the others.
+fn inspect_all(options: &Inspect) -> Result<(), Failure> {
+    let of_one = [
+        ("--suggest", options.suggest),
+        ("-o", options.output.is_some()),
+        ("--write-converter", options.write_converter.is_some()),
+    ];
+    if let Some((option, _)) = of_one.iter().find(|(_, is_given)| *is_given) {
+        return Err(Failure::Input(format!("{option} takes one log\nhint: start the command once for each")));
+    }
+    let (mut found, mut failed) = (Vec::new(), Vec::new());
+    for (at, log) in options.logs.iter().enumerate() {
+        if at > 0 && !options.json {
+            output::line("")?;
+        }
+        if options.shifts && !options.json {
+            output::line(&format!("{}:", log.shown()))?;
+        }
+        match inspect_log(options, log) {
+            Ok(of_log) => found.extend(of_log),
+            Err(Failure::BrokenPipe) => return Err(Failure::BrokenPipe),
+            Err(failure) => {
+                output::error(&failure.to_string());
+                failed.push(log.shown().to_string());
+            }
+        }
+    }
+    if options.json {
+        output::json(&json!({ "logs": found }))?;
+    }
+    if failed.is_empty() {
+        return Ok(());
+    }
+    let (count, all) = (failed.len(), options.logs.len());
+    Err(Failure::Input(format!("{count} of {all} logs are not inspected: {}", failed.join(", "))))
+}
+
+/// Prints what is in a log, or returns it for JSON.
+fn inspect_log(options: &Inspect, path: &Path) -> Result<Option<Value>, Failure> {
     let mut map = channel_map(&options.mapping)?;
     if !options.ratios.is_empty() {
         map.gearbox.ratios.clone_from(&options.ratios);
     }
-    let mut log = Log::open(&options.log, &map.open)?.on_threads(available_threads());
+    let mut log = Log::open(path, &map.open)?.on_threads(available_threads());
     if log.channels().is_empty() {
-        return Err(nothing_in(&options.log, "channels"));
+        return Err(nothing_in(path, "channels"));
     }
     if options.suggest {
         let has_frames = !["CSV", "Parquet"].iter().any(|format| log.format().starts_with(format));
@@ -40,8 +85,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         let dbc =
             dbc.map(|dbc| std::path::absolute(dbc).unwrap_or_else(|_| dbc.clone()).to_string_lossy().into_owned());
         let by_names = logs::suggest(log.channels(), dbc.as_deref());
-        let by_values = by_values(&options.log, &by_names);
-        return Ok(output::toml(format!("{by_names}{by_values}").trim_end())?);
+        let by_values = by_values(path, &by_names);
+        output::toml(format!("{by_names}{by_values}").trim_end())?;
+        return Ok(None);
     }
     if options.shifts {
         if map.channels.is_empty() {
@@ -52,22 +98,22 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         }
         for output in [&options.output, &options.write_converter] {
             check_output(output.as_ref())?;
-            not_an_input(output.as_ref(), options.mapping.files().chain([&options.log]))?;
+            not_an_input(output.as_ref(), options.mapping.files().chain(&options.logs))?;
         }
         let is_converter = |path: &Path| head(path).starts_with(converter_file::BEGIN);
         let converter = options.write_converter.as_deref();
         converter.map(|path| replaces_only("table of a converter", path, is_converter)).transpose()?;
         options.output.as_deref().map(|page| replaces_only("page in HTML", page, is_page)).transpose()?;
-        return shifts(options, &mut log, &map);
+        return shifts(options, path, &mut log, &map);
     }
     let inspection = logs::inspect(&mut log)?;
     if inspection.channels.iter().all(|summary| summary.counts.total() == 0) {
-        return Err(nothing_in(&options.log, "samples"));
+        return Err(nothing_in(path, "samples"));
     }
     if options.json {
-        return inspect_json::channels(options, &log, &inspection);
+        return Ok(Some(inspect_json::channels(path, &log, &inspection)));
     }
-    output::line(&format!("{}: {}, {} channels", options.log.shown(), log.format(), log.channels().len()))?;
+    output::line(&format!("{}: {}, {} channels", path.shown(), log.format(), log.channels().len()))?;
     channels(&log, &inspection)?;
     remarks(&inspection.notes);
     let steps_s = inspection.channels.iter().filter_map(|summary| summary.period_s);
@@ -75,7 +121,10 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     let first_s = spans_s().map(|[first_s, _]| first_s).fold(f64::INFINITY, f64::min);
     let last_s = spans_s().map(|[_, last_s]| last_s).fold(f64::NEG_INFINITY, f64::max);
     remarks(wrong_time(steps_s.fold(f64::INFINITY, f64::min), last_s - first_s).as_slice());
-    if map.channels.is_empty() { Ok(()) } else { check_map(options, &log, &map) }
+    if !map.channels.is_empty() {
+        check_map(path, &log, &map)?;
+    }
+    Ok(None)
 }
 
 /// A log without channels or samples.
@@ -87,16 +136,16 @@ fn nothing_in(log: &Path, what: &str) -> Failure {
 }
 
 /// Refuses a map that does not fit the log, or by whose units its values cannot be right, as an estimate does.
-fn check_map(options: &Inspect, log: &Log, map: &ChannelMap) -> Result<(), Failure> {
+fn check_map(path: &Path, log: &Log, map: &ChannelMap) -> Result<(), Failure> {
     map.resolve(log)?;
-    if options.log == Path::new("-") {
+    if path == Path::new("-") {
         output::note(
             "the channel map fits the names and units of the log; values of standard input are not compared with them",
         );
         return Ok(());
     }
     // A log is read once.
-    let mut log = Log::open(&options.log, &map.open)?.on_threads(available_threads());
+    let mut log = Log::open(path, &map.open)?.on_threads(available_threads());
     let mut readings = Readings::new(&mut log, map)?;
     readings.by_ref().try_for_each(|reading| reading.map(drop))?;
     readings.check()?;
@@ -221,7 +270,7 @@ fn channels(log: &Log, inspection: &Inspection) -> Result<(), Failure> {
     Ok(output::long_table(if grouped { 3 } else { 2 }, rows)?)
 }
 
-fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Failure> {
+fn shifts(options: &Inspect, path: &Path, log: &mut Log, map: &ChannelMap) -> Result<Option<Value>, Failure> {
     // A channel that is not there is the reason for what the finder would miss.
     map.resolve(log)?;
     let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
@@ -257,11 +306,11 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
     let found: Vec<Shift> = finder.take_settled(f64::INFINITY).iter().map(|shift| shift.earlier_by(origin_s)).collect();
     notes.extend(finder.notes());
     let drive = Drive::of(record, map);
-    if let Some(path) = &options.write_converter {
-        write_converter(path, &options.log, &drive)?;
+    if let Some(converter) = &options.write_converter {
+        write_converter(converter, path, &drive)?;
     }
     if options.json {
-        return inspect_json::shifts(options, [first_s, last_s], &found, &notes);
+        return Ok(Some(inspect_json::shifts(path, [first_s, last_s], &found, &notes)));
     }
     remarks(&notes);
     say_origin(origin_s)?;
@@ -282,10 +331,10 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
     if !has_command(map) {
         output::note("no valve command is mapped: shifts and speeds can be studied, a pressure cannot be estimated");
     }
-    match &options.output {
-        Some(path) => page(path, options, map, &found, &drive, notes),
-        None => Ok(()),
+    if let Some(output) = &options.output {
+        page((output, path), options, map, &found, &drive, notes)?;
     }
+    Ok(None)
 }
 
 /// What was met in the log, in sentences.

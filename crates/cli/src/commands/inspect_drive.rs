@@ -45,7 +45,7 @@ pub(super) fn write_converter(path: &Path, log: &Path, drive: &Drive) -> Result<
 
 /// Writes the page of the drive.
 pub(super) fn page(
-    path: &Path,
+    (path, log): (&Path, &Path),
     options: &Inspect,
     map: &ChannelMap,
     shifts: &[Shift],
@@ -57,7 +57,7 @@ pub(super) fn page(
         faults.push("The page shows the first five hours: the drive is longer.".to_owned());
     }
     let page = SpeedsPage {
-        log: &options.log,
+        log,
         map: map_file.as_ref(),
         record: &drive.record,
         moments: &drive.moments,

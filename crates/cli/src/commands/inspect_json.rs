@@ -1,38 +1,36 @@
 //! What `wetclutch inspect --json` prints.
 
+use std::path::Path;
+
 use logs::{Channel, ChannelSummary, Inspection, Log, Quality, Shift};
 use serde_json::{Map, Value, json};
 use trace::ShownPath as _;
 
-use crate::args::Inspect;
-use crate::failure::Failure;
-use crate::output;
-
-/// Prints the channels of a log. Times are those of the log's clock.
-pub(super) fn channels(options: &Inspect, log: &Log, inspection: &Inspection) -> Result<(), Failure> {
+/// The channels of a log. Times are those of the log's clock.
+pub(super) fn channels(path: &Path, log: &Log, inspection: &Inspection) -> Value {
     let channels: Vec<Value> = log
         .channels()
         .iter()
         .zip(&inspection.channels)
         .map(|(channel, summary)| of_channel(channel, summary))
         .collect();
-    output::json(&json!({
-        "log": options.log.shown().to_string(),
+    json!({
+        "log": path.shown().to_string(),
         "format": log.format(),
         "channels": channels,
         "warnings": inspection.notes,
-    }))
+    })
 }
 
-/// Prints the shifts of a log. Times are those of the log's clock.
-pub(super) fn shifts(options: &Inspect, span_s: [f64; 2], shifts: &[Shift], notes: &[String]) -> Result<(), Failure> {
-    output::json(&json!({
-        "log": options.log.shown().to_string(),
+/// The shifts of a log. Times are those of the log's clock.
+pub(super) fn shifts(path: &Path, span_s: [f64; 2], shifts: &[Shift], notes: &[String]) -> Value {
+    json!({
+        "log": path.shown().to_string(),
         "from_s": span_s[0],
         "to_s": span_s[1],
         "shifts": shifts.iter().map(of_shift).collect::<Vec<_>>(),
         "warnings": notes,
-    }))
+    })
 }
 
 fn of_channel(channel: &Channel, summary: &ChannelSummary) -> Value {
