@@ -25,6 +25,8 @@ pub(crate) struct Findings {
     other_gear: u64,
     first_s: f64,
     last_s: f64,
+    /// The last step in the gears of the vehicle file's shift, s.
+    in_gears_s: f64,
     passages: Passages,
     /// Samples of each health that was seen.
     health: Vec<(Health, u64)>,
@@ -39,6 +41,8 @@ pub(crate) struct Findings {
     taken: [u64; CHANNELS],
 }
 
+/// A gear is known from the ratio of the speeds after a moment; until then a drive counts as in the gears of the shift, s.
+const UNKNOWN_S: f64 = 0.2;
 /// From fewer rows nothing is said of most of them \[chosen\]: one second at 100 Hz.
 const ENOUGH_ROWS: u64 = 100;
 /// The channels of an observer, and the role of each.
@@ -52,6 +56,7 @@ impl Findings {
             other_gear: 0,
             first_s: f64::NAN,
             last_s: f64::NAN,
+            in_gears_s: f64::NAN,
             passages: Passages::default(),
             health: Vec::new(),
             errors: Some(ErrorScore::new(0.0)),
@@ -77,6 +82,7 @@ impl Findings {
 
     pub(crate) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
         self.pass(row.time_s);
+        self.in_gears_s = row.time_s;
         self.rows += 1;
         self.ratios.push(row.time_s, &row.input, is_looked_at(self.rows, FIRST_LOOK));
         let input = &row.input;
@@ -138,7 +144,8 @@ impl Findings {
     /// More than half of the readings of a channel were refused, or none came; or most estimates are outside their range.
     pub(crate) fn check(&self, commands: [Role; 2], log: &Measured<'_>, observer: ObserverKind) -> Result<(), Error> {
         let needs_wheel = log.has_wheel_speed() && observer != ObserverKind::Rigid && !is_open_loop(observer);
-        if self.rows == 0 && self.other_gear > 0 {
+        let is_in_gears = self.in_gears_s - self.first_s > UNKNOWN_S;
+        if !is_in_gears && self.other_gear > 0 {
             return Err(Error::Input(
                 "the log is never in the gears of the vehicle file's shift\nhint: check `gearbox.ratios` of the channel map and the \
                  gear train of the vehicle file; `wetclutch inspect --shifts` lists the shifts"
@@ -182,7 +189,7 @@ impl Findings {
         let lost = self.without_command;
         if 2 * lost > self.rows && self.rows >= ENOUGH_ROWS {
             return Err(Error::Input(format!(
-                "{} of {} samples have no command of the valve that can be used\nhint: if it is sent on change, say so by `sent_on_change = true` \
+                "{} of {} samples have no command of the valve that can be used\nhint: if it is sent on change, set `sent_on_change = true` \
                  in a channel map; else look at its channel with `wetclutch inspect`. A log of another car, or of one with a whole gearbox, may have \
                  it in its shifts alone, and that needs the vehicle file of that car",
                 grouped(lost),
@@ -197,7 +204,7 @@ impl Findings {
         Err(Error::Input(format!(
             "{} of {} estimates are impossible for this car, most of them `{worst}`\nhint: a channel with a wrong scale does this, \
              another car than that of the vehicle file, and a log of other gears; `wetclutch inspect` shows minimum and maximum values, \
-             and a channel map with `gearbox.ratios` tells the gears apart",
+             and a channel map with `gearbox.ratios` distinguishes the gears",
             grouped(count),
             grouped(self.rows)
         )))
