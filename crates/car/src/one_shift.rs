@@ -108,7 +108,7 @@ pub enum OneShiftError {
     #[error(
         "the car has no converter, and the observers with designed gains take the turbine torque from the maps of one\n\
          hint: the gearbox filter takes the torque that the engine's controller reports (`wetclutch estimate`), and `wetclutch \
-         sensitivity` says what the speeds show of each clutch torque"
+         sensitivity` lists what the speeds show of each clutch torque"
     )]
     NoConverter,
 }

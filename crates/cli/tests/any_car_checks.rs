@@ -208,7 +208,7 @@ fn a_gear_that_changes_without_a_target_is_told() {
     });
     folder.write("log.csv", log);
     let told = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
-    assert!(told.contains("gear changes without a target_gear that says so before"), "{told}");
+    assert!(told.contains("gear changes without a change of target_gear before"), "{told}");
     let whole = said(&estimate(&folder, "sim/short_measured.csv", &["-o", &folder.path("whole.csv")]));
     assert!(!whole.contains("without a target_gear") && !whole.contains("output_speed over wheel_speed"), "{whole}");
 }
@@ -311,7 +311,9 @@ fn a_gear_that_the_gearbox_does_not_have_is_counted_and_the_gear_before_stands()
     let whole = folder.read("out.csv");
     for name in ["gear", "target_gear"] {
         let few = said(&with_cells(&folder, &text, name, "255", |row| row == 300));
-        let note = format!("warning: 1 of 2400 samples of {name} are no gear of this gearbox (255) and are not used");
+        let note = format!(
+            "warning: 1 of 2400 samples of {name} are no gear of this gearbox (255) and are not used: the gear before stands"
+        );
         assert!(few.contains(&note) && few.contains("`valid_range` of `channel."), "{few}");
         assert!(folder.read("out.csv") == whole, "{name}");
         let maximum = refused(&with_cells(&folder, &text, name, "255", |row| row % 5 > 1));

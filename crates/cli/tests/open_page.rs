@@ -43,7 +43,11 @@ fn without_a_desktop_the_place_of_the_page_is_printed() {
     let output = demo(&folder, false);
     assert!(output.status.success());
     let message = stderr(&output);
-    assert!(message.contains("hint: open ") && message.contains("out/report.html in a browser"), "{message}");
+    assert!(
+        message.contains("--open: there is no desktop to open the page on\nhint: open ")
+            && message.contains("out/report.html in a browser"),
+        "{message}"
+    );
     assert!(!Path::new(&folder.path("opened")).exists());
 }
 

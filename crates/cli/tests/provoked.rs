@@ -1,11 +1,21 @@
 //! Errors of the index of messages that no other test provokes: each with its cause, and what is printed.
 
-use crate::support::{BENCH, EXPERIMENT, Folder, ROOT, VEHICLE, refused, said, wetclutch};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use crate::support::{BENCH, EXPERIMENT, Folder, ROOT, VEHICLE, refused, said, stderr, wetclutch};
 
 /// Runs a command that is wrong; its message has these words and a hint.
 fn provokes(arguments: &[&str], words: &str) {
     let text = refused(&wetclutch(arguments));
     assert!(text.starts_with("error: ") && text.contains(words) && text.contains("\nhint: "), "{arguments:?}: {text}");
+}
+
+/// Runs a command that is wrong; its message has these words, and says by them what is expected.
+fn names(arguments: &[&str], words: &str) {
+    let text = refused(&wetclutch(arguments));
+    assert!(text.starts_with("error: ") && text.contains(words), "{arguments:?}: {text}");
 }
 
 fn car() -> String {
@@ -39,10 +49,16 @@ fn channels_and_maps_that_do_not_fit_the_command_are_named() {
     provokes(&["inspect", &log, "--map", &map], "`dbc` leads to ");
     let semicolons = folder.write("semicolons.csv", std::fs::read_to_string(&log).unwrap().replace(',', ";"));
     provokes(&["estimate", &semicolons, "--vehicle", &car()], "the columns are separated by `;`");
+    let duty = "time_s,engine_speed_rad_s,turbine_speed_rad_s,output_speed_rad_s,oncoming_duty_percent\n0,1,1,1,1\n";
+    let duty = folder.write("duty.csv", duty);
+    provokes(
+        &["estimate", &duty, "--vehicle", VEHICLE],
+        "the log has `oncoming_duty_percent`, but the command of the vehicle's valve is",
+    );
     let channels = ["turbine_speed", "output_speed"].map(|role| format!("{role}={role}_rad_s"));
     let mapped = ["--channel", &channels[0], "--channel", &channels[1]];
     let text = ["init", "--from-log", &log, "--mass-kg", "1500", "-o", &folder.path("car.toml")];
-    assert!(refused(&wetclutch(&[&text[..], &mapped].concat())).contains("hint: "));
+    assert!(refused(&wetclutch(&[&text[..], &mapped].concat())).contains("the log does not show this: "));
     // A bus log whose stamps are the times between frames.
     let deltas: String = (0..50).map(|i| format!("(0.0{:02}) can0 100#01E803\n", 50 - i)).collect();
     let dbc =
@@ -71,6 +87,52 @@ fn options_for_other_files_are_named() {
     let program = env!("CARGO_BIN_EXE_wetclutch");
     provokes(&["export", &car, "--check-elf", program, "-o", &out], "is not in the program");
     provokes(&["fit", "-", "--vehicle", VEHICLE, "-o", &folder.path("f.toml")], "a fit reads a log twice");
+    let library = ["export", &car, "--shift", "1-2", "--fmu", program, "-o", &out];
+    provokes(&library, "not a shared library of a model: it has not the functions of FMI 2.0 and 3.0");
+    provokes(&["design", &car, "--observer", "sliding"], "`--observer sliding` has no certificate");
+    let of_pipe = ["estimate", "-", "--vehicle", &car, "--learnt", "-"];
+    provokes(&of_pipe, "--learnt -: what was learnt is read from a file and written to it");
+    let log = folder.write("log.csv", "time_s\n0\n");
+    let two = [&log, &log, "--vehicle", &car, "--follow", "-o", &out];
+    provokes(&[&["estimate"][..], &two].concat(), "--follow takes one log");
+    names(
+        &["estimate", EXPERIMENT, "--vehicle", VEHICLE, "--shifts", "1"],
+        "expected two gears by their names, such as 1-2",
+    );
+    names(&["study", EXPERIMENT, "--shard", "3/2", "-o", &out], "expected I/N with I from 1 to N, such as 2/4");
+}
+
+#[test]
+fn formats_that_need_a_whole_file_are_named_where_they_come_through_a_pipe() {
+    let log = std::fs::File::open(format!("{ROOT}crates/logs/tests/data/plain_410.mf4")).unwrap();
+    let mut inspect = Command::new(env!("CARGO_BIN_EXE_wetclutch"));
+    let output = inspect.args(["inspect", "-"]).stdin(Stdio::from(log)).output().unwrap();
+    assert!(refused(&output).contains("MDF and Parquet files cannot be read from a pipe\nhint: give the file itself"));
+}
+
+/// The eight-speed car with an engine that does not even turn the pump of its converter.
+fn weak_car(folder: &Folder) -> String {
+    let text = std::fs::read_to_string(car()).unwrap().replace("../gearboxes", &format!("{ROOT}gearboxes"));
+    let (begin, end) = (text.find("[engine.torque]").unwrap(), text.find("[converter]").unwrap());
+    let map = "[engine.torque]\nthrottle = [0, 1]\nspeed_rad_s = [80, 700]\ntorque_n_m = [[-2, 12], [-16, 17]]\n";
+    let text = [&text[..begin], map, &text[end..]].concat().replace("drag_n_m_s = 0.047", "drag_n_m_s = 0.5");
+    folder.write("weak.toml", text)
+}
+
+#[test]
+fn drives_that_no_car_can_make_are_named_and_leave_nothing() {
+    let folder = Folder::new("impossible-drives");
+    let weak = weak_car(&folder);
+    for (car, start, words) in [
+        (&car(), "gear = \"1\"\nvehicle_m_s = 60", "in gear 1 at 60 m/s the gearbox input would turn at "),
+        (&weak, "vehicle_m_s = 0", "the engine stalls at "),
+    ] {
+        let drive = "sample_time_s = 0.01\n[[segment]]\nduration_s = 5\nthrottle = 0.0\n";
+        let drive = folder.write("drive.toml", format!("vehicle = '{car}'\nname = \"d\"\n{drive}[start]\n{start}\n"));
+        let output = wetclutch(&["simulate", &drive, "-o", &folder.path("new/out")]);
+        assert!(!output.status.success() && stderr(&output).contains(words), "{words}: {}", stderr(&output));
+        assert!(!Path::new(&folder.path("new")).exists(), "{words}");
+    }
 }
 
 #[test]
@@ -86,4 +148,144 @@ fn studies_that_do_not_fit_their_folder_are_named() {
     provokes(&["merge", &study, &part, "-o", &merged], "shard 2/2 is missing");
     provokes(&["merge", &study, &whole, "-o", &merged], "this is a whole study, expected a shard");
     provokes(&["worst-case", &study, "--observer", "nobody", "-o", &merged], "the study has no observer `nobody`");
+    // A shard that has lost a row, and no part of a row.
+    said(&wetclutch(&["study", &study, "--shard", "2/2", "-o", &folder.path("rest")]));
+    let rows = folder.read("rest/runs.csv");
+    folder.write("rest/runs.csv", format!("{}\n", rows.lines().next().unwrap()));
+    provokes(&["merge", &study, &part, &folder.path("rest"), "-o", &merged], "contains 0 of 1 runs");
+}
+
+/// Estimates the rows of a simulated log that lie in these times, with another current.
+fn estimate_of(folder: &Folder, times_s: [f64; 2], current: impl Fn(usize, &str) -> String, more: &[&str]) -> Output {
+    if !Path::new(&folder.path("drive")).exists() {
+        said(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("drive")]));
+    }
+    let text = folder.read("drive/e1_measured.csv");
+    let names = text.lines().next().unwrap();
+    let place = names.split(',').position(|name| name == "oncoming_current_a").unwrap();
+    let mut log = format!("{names}\n");
+    for (at, line) in text.lines().skip(1).step_by(10).enumerate() {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if (times_s[0]..times_s[1]).contains(&cells[0].parse().unwrap()) {
+            let current = current(at, cells[place]);
+            cells[place] = &current;
+            writeln!(log, "{}", cells.join(",")).unwrap();
+        }
+    }
+    let log = folder.write("log.csv", log);
+    wetclutch(&[&["estimate", &log, "--vehicle", VEHICLE, "-o", &folder.path("out.csv")], more].concat())
+}
+
+#[test]
+fn logs_of_another_car_are_named() {
+    let folder = Folder::new("other-car");
+    let (all, given) = ([0.0, 20.0], |_: usize, current: &str| current.to_owned());
+    // Always in a gear above those of the file.
+    let channels = [("engine_speed", ""), ("turbine_speed", "scale = 1.6"), ("output_speed", "")];
+    let channels =
+        channels.map(|(role, scale)| format!("[channel.{role}]\nname = \"{role}_rad_s\"\n{scale}\n")).concat();
+    let command = "[channel.oncoming_current]\nname = \"oncoming_current_a\"\n";
+    let map = folder.write("map.toml", format!("[gearbox]\nratios = [4.0, 2.5, 1.0]\n{channels}{command}"));
+    for (output, words) in [
+        (
+            estimate_of(&folder, [1.0, 7.0], given, &["--map", &map]),
+            "the log is never in the gears of the vehicle file's shift",
+        ),
+        (estimate_of(&folder, [1.0, 7.0], given, &["--shifts", "1-2"]), "--shifts 1-2: no shift was found in the log"),
+        (
+            estimate_of(&folder, all, |_, _| "0.6".to_owned(), &["--observer", "rigid"]),
+            "estimates are impossible for this car, most of them `limited_to_range`",
+        ),
+        (
+            estimate_of(&folder, all, |at, current| [current, "3", "-1"][at % 3].to_owned(), &[]),
+            "readings of oncoming_current were refused: they are impossible for this car",
+        ),
+    ] {
+        let text = refused(&output);
+        assert!(text.contains(words) && text.contains("\nhint: "), "{words}: {text}");
+    }
+}
+
+#[test]
+fn changed_rows_of_studies_of_cars_are_named() {
+    let folder = Folder::new("car-rows");
+    let study = format!("name = \"s\"\ntitle = \"S\"\nvehicle = '{}'\nshifts = [\"1-2\"]\nruns = 2\n", car());
+    let study = folder.write("study.toml", study);
+    let [first, second, merged] = ["first", "second", "merged"].map(|name| folder.path(name));
+    said(&wetclutch(&["study", &study, "--shard", "1/2", "-o", &first]));
+    said(&wetclutch(&["study", &study, "--shard", "2/2", "-o", &second]));
+    let rows = folder.read("second/runs.csv");
+    for (old, new, words) in [
+        ("\n1,", "\n7,", "expected run 1, found `7`"),
+        (",ok,", ",good,", "there is no status `good`"),
+        (",ok,", ",ok,1,", "the row has another number of cells"),
+    ] {
+        assert!(rows.contains(old), "{rows}");
+        folder.write("second/runs.csv", rows.replace(old, new));
+        provokes(&["merge", &study, &first, &second, "-o", &merged], words);
+    }
+}
+
+#[test]
+fn studies_without_a_complete_shift_are_named() {
+    let folder = Folder::new("no-shift");
+    let bench = std::fs::read_to_string(BENCH).unwrap();
+    let vehicle = format!("vehicle = '{VEHICLE}'");
+    let lines = bench.lines().map(|line| match line.split(" =").next() {
+        Some("vehicle") => vehicle.as_str(),
+        Some("duration_s") if line.ends_with("= 9.5") => "duration_s = 7.6",
+        _ => line,
+    });
+    folder.write("short.toml", lines.collect::<Vec<_>>().join("\n"));
+    let study = "name = \"s\"\ntitle = \"S\"\nexperiment = \"short.toml\"\nplan = \"latin-hypercube\"\nruns = 2\nseed = 1\nobservers = [\"open loop\"]\n[[factor]]\nkey = \"car.vehicle.mass_kg\"\nrange = [1300, 2000]\n";
+    let study = folder.write("study.toml", study);
+    let out = folder.path("out");
+    for (arguments, words) in [
+        (&["error-bound", &study, "-o", &out][..], "no run has a complete shift: there is no model error to compute"),
+        (
+            &["worst-case", &study, "--observer", "open loop", "-o", &out],
+            "no run of the study has a complete shift to start from",
+        ),
+    ] {
+        let output = wetclutch(arguments);
+        assert!(output.status.code() == Some(1) && stderr(&output).contains(words), "{words}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn cars_that_are_not_as_their_file_says_are_warned_of() {
+    let folder = Folder::new("other-than-file");
+    let simulated = |drive: &str| {
+        let drive = folder.write("drive.toml", drive.replace("../vehicles", &format!("{ROOT}vehicles")));
+        said(&wetclutch(&["simulate", &drive, "-o", &folder.path("drive"), "--force"]));
+    };
+    let warned = |log: &str, words: &str| {
+        let log = folder.path(log);
+        let text = said(&wetclutch(&["estimate", &log, "--vehicle", &car(), "-o", &folder.path("out.csv"), "--force"]));
+        assert!(text.contains(words), "{words}: {text}");
+    };
+    let faults = std::fs::read_to_string(format!("{ROOT}drives/faults.toml")).unwrap();
+    simulated(&faults);
+    warned("drive/faults_measured.csv", "warning: one of C, D slips in gear 5, 7 since ");
+    simulated(&faults.replace(
+        "element = \"C\"\nfriction_factor = 0.1\nfrom_s = 60",
+        "element = \"E\"\nfriction_factor = 0.03\nfrom_s = 20",
+    ));
+    warned("drive/faults_measured.csv", "in all: it is engaged there and has held no more torque since");
+    // All currents are 50 mA too high.
+    simulated(
+        &std::fs::read_to_string(format!("{ROOT}drives/city.toml"))
+            .unwrap()
+            .replace("repetitions = 20", "repetitions = 1"),
+    );
+    let text = folder.read("drive/city_measured.csv");
+    let is_current = |name: &str| name.starts_with("element_") && name.ends_with("_current_a");
+    let currents: Vec<bool> = text.lines().next().unwrap().split(',').map(is_current).collect();
+    let higher = |(cell, is_current): (&str, &bool)| match cell.parse::<f64>() {
+        Ok(current) if *is_current => (current + 0.05).to_string(),
+        _ => cell.to_owned(),
+    };
+    let row = |line: &str| line.split(',').zip(&currents).map(higher).collect::<Vec<_>>().join(",") + "\n";
+    folder.write("higher.csv", text.lines().map(row).collect::<String>());
+    warned("higher.csv", "warning: by the shifts the car is outside its error budget, from ");
 }

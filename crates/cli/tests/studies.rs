@@ -358,8 +358,16 @@ fn a_row_that_was_changed_is_named_with_its_shard_and_line_and_a_merge_after_tha
     let longer = format!("{good}{third}\n");
     let cases = [
         (changed(1, "42"), ":3: the seed of run 9 is"),
-        (changed(2, "1500"), ":3: `mass_kg` of run 9 is"),
+        (changed(2, "1500"), ":3: `mass_kg` of run 9 is 1500, expected "),
         (changed(0, "8"), ":3: the row is of run 8, expected run 9"),
+        (
+            good.replace(&third, &third.replace(cells[2], &format!("{}0", cells[2]))),
+            ":3: the numbers of the row have been changed",
+        ),
+        (
+            good.replace(&third, &third.replace(",ok,", ",diverged,")),
+            ":3: the scores of run 9 do not go with its status `diverged`",
+        ),
         (good.replace('\n', "\r\n"), ":1: the line ends with CR LF"),
         (good.trim_end().to_owned(), ":9: the line is incomplete"),
         (good.replace(&format!("{third}\n"), ""), ":3: the row is of run 10, expected run 9"),

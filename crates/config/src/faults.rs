@@ -58,11 +58,11 @@ impl RawFault {
         self.check_keys(check)?;
         let number = |key: &str, value: &Option<Number>, range| match value {
             Some(value) => check.number(format_args!("fault.{key}"), value, range),
-            None => Err(self.wrong(check, format!("`{key}` is missing"))),
+            None => Err(self.missing(check, key)),
         };
         let element = || match &self.element {
             Some(element) => Ok(element.get_ref().clone()),
-            None => Err(self.wrong(check, "`element` is missing".to_owned())),
+            None => Err(self.missing(check, "element")),
         };
         let friction = || number("friction_factor", &self.friction_factor, 0.0..=10.0);
         let kind = match *self.kind.get_ref() {
@@ -104,7 +104,7 @@ impl RawFault {
                 return Err(self.wrong(check, format!("`{key}` has no effect with this kind")));
             }
             if !is_given && needed.contains(&key) {
-                return Err(self.wrong(check, format!("`{key}` is missing")));
+                return Err(self.missing(check, key));
             }
         }
         Ok(())
@@ -116,6 +116,10 @@ impl RawFault {
             Some([one, other]) if one != other => Ok([one.clone(), other.clone()]),
             _ => Err(self.wrong(check, "`elements` has to name two elements".to_owned())),
         }
+    }
+
+    fn missing(&self, check: &Check<'_>, key: &str) -> ConfigError {
+        self.wrong(check, format!("`{key}` is missing"))
     }
 
     fn wrong(&self, check: &Check<'_>, message: String) -> ConfigError {

@@ -90,7 +90,7 @@ mod tests {
             ("time_s,speed_km_h\n0,0\n1,x\n", "t.csv:3: `time_s, speed`: \"1,x\" is not two numbers"),
             ("time_s,speed_km_h\n0,0\n1\n", "\"1\" has no comma"),
             ("time_s,speed_km_h\n0,0\n1,NaN\n", "expected 0 to 100"),
-            ("time_s,speed_km_h\n0,0\n1,-3\n", "the speed is -0.8 m/s"),
+            ("time_s,speed_km_h\n0,0\n1,-3\n", "the speed is -0.8 m/s, expected 0 to "),
             ("time_s,speed_m_s\n0,0\n1,120\n", "the speed is 120.0 m/s"),
             ("time_s,speed_km_h\n0,0\n1,1\n1,2\n", "t.csv:4"),
             ("time_s,speed_km_h\n5,0\n6,2\n", "times begin at 0 and rise"),

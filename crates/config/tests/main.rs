@@ -9,4 +9,5 @@ mod gearbox_errors;
 mod gearboxes;
 mod mutations;
 mod one_shift;
+mod provoked;
 mod ratios_alone;

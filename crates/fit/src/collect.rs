@@ -151,7 +151,7 @@ fn needed(path: &Path, map: &ChannelMap, command: Role) -> Result<(), FitError> 
         None => Ok(()),
         Some(missing) => Err(FitError::input(format!(
             "{}: there is no {role}, and a fit needs {}\n\
-             hint: say which channel it is with --map or `--channel {role}=NAME`; `wetclutch inspect` lists the channels",
+             hint: name its channel with --map or `--channel {role}=NAME`; `wetclutch inspect` lists the channels",
             path.shown(),
             needed.map(Role::name).join(", "),
             role = missing.name(),

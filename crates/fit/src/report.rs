@@ -335,6 +335,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_fit_that_has_not_ended_and_one_of_one_shift_say_so() {
+        assert_eq!(cautions(true, 2).count(), 0);
+        let said: Vec<String> = cautions(false, 1).collect();
+        assert!(
+            said[0].starts_with("warning: not converged: the iterations were used up") && said.len() == 2,
+            "{said:?}"
+        );
+    }
+
+    #[test]
     fn quantiles_of_chi_squared_are_those_of_tables() {
         for (count, limit) in [(2, 5.99), (5, 11.07), (10, 18.31), (20, 31.41)] {
             let found = chi_squared_95(count);

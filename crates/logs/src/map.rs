@@ -251,7 +251,7 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
     let names = match (raw.name, raw.names) {
         (Some(name), None) => vec![name],
         (None, Some(names)) if !names.is_empty() => names,
-        _ => return Err(format!("{} or {} must say the channel", key("name"), key("names"))),
+        _ => return Err(format!("{} or {} must name the channel", key("name"), key("names"))),
     };
     if names.len() > 1 && raw.combine.is_none() {
         return Err(format!(
@@ -316,7 +316,9 @@ pub fn check_ratios(ratios: &[f64]) -> Result<(), String> {
         return Err(format!("a ratio is {wrong}, expected 0.1 to 30"));
     }
     match ratios.windows(2).find(|pair| pair[0] < 1.02 * pair[1]) {
-        Some(pair) => Err(format!("{} is followed by {}, expected falling ratios, 1st gear first", pair[0], pair[1])),
+        Some(pair) => {
+            Err(format!("{} is followed by {}, expected falling ratios, lowest gear first", pair[0], pair[1]))
+        }
         None => Ok(()),
     }
 }
@@ -346,7 +348,7 @@ impl Resolved {
             None if units.windows(2).all(|pair| pair[0] == pair[1]) => units[0].to_owned(),
             None => {
                 return Err(LogError::map(format!(
-                    "the channels of {} have the units {}\nhint: say one in `channel.{}.unit`",
+                    "the channels of {} have the units {}\nhint: set one in `channel.{}.unit`",
                     entry.key(),
                     units.join(" and "),
                     entry.key()
@@ -392,14 +394,14 @@ fn conversion(entry: &Mapped, text: &str, channel: &Channel, gearbox: &Gearbox) 
     let channel = error::shown(&channel.name);
     if text.trim().is_empty() && wanted != Quantity::Fraction {
         return Err(format!(
-            "channel `{channel}` ({name}) has no unit in the log\nhint: say it, as in `--channel {name}=\"{channel} [{}]\"` or `channel.{name}.unit`",
+            "channel `{channel}` ({name}) has no unit in the log\nhint: give it, as in `--channel {name}=\"{channel} [{}]\"` or `channel.{name}.unit`",
             role.unit()
         ));
     }
     let unit = if text.trim().is_empty() { Unit::parse("1") } else { Unit::parse(text) };
     let Some(unit) = unit else {
         return Err(format!(
-            "channel `{channel}` ({name}) has the unit `{}`, which is not known\nhint: the units are {}; say one in `channel.{name}.unit`, with `channel.{name}.scale` where none fits",
+            "channel `{channel}` ({name}) has the unit `{}`, which is not known\nhint: the units are {}; set one in `channel.{name}.unit`, with `channel.{name}.scale` where none fits",
             error::shown(text),
             Unit::known()
         ));
@@ -420,7 +422,7 @@ fn conversion(entry: &Mapped, text: &str, channel: &Channel, gearbox: &Gearbox) 
         },
         _ => {
             return Err(format!(
-                "channel `{channel}` ({name}) is in {}, expected a unit like {}\nhint: say it in `channel.{name}.unit` if the log is wrong",
+                "channel `{channel}` ({name}) is in {}, expected a unit like {}\nhint: set `channel.{name}.unit` if the log is wrong",
                 unit.name,
                 role.unit()
             ));
@@ -453,7 +455,7 @@ mod tests {
         assert!(check_ratios(&[4.7, 3.1, 1.0]).is_ok() && check_ratios(&[]).is_ok());
         assert_eq!(
             check_ratios(&[3.1, 4.7]).unwrap_err(),
-            "3.1 is followed by 4.7, expected falling ratios, 1st gear first"
+            "3.1 is followed by 4.7, expected falling ratios, lowest gear first"
         );
         assert!(check_ratios(&[f64::NAN]).is_err() && check_ratios(&[4.0, -1.0]).is_err());
     }

@@ -232,7 +232,7 @@ pub(crate) fn time_unit(
         _ => Err(LogError::file(
             path,
             format!(
-                "the time `{}` has the unit `{}`\nhint: it can be s, ms, us, ns, min or h; say it in the channel map under [time]",
+                "the time `{}` has the unit `{}`\nhint: it can be s, ms, us, ns, min or h; set it in the channel map under [time]",
                 error::shown(name),
                 error::shown(&text)
             ),

@@ -13,5 +13,6 @@ mod hostile;
 mod mdf;
 mod mdf_conversions;
 mod parquet_times;
+mod provoked;
 mod readings;
 mod shifts;

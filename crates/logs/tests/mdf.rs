@@ -193,7 +193,7 @@ fn a_damaged_block_is_told_by_its_place_and_what_is_before_it_is_read() {
     let (found, notes) = samples(&folder.write("huge.mf4", &huge));
     assert!(!found.is_empty() && found.len() < whole);
     assert!(
-        notes[0].contains(&format!("block at byte {place}: it says that it unpacks to 209715200 bytes")),
+        notes[0].contains(&format!("block at byte {place}: its stated unpacked size is 209715200 bytes")),
         "{notes:?}"
     );
 }

@@ -212,7 +212,7 @@ fn parts_count_where_all_of_them_came() {
 #[test]
 fn what_does_not_fit_says_what_to_do() {
     let cases = [
-        ("time_s,n\n0,1\n1,2\n", "engine_speed=n", "channel `n` (engine_speed) has no unit in the log\nhint: say it"),
+        ("time_s,n\n0,1\n1,2\n", "engine_speed=n", "channel `n` (engine_speed) has no unit in the log\nhint: give it"),
         (
             "time_s,n [furlong]\n0,1\n1,2\n",
             "engine_speed=n",
@@ -287,7 +287,7 @@ fn a_wrong_map_is_refused_with_its_key() {
     let folder = Folder::new("maps");
     for (text, message) in [
         ("[channel.speed]\nname = \"a\"\n", "there is no role `speed`\nhint: the roles are"),
-        ("[channel.gear]\n", "`channel.gear.name` or `channel.gear.names` must say the channel"),
+        ("[channel.gear]\n", "`channel.gear.name` or `channel.gear.names` must name the channel"),
         ("[channel.gear]\nnames = [\"a\", \"b\"]\n", "`channel.gear.combine` is missing"),
         ("[channel.gear]\nname = \"a\"\nscale = 0\n", "`channel.gear.scale` is 0"),
         ("[channel.gear]\nname = \"a\"\nlate_s = -11\n", "`channel.gear.late_s` is -11, expected -10 to 10"),

@@ -78,7 +78,7 @@ fn check_size(bytes: u64, largest_bytes: u64) -> io::Result<()> {
         return Ok(());
     }
     let message = format!(
-        "the file is larger than {} MiB, the most that is read of a file of this kind\nhint: check the order of the files",
+        "the file is larger than {} MiB, the maximum for a file of this kind\nhint: check the order of the files",
         largest_bytes >> 20
     );
     Err(io::Error::new(ErrorKind::FileTooLarge, message))
@@ -104,7 +104,11 @@ mod tests {
         File::create(&path).unwrap().set_len(1 << 40).unwrap();
         assert_eq!(read_text(&path).unwrap_err().kind(), ErrorKind::FileTooLarge);
         fs::write(&path, [b'a', 0xff]).unwrap();
-        assert_eq!(read_text(&path).unwrap_err().kind(), ErrorKind::InvalidData);
+        let error = read_text(&path).unwrap_err();
+        assert_eq!(
+            (error.kind(), &*error.to_string()),
+            (ErrorKind::InvalidData, "the file is not text in UTF-8 or UTF-16")
+        );
         assert_eq!(read_small(&path, 2).unwrap(), [b'a', 0xff]);
         assert_eq!(read_text(&folder.0.join("none")).unwrap_err().kind(), ErrorKind::NotFound);
     }

@@ -39,7 +39,10 @@ fn a_car_of_a_few_numbers_is_driven_estimated_and_scored() {
         // The valves are those of the file: both errors are those of the readings.
         assert!(score.torque_n_m.iter().all(|error| error.is_finite()), "{score:?}");
     }
-    assert!(score(&found.rows, &truth).is_err());
+    let error = score(&found.rows, &truth).unwrap_err().to_string();
+    assert!(error.starts_with("the truth has no column `offgoing_pressure_pa` of numbers\nhint: "), "{error}");
+    let error = VehicleFile::template("9hp", &TemplateNumbers::of_mass(1900.0)).map(|_| ()).unwrap_err().to_string();
+    assert!(error.starts_with("gearbox: there is no `9hp`\nhint: the gearboxes are "), "{error}");
 }
 
 #[test]

@@ -60,7 +60,7 @@ impl Wrong {
                     names.next().map_or(Self::Other, |key| Self::Unknown { key, known: names.collect() })
                 }
                 message if message.starts_with("this looks like a") => Self::Kind,
-                message if message.ends_with(" must say the channel") => {
+                message if message.ends_with(" must name the channel") => {
                     let table = quoted(message).and_then(|key| Some(key.rsplit_once('.')?.0.to_owned()));
                     Self::Missing { table, key: "name".to_owned() }
                 }

@@ -486,7 +486,7 @@ impl CommonClutch<'_> {
             return Ok(());
         }
         let message = format!(
-            "is {} Pa, and the return spring of {name} holds up to {:.4e} Pa",
+            "is {} Pa, and the return spring of {name} holds up to {:.0} Pa",
             self.line_pressure_pa,
             clutch.kiss_pressure()
         );

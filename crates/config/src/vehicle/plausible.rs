@@ -304,7 +304,7 @@ mod tests {
             (
                 "rad = 13000",
                 "rad = 227",
-                "twist of the drive shafts at the largest torque in the lowest gear, rad: 12.6",
+                "twist of the drive shafts at the largest torque in the lowest gear, rad: 12.6; usual are 0.015 to 1.5",
             ),
             ("wheel_inertia_kg_m2 = 2.4", "wheel_inertia_kg_m2 = 240", "`driveline.wheel_inertia_kg_m2`"),
             ("rolling_moment_n_m = 100", "rolling_moment_n_m = 10000", "`vehicle.rolling_moment_n_m`"),

@@ -295,6 +295,11 @@ mod tests {
             measured.read(0.01 * f64::from(row), 0.001 * f64::from((row / 10).pow(2) % 7 % 3));
         }
         assert_eq!(measured.held_s(), Some(0.1));
+        let [warning] = <[String; 1]>::try_from(warnings_of(&[("C", &measured)])).unwrap();
+        assert!(
+            warning.starts_with("warning: commands that change more rarely than the rows come: C (every 0.10 s)"),
+            "{warning}"
+        );
         // Three steps, as of a valve that is switched.
         let mut steps = CommandTimes::default();
         for row in 0..800 {
@@ -309,6 +314,9 @@ mod tests {
             let mut times = CommandTimes::default();
             let reading = |row| Reading { value: f64::from(row / every % 7), age_s: 0.0 };
             (0..rows).for_each(|row| times.push(0.01 * f64::from(row), (row % every == 0).then(|| reading(row))));
+            let said = warnings_of(&[("C", &times)]).join("\n");
+            let is_said = said.contains("warning: commands that are recorded more rarely than every 0.05 s: C (every ");
+            assert_eq!(is_said, times.too_rarely_read_s().is_some(), "{said}");
             times.too_rarely_read_s()
         };
         assert_eq!([1, 5].map(|every| read(every, 10_000)), [None; 2]);

@@ -86,7 +86,7 @@ impl<'c> LockUpCheck<'c> {
         };
         (!self.is_named && closed_s >= ENOUGH_S).then(|| {
             format!(
-                "warning: the lock-up clutch seems to be closed or to slip for {closed_s:.0} s, {why}, and the log does not say so: the estimates of those times \
+                "warning: the lock-up clutch seems to be closed or to slip for {closed_s:.0} s, {why}, and the log does not record it: the estimates of those times \
                  take the torque of an open converter\nhint: give `lock_up_applied` (1 while the clutch carries, also while it slips) with \
                  `reported_engine_torque`, which is the torque at the gearbox input then"
             )

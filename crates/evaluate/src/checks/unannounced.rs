@@ -36,7 +36,7 @@ impl Check for UnannouncedShifts {
     fn warnings(&self) -> Vec<String> {
         let warning = (self.count > 0).then(|| {
             format!(
-                "warning: gear changes without a target_gear that says so before (so often: {}): these shifts are not estimated. target_gear has to \
+                "warning: gear changes without a change of target_gear before (so often: {}): these shifts are not estimated. target_gear has to \
                  change when a shift is requested, gear when it is done",
                 self.count
             )

@@ -284,8 +284,8 @@ impl GearboxFit {
         }
         if self.torque_misfit > MISFIT {
             lines.push(format!(
-                "warning: the shifts ask for torques that the model does not have: their errors are {:.1} times what drag and the converter's \
-                 maps explain. The vehicle file is not of this car, its maps have another shape, or a signal is not what the channel map says; \
+                "warning: the shifts need torques that the model cannot give: their errors are {:.1} times what drag and the converter's \
+                 maps explain. The vehicle file is not of this car, its maps have another shape, or a signal is not that of the channel map; \
                  the intervals are too small",
                 self.torque_misfit
             ));

@@ -55,7 +55,7 @@ impl Object {
         }
         let (header, size, kind) = (u16_at(bytes, 4), u32_at(bytes, 8), u32_at(bytes, 12));
         if size < BASE as u32 || size > LARGEST_OBJECT || usize::from(header) < BASE {
-            return Err(format!("an object says that it has {size} bytes, {header} of them in its head"));
+            return Err(format!("an object has a stated size of {size} bytes, and {header} of them as its head"));
         }
         Ok(Self { kind, header: usize::from(header), size: size as usize })
     }

@@ -62,7 +62,7 @@ impl Packed {
     fn memory(self) -> Result<u64, String> {
         let maximum = LARGEST_BLOCK.min(self.packed_bytes.saturating_mul(MAX_FROM_A_BYTE));
         if self.bytes > maximum {
-            return Err(format!("it says that it unpacks to {} bytes, expected at most {maximum}", self.bytes));
+            return Err(format!("its stated unpacked size is {} bytes, expected at most {maximum}", self.bytes));
         }
         Ok(self.bytes + self.packed_bytes.min(LARGEST_BLOCK))
     }
@@ -126,10 +126,10 @@ impl Blocks {
         }
         match Decompressor::new().zlib_decompress(&memory.packed, &mut memory.unpacked[..size]) {
             Ok(unpacked) if unpacked == size => Ok(size),
-            Ok(unpacked) => Err(format!("it unpacks to {unpacked} bytes, and says {size}")),
+            Ok(unpacked) => Err(format!("it unpacks to {unpacked} bytes, and its stated size is {size}")),
             Err(DecompressionError::BadData) => Err("what is packed in it is damaged".to_owned()),
             Err(DecompressionError::InsufficientSpace) => {
-                Err(format!("it unpacks to more than the {size} bytes that it says"))
+                Err(format!("it unpacks to more than its stated size, {size} bytes"))
             }
         }
     }

@@ -32,7 +32,7 @@ impl CheckedPages {
             return if *num_values as usize <= length / size {
                 Ok(())
             } else {
-                Err("a dictionary is shorter than it says")
+                Err("a dictionary is shorter than its stated size")
             };
         }
         if matches!(page.encoding(), Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) && !self.dictionary {

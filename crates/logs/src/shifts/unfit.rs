@@ -88,4 +88,15 @@ mod tests {
         let (middle, count) = unfit.middle();
         assert!((middle / 0.262 - 1.0).abs() < 0.01 && count == 5, "{middle}");
     }
+
+    #[test]
+    fn ratios_in_a_gear_for_moments_are_named() {
+        let mut unfit = Unfit::default();
+        (0..9).for_each(|_| unfit.push(3.0, true));
+        let reason = unfit.reason(&[3.0, 1.0], "turbine").unwrap();
+        assert!(
+            reason.contains("their ratio is in a gear 9 times, and never for 0.1 s without a hole\nhint: "),
+            "{reason}"
+        );
+    }
 }

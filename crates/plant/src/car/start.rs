@@ -48,7 +48,7 @@ impl CarModel {
         let turbine = of_gear.ratio * output;
         if turbine.abs() > SPEEDS_RAD_S.1 {
             return wrong(format!(
-                "in gear {} at {vehicle_m_s} m/s the gearbox input would turn at {turbine:.0} rad/s; the most is {} rad/s",
+                "in gear {} at {vehicle_m_s} m/s the gearbox input would turn at {turbine:.0} rad/s, expected at most {} rad/s",
                 of_gear.name, SPEEDS_RAD_S.1
             ));
         }

@@ -235,7 +235,7 @@ fn wrong_requests_get_clear_errors() {
         samples(&car, &drive(&text)).unwrap_err().to_string()
     };
     assert!(error("start = { gear = \"9\" }").contains("no gear \"9\"\nhint: its gears are R, 1, 2"));
-    assert!(error("start = { gear = \"1\", vehicle_m_s = 90.0 }").contains("the most is 700 rad/s"));
+    assert!(error("start = { gear = \"1\", vehicle_m_s = 90.0 }").contains("expected at most 700 rad/s"));
     let into_reverse = error("start = { vehicle_m_s = 5.0 }\nshift = [{ time_s = 1.0, gear = \"R\" }]");
     assert!(into_reverse.contains("gear R can be engaged only at rest"), "{into_reverse}");
 

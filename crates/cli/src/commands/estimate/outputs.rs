@@ -43,7 +43,7 @@ pub(super) fn check_name(options: &args::Estimate) -> Result<(), Failure> {
     }
     match options.format {
         Some(format) if TableFormat::from(format) != by_name => Err(Failure::Input(format!(
-            "{}: the name is not that of a file in --format {}\nhint: the ending says the format; leave --format out, or end the name in .{1}",
+            "{}: the name is not that of a file in --format {}\nhint: the ending sets the format; leave --format out, or end the name in .{1}",
             output.shown(),
             format.ending()
         ))),
