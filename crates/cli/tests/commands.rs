@@ -347,7 +347,7 @@ fn without_settings(line: &str) -> String {
     let is_fraction = |cell: &str| {
         cell.trim().strip_suffix(" %").is_some_and(|fraction| fraction.bytes().all(|byte| byte.is_ascii_digit()))
     };
-    if line.contains(" settings drawn: ") {
+    if line.contains(" settings sampled: ") {
         return String::new();
     }
     line.split('|').filter(|cell| !is_fraction(cell)).collect::<Vec<_>>().join("|")

@@ -102,7 +102,7 @@ pub fn agreeing(chapter: &Chapter) -> Vec<String> {
 fn settings_text(settings: &Settings) -> String {
     let Settings { drawn, whole, no_shift, no_gains, refused } = settings;
     format!(
-        "{drawn} settings drawn: {whole} with a whole shift in each experiment, {no_shift} without, {no_gains} without certified \
+        "{drawn} settings sampled: {whole} with a whole shift in each experiment, {no_shift} without, {no_gains} without certified \
          gains, {refused} refused"
     )
 }
