@@ -108,15 +108,53 @@ fn printable_cells(row: Vec<String>) -> Vec<String> {
 }
 
 /// The lines of a table, as [`table`] has them, with its titles. A title that is wider than the cells of its
-/// column takes several lines.
+/// column takes several lines; what is wider than the terminal follows below, with the first columns once more.
 pub(crate) fn titled_lines(left: usize, titles: &[String], rows: &[Vec<String>]) -> Vec<String> {
+    let terminal = console::Term::stdout();
+    let width = terminal.size_checked().filter(|_| terminal.is_term()).map(|(_, columns)| usize::from(columns));
+    fitted_lines(left, titles, rows, width.unwrap_or(usize::MAX))
+}
+
+/// The same in lines of this width, as far as the first columns and one more are no wider.
+fn fitted_lines(left: usize, titles: &[String], rows: &[Vec<String>], width: usize) -> Vec<String> {
+    /// Columns that say which row it is.
+    const KEYS: usize = 2;
     let (mut titles, mut rows) = (titles.to_vec(), rows.to_vec());
     shown_units::convert_table(&mut titles, &mut rows);
     let rows: Vec<Vec<String>> = rows.into_iter().map(printable_cells).collect();
+    let widths = widths_of(&titles, &rows);
+    let keys: Vec<usize> = (0..left.min(KEYS)).collect();
+    let length =
+        |columns: &[usize]| columns.iter().map(|&column| widths[column] + GAP.len()).sum::<usize>() - GAP.len();
+    let (mut blocks, mut block) = (Vec::new(), Vec::new());
+    for column in 0..titles.len() {
+        block.push(column);
+        if length(&block) > width && block.len() > keys.len() + 1 {
+            block.pop();
+            blocks.push(std::mem::replace(&mut block, [&keys[..], &[column]].concat()));
+        }
+    }
+    blocks.push(block);
+    let of_block = |columns: &Vec<usize>| {
+        let own =
+            |cells: &[String]| -> Vec<String> { columns.iter().filter_map(|&at| cells.get(at).cloned()).collect() };
+        let rows: Vec<Vec<String>> = rows.iter().map(|row| own(row)).collect();
+        block_lines(columns.iter().filter(|&&column| column < left).count(), &own(&titles), &rows)
+    };
+    blocks.iter().map(of_block).collect::<Vec<_>>().join(&String::new())
+}
+
+/// The widths of the columns: those of their cells, and of the longest words of their titles.
+fn widths_of(titles: &[String], rows: &[Vec<String>]) -> Vec<usize> {
     let length = |text: &str| text.chars().count();
     let widest = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| length(cell)).max().unwrap_or(0);
     let word = |title: &str| words(title).map(|word| length(&word)).max().unwrap_or(0);
-    let widths: Vec<usize> = titles.iter().enumerate().map(|(j, title)| widest(j).max(word(title))).collect();
+    titles.iter().enumerate().map(|(j, title)| widest(j).max(word(title))).collect()
+}
+
+/// The lines of columns that stand side by side.
+fn block_lines(left: usize, titles: &[String], rows: &[Vec<String>]) -> Vec<String> {
+    let widths = widths_of(titles, rows);
     let titles: Vec<Vec<String>> = titles.iter().zip(&widths).map(|(title, &width)| wrapped(title, width)).collect();
     let height = titles.iter().map(Vec::len).max().unwrap_or(0);
     // The last lines of all titles stand on one line.
@@ -126,7 +164,7 @@ pub(crate) fn titled_lines(left: usize, titles: &[String], rows: &[Vec<String>])
         titles.iter().map(of).collect::<Vec<_>>()
     };
     let titles: Vec<Vec<String>> = (0..height).map(title_line).collect();
-    titles.iter().chain(&rows).map(|row| line_of(left, row, &widths)).collect()
+    titles.iter().chain(rows).map(|row| line_of(left, row, &widths)).collect()
 }
 
 /// A text in lines of at most this width, as far as its words are no wider. The two words of a unit stay together.
@@ -148,13 +186,16 @@ fn words(title: &str) -> impl Iterator<Item = String> {
     joined.split(' ').map(|word| word.replace(JOINED, " ")).collect::<Vec<_>>().into_iter()
 }
 
+/// What stands between two columns.
+const GAP: &str = "  ";
+
 /// A line of a table with columns of these widths.
 fn line_of(left: usize, row: &[String], widths: &[usize]) -> String {
     let cells = row.iter().zip(widths).enumerate().map(|(j, (cell, &width))| match j < left {
         true => format!("{cell:<width$}"),
         false => format!("{cell:>width$}"),
     });
-    cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    cells.collect::<Vec<_>>().join(GAP).trim_end().to_owned()
 }
 
 /// A line on standard output. A reader that has closed it, such as `head`, misses the rest: that is no error, and the files of the
@@ -225,6 +266,27 @@ mod tests {
         );
         assert_eq!(titled_lines(1, &titles, &[]).len(), 4);
         assert!(titled_lines(1, &[], &[]).is_empty());
+    }
+
+    #[test]
+    fn a_table_that_is_wider_than_the_terminal_goes_on_below_with_its_first_columns() {
+        let cells = |cells: &[&str]| cells.iter().map(|&cell| cell.to_owned()).collect::<Vec<_>>();
+        let titles = cells(&["#", "shift", "kind", "begin s", "time s", "health"]);
+        let rows = [cells(&["1", "1-2", "power-on", "8.68", "0.80", "good"])];
+        let lines = |width: usize| fitted_lines(3, &titles, &rows, width);
+        assert_eq!(lines(usize::MAX), titled_lines(3, &titles, &rows));
+        let expected = [
+            "                    begin",
+            "#  shift  kind          s",
+            "1  1-2    power-on   8.68",
+            "",
+            "          time",
+            "#  shift     s  health",
+            "1  1-2    0.80    good",
+        ];
+        assert_eq!(lines(25), expected);
+        // A column that is too wide alone stands in a block of its own.
+        assert!(lines(3).iter().filter(|line| line.starts_with("#  shift")).count() == 4);
     }
 
     #[test]
