@@ -1,4 +1,5 @@
-"""Takes what no browser shows out of a built site: slim.py FOLDER. Line breaks with the blanks after them outside of code, and blanks in schemas."""
+"""Takes what no browser shows out of a built site: slim.py FOLDER. Line breaks with the blanks after them outside of code, anchors of lines of code, and blanks in
+schemas."""
 
 import json
 import re
@@ -9,8 +10,11 @@ from pathlib import Path
 KEPT = re.compile(r"(<pre.*?</pre>|<script.*?</script>|<textarea.*?</textarea>)", re.DOTALL)
 
 
+LINE_ANCHOR = re.compile(r'<a id="__codelineno[^>]*></a>')
+
+
 def slim(page: str) -> str:
-    parts = KEPT.split(page)
+    parts = KEPT.split(LINE_ANCHOR.sub("", page))
     return "".join(part if KEPT.fullmatch(part) else re.sub(r"\s*\n\s*", "\n", part) for part in parts)
 
 
