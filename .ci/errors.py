@@ -47,12 +47,6 @@ NOT_PROVOKED = {
         "the fit left the range in which the model",
     ],
     "what no input has brought about so far, and no rule excludes": [
-        "the car cannot be simulated: …",
-        "of the self-test cannot be simulated",
-        "but that of another model",
-        "it is for …",
-        "no shift can be used",
-        "The values above are those with commands at the right times",
         "does not follow from neutral by one clutch",
         "has no clutch that could slip",
         "the train has more than … degrees of freedom",

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::support::{BENCH, EXPERIMENT, Folder, ROOT, VEHICLE, refused, said, stderr, wetclutch};
+use crate::support::{BENCH, EXPERIMENT, Folder, ROOT, VEHICLE, refused, said, shown, stderr, wetclutch};
 
 /// Runs a command that is wrong; its message has these words and a hint.
 fn provokes(arguments: &[&str], words: &str) {
@@ -135,6 +135,28 @@ fn drives_that_no_car_can_make_are_named_and_leave_nothing() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn shared_libraries_of_other_models_and_processors_are_named() {
+    let folder = Folder::new("libraries");
+    let export = |library: &str| {
+        ["export", &car(), "--shift", "1-2", "--fmu", library, "-o", &folder.path("out")].map(str::to_owned)
+    };
+    let library = |name: &str, functions: &[&str]| {
+        let source: String = functions.iter().map(|function| format!("void {function}(void) {{}}\n")).collect();
+        let (source, library) = (folder.write(&format!("{name}.c"), source), folder.path(&format!("{name}.so")));
+        assert!(Command::new("cc").args(["-shared", "-fPIC", "-o", &library, &source]).status().unwrap().success());
+        library
+    };
+    let refused = |library: &str, words: &str| provokes(&export(library).each_ref().map(String::as_str), words);
+    refused(&library("other", &["fmi2DoStep", "fmi3DoStep"]), "it is not wetclutch_fmu, but that of another model");
+    // The same for a processor of another kind: in the head of the file stands its number.
+    let own = library("own", &["fmi2DoStep", "fmi3DoStep", "wetclutch_fmu"]);
+    let mut bytes = std::fs::read(own).unwrap();
+    bytes[18..20].copy_from_slice(&[0x16, 0]);
+    refused(&folder.write("foreign.so", bytes), "not a shared library of a model: it is for S390x");
+}
+
 #[test]
 fn studies_that_do_not_fit_their_folder_are_named() {
     let folder = Folder::new("study-folders");
@@ -250,6 +272,44 @@ fn studies_without_a_complete_shift_are_named() {
         let output = wetclutch(arguments);
         assert!(output.status.code() == Some(1) && stderr(&output).contains(words), "{words}: {}", stderr(&output));
     }
+}
+
+#[test]
+fn a_car_without_a_stick_diagram_is_not_simulated() {
+    let folder = Folder::new("no-diagram");
+    let shares = std::fs::read_to_string(format!("{ROOT}crates/config/tests/gearboxes/shares.toml")).unwrap();
+    let pack = "pack = { friction_faces = 4, mean_radius_m = 0.14, piston_area_m2 = 0.012, return_spring_n = 600, friction_coefficient = 0.13 }";
+    folder.write("shares.toml", shares.replace("kind = \"clutch\"", &format!("kind = \"clutch\"\n{pack}")));
+    let car = folder.write("car.toml", "name = \"s\"\ngearbox = \"shares.toml\"\n");
+    let words = "the car cannot be simulated: the gearbox has no stick diagram";
+    provokes(&["sensitivity", &car], words);
+    let output = wetclutch(&["export", &car, "-o", &folder.path("out")]);
+    let text = format!("the shift 1-2 of the self-test cannot be simulated: {words}");
+    assert!(output.status.code() == Some(1) && stderr(&output).contains(&text), "{}", stderr(&output));
+}
+
+#[test]
+fn commands_that_come_late_keep_the_given_file() {
+    let folder = Folder::new("late");
+    let city = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
+    let city = city.replace("../vehicles", &format!("{ROOT}vehicles")).replace("repetitions = 20", "repetitions = 3");
+    said(&wetclutch(&["simulate", &folder.write("drive.toml", city), "-o", &folder.path("drive")]));
+    let text = folder.read("drive/city_measured.csv");
+    let mut lines = text.lines();
+    let names = lines.next().unwrap();
+    let currents: Vec<bool> = names.split(',').map(|name| name.ends_with("_current_a")).collect();
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    let mut log = format!("{names}\n");
+    for (at, row) in rows.iter().enumerate() {
+        // The currents of 80 ms before.
+        let before = &rows[at.saturating_sub(8)];
+        let cells = currents.iter().enumerate().map(|(at, is_current)| if *is_current { before[at] } else { row[at] });
+        writeln!(log, "{}", cells.collect::<Vec<_>>().join(",")).unwrap();
+    }
+    let log = folder.write("late.csv", log);
+    let text = shown(&wetclutch(&["fit", &log, "--vehicle", &car(), "-o", &folder.path("fitted.toml")]));
+    assert!(text.contains("warning: the commands of these logs are 8"), "{text}");
+    assert!(text.contains("Then fit again. The values above are those with commands at the right times"), "{text}");
 }
 
 #[test]

@@ -33,6 +33,15 @@ fn a_shift_that_is_given_again_and_again_counts_once() {
 }
 
 #[test]
+fn shifts_that_cannot_be_used_are_named_with_the_reason() {
+    let mut car = TestCar::drawn(2);
+    let mut without_turbine = shifts(&mut car, 2, Logs::SpeedsAndCurrent);
+    without_turbine.iter_mut().for_each(|record| record.turbine = Series { time_s: Vec::new(), value: Vec::new() });
+    let error = fitted(&car, &without_turbine).map(|_| ()).unwrap_err().to_string();
+    assert!(error.starts_with("no shift can be used\n") && error.lines().count() == 3, "{error}");
+}
+
+#[test]
 fn a_log_that_is_given_again_tells_nothing_new_and_checks_nothing() {
     let mut car = TestCar::drawn(2);
     let one = || Driving::default();
