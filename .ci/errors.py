@@ -95,13 +95,14 @@ def is_prose(literal):
 
 
 def hints_by_variant(code, text):
-    """The hints of the variants of an error, in a function `hint`."""
-    found, begin = {}, code.find("fn hint(&self)")
-    for place, literal in literals(text) if begin >= 0 else []:
-        arm = code[max(begin, code.rfind("None =>", begin, place), code.rfind(",\n", begin, place)) : place]
-        for variant in re.findall(r"Self::(\w+)", arm) if place > begin and "=>" in arm else []:
-            found.setdefault(variant, []).append(literal)
-    return {variant: "; or ".join(hints) for variant, hints in found.items()}
+    """The hints of the variants of an error, in a function `hint`: of each literal the variants between the one before it and it."""
+    found, before = {}, code.find("fn hint(&self)")
+    for place, literal in literals(text) if before >= 0 else []:
+        if place > before and is_prose(literal):
+            for variant in re.findall(r"Self::(\w+)", code[before:place]):
+                found.setdefault(variant, []).append(literal)
+            before = place
+    return {variant: "; or ".join(dict.fromkeys(hints)) for variant, hints in found.items()}
 
 
 def messages(path, text):
@@ -119,7 +120,7 @@ def messages(path, text):
             is_behind = not HINTS.search(statement)
         if HINTS.search(statement):
             if not is_behind:
-                waiting = literal
+                waiting = (place, literal)
             elif found and found[-1][3] == begin and not found[-1][1]:
                 found[-1][1] = literal
             continue
@@ -129,7 +130,9 @@ def messages(path, text):
         variant = re.match(r"[^\]]*\]\s*(\w+)", code[place:]) if "#[error(" in statement else None
         variant = variant and variant[1]
         if is_prose(message):
-            found.append([message, hint or of_variants.get(variant) or waiting or "", variant, begin])
+            # One that was used before is of another message.
+            is_free = waiting and not re.search(r"\bhint\b", code[waiting[0] : place])
+            found.append([message, hint or of_variants.get(variant) or (waiting[1] if is_free else ""), variant, begin])
             waiting = None
     return [(message, hint, variant) for message, hint, variant, _ in found]
 
@@ -143,7 +146,7 @@ def plain(literal):
 def cell(literal):
     """A literal as a cell of a table."""
     text = plain(literal).replace("\n", " ")
-    return text.replace("warning: ", "").replace("|", "\\|").replace("<", "&lt;").removeprefix("…: ").strip()
+    return text.strip().removeprefix("hint: ").replace("warning: ", "").replace("|", "\\|").replace("<", "&lt;").removeprefix("…: ").strip()
 
 
 def write_index(page):

@@ -155,15 +155,15 @@ impl Fit {
         };
         let limited = (!self.at_limit.is_empty()).then(|| {
             format!(
-                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not what the channel map \
-                 says; do not use the fitted file before the reason is known",
+                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not that \
+                 of the channel map; do not use the fitted file before the reason is known",
                 self.at_limit.join(", ")
             )
         });
         let finer = (!self.misfits.is_empty()).then(|| {
             let names: Vec<&str> = self.misfits.iter().map(|map| map.name()).collect();
             format!(
-                "warning: the shifts do not follow the fitted model: they ask for another shape of {} than the fit gives it (Hotelling's T2 \
+                "warning: the shifts do not follow the fitted model: they need another shape of {} than the fit gives it (Hotelling's T2 \
                  over the shifts, level {LEVEL}), or for what no map of the vehicle file has. The intervals contain how far that moves the \
                  values",
                 names.join(", ")

@@ -132,7 +132,7 @@ pub fn warnings_of(commands: &[(&str, &CommandTimes)]) -> Vec<String> {
     let rare = (!rare.is_empty()).then(|| {
         format!(
             "warning: commands that are recorded more rarely than every {APART_S} s: {rare}. What a command does between two of its readings, as the \
-             pulse that fills a clutch, is not seen, and the guaranteed ranges do not hold. Record the commands at the rate at which they are sent"
+             pulse that fills a clutch, is not known, and the guaranteed ranges do not hold. Record the commands at the rate at which they are sent"
         )
     });
     held.into_iter().chain(rare).collect()

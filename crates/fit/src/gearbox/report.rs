@@ -292,8 +292,8 @@ impl GearboxFit {
         }
         if !self.at_limit.is_empty() {
             lines.push(format!(
-                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not what the channel map \
-                 says; do not use the fitted file before the reason is known",
+                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not that \
+                 of the channel map; do not use the fitted file before the reason is known",
                 self.at_limit.join(", ")
             ));
         }
