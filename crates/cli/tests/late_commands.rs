@@ -1,7 +1,7 @@
 //! Logs of cars with a gearbox whose commands come late or early against the speeds.
 
 use crate::any_car::{column, estimate, numbers, simulated_twice};
-use crate::support::said;
+use crate::support::{Folder, ROOT, said, wetclutch};
 
 /// The log with its commands so many rows late.
 pub(crate) fn late(text: &str, rows: isize) -> String {
@@ -60,4 +60,37 @@ fn a_delay_of_the_commands_is_said_and_moved_by_the_channel_map() {
         let maximum = torques[0].iter().zip(&torques[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(maximum < 0.5, "{maximum}");
     }
+}
+
+/// Friction, valve gain and lag of the car are wrong, and within the bounds that its file states.
+#[test]
+fn slow_valves_within_wide_bounds_are_no_delay_of_the_commands() {
+    let folder = Folder::new("slow-valves");
+    let file = std::fs::read_to_string(format!("{ROOT}vehicles/eight_speed.toml")).unwrap();
+    let file = file.replacen("\"../gearboxes", &format!("\"{ROOT}gearboxes"), 1);
+    let wide = ["A", "B", "C", "D", "E"].map(|name| {
+        format!("\n[clutch.{name}.error_bounds]\nfriction_factor = [0.6, 1.5]\nvalve_gain_factor = [0.7, 1.35]\nvalve_lag_factor = [0.3, 2]\n")
+    });
+    let bounded = folder.write("bounded.toml", file.clone() + &wide.concat());
+    let slower = scaled(&file, "time_constant_s", 1.9);
+    let true_car = folder.write("true.toml", scaled(&slower, "gain_pa_a", 0.86));
+    let city = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
+    let sensors = std::fs::read_to_string(format!("{ROOT}experiments/bench.toml")).unwrap();
+    let sensors = &sensors[sensors.find("[sensors]").unwrap()..sensors.find("# The observers").unwrap()];
+    let sensors_file = folder.write("sensors.toml", sensors);
+    let drive = folder.write("city.toml", city.replacen("repetitions = 20", "repetitions = 1", 1) + sensors);
+    said(&wetclutch(&["simulate", &drive, "--vehicle", &true_car, "-o", &folder.path("sim")]));
+    let (log, out) = (folder.path("sim/city_measured.csv"), folder.path("out.csv"));
+    let said = said(&wetclutch(&["estimate", &log, "--vehicle", &bounded, "--sensors", &sensors_file, "-o", &out]));
+    assert!(!said.contains("the commands of the valves come"), "{said}");
+}
+
+/// A vehicle file with the values of a list times a factor.
+fn scaled(file: &str, key: &str, factor: f64) -> String {
+    let begin = file.find(key).unwrap();
+    let begin = begin + file[begin..].find('[').unwrap() + 1;
+    let end = begin + file[begin..].find(']').unwrap();
+    let values = file[begin..end].split(',').map(|value| factor * value.trim().parse::<f64>().unwrap());
+    let values: Vec<String> = values.map(|value| value.to_string()).collect();
+    format!("{}{}{}", &file[..begin], values.join(", "), &file[end..])
 }

@@ -47,6 +47,10 @@ const REPORTED_S: f64 = 0.065;
 const DEFAULT_DELAY_S: f64 = 0.015;
 const DEFAULT_LAG: f64 = 0.5;
 const LAG_S: f64 = 0.04;
+/// Relative errors of friction and valve gain together in the default bounds, and the time in which a clutch takes its load, s \[chosen\]: a clutch that
+/// is stronger by a fraction takes it earlier by about that fraction of this time.
+const DEFAULT_STRENGTH: f64 = 0.25;
+const LOAD_S: f64 = 0.3;
 /// Fraction of the difference that the delay leaves at most \[chosen\].
 const LEFT: f64 = 0.9;
 
@@ -126,10 +130,12 @@ impl<'c> CommandDelay<'c> {
         });
         let more_delay_s = (budget.widest(ElementErrors::valve_delay) - DEFAULT_DELAY_S).max(0.0);
         let more_lag_s = LAG_S * (budget.widest(ElementErrors::valve_lag) - DEFAULT_LAG).max(0.0);
+        let strength = gain + budget.widest(ElementErrors::friction);
+        let more_strength_s = LOAD_S * (strength - DEFAULT_STRENGTH).max(0.0);
         Self {
             tables,
             pressures,
-            reported_s: REPORTED_S + more_delay_s + more_lag_s,
+            reported_s: REPORTED_S + more_delay_s + more_lag_s + more_strength_s,
             rows: VecDeque::new(),
             waiting: VecDeque::new(),
             age_s: 0.0,
