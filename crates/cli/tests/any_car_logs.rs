@@ -192,6 +192,10 @@ fn a_channel_map_and_a_choice_of_shifts_work_for_any_gearbox() {
     assert!(duty.contains("hint: it is element_a_current, in A"), "{duty}");
     let names = refused(&estimate(&folder, "foreign.mf4", "no.csv", &[]));
     assert!(names.contains("this log needs a channel map"), "{names}");
+    let no_goal = |name: &str| (if name == "target_gear" { "goal" } else { name }.to_owned(), 1.0);
+    convert(&folder.path("sim/city_measured.csv"), &folder.path("goal.mf4"), no_goal);
+    let target = refused(&estimate(&folder, "goal.mf4", "no.csv", &[]));
+    assert!(target.contains("none with numbers is `target_gear`"), "{target}");
     // Rows of the chosen shifts alone.
     let all = folder.read("csv_shifts.csv");
     let ups = all.lines().filter(|line| line.contains(",1,2,")).count();

@@ -121,7 +121,7 @@ fn the_pressure_that_is_asked_of_the_clutch_stands_for_the_command_of_its_valve(
 #[test]
 fn what_an_estimate_lacks_is_said_before_anything_is_written() {
     let folder = Folder::new("lacks");
-    let mdf = format!("{DATA}/plain_410.mf4");
+    let [mdf, bus] = ["plain_410.mf4", "bus.mf4"].map(|name| format!("{DATA}/{name}"));
     let out = folder.path("out.csv");
     let table =
         folder.write("log.csv", "time_s,e,t,o,i\n0,800,790,300,0.1\n0.01,900,890,310,0.1\n0.02,900,890,310,0.1\n");
@@ -132,6 +132,7 @@ fn what_an_estimate_lacks_is_said_before_anything_is_written() {
     };
     let cases = [
         (&mdf, vec![], "this log needs a channel map\nhint: `wetclutch inspect`"),
+        (&bus, vec![], "there are frames of a CAN bus, whose signals are not read\nhint: a DBC defines the signals"),
         (
             &mdf,
             vec!["--channel".to_owned(), "engine_speed=N_Eng".to_owned()],

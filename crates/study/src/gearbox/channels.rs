@@ -371,7 +371,11 @@ pub fn own_map(log: &Log, car: &Car) -> Result<ChannelMap, Vec<&'static str>> {
         };
         map.channels.extend(command.or_else(pressure));
     }
-    let needed = [(Role::TurbineSpeed, signal::TURBINE_SPEED), (Role::Gear, signal::GEAR)];
+    let needed = [
+        (Role::TurbineSpeed, signal::TURBINE_SPEED),
+        (Role::Gear, signal::GEAR),
+        (Role::TargetGear, signal::TARGET_GEAR),
+    ];
     let missing: Vec<&str> = needed.into_iter().filter(|(role, _)| !map.has(*role)).map(|(_, name)| name).collect();
     if missing.is_empty() { Ok(map) } else { Err(missing) }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use logs::plausibility::{likely_time_unit, too_fast_a_time};
-use logs::{ChannelMap, Quality, Readings, Role};
+use logs::{ChannelMap, Log, Quality, Readings, Role};
 use trace::{ShownPath as _, TraceError, signal};
 
 use crate::{Error, Notes, grouped};
@@ -25,6 +25,18 @@ pub(crate) fn other_delimiter(path: &Path, error: TraceError) -> Error {
         path.shown(),
         delimiter.escape_debug()
     ))
+}
+
+/// Refuses a log of frames of a CAN bus that no DBC is given for.
+pub(crate) fn check_dbc(path: &Path, log: &Log) -> Result<(), Error> {
+    if log.lacks_dbc() {
+        return Err(Error::Input(format!(
+            "{}: there are frames of a CAN bus, whose signals are not read\n\
+             hint: a DBC defines the signals in them: give it with --dbc, and a channel map with --map",
+            path.shown()
+        )));
+    }
+    Ok(())
 }
 
 /// Refuses a log with so much time between its rows that it has no shifts: the time is in another unit by all appearances.

@@ -11,11 +11,11 @@ use observer::gearbox::MAX_ELEMENTS;
 use study::gearbox::car_log::{CarLog, LogStep};
 use study::gearbox::channels::{CarChannels, own_map};
 use study::log::FIRST_LOOK;
-use trace::ShownPath as _;
+use trace::{ShownPath as _, signal};
 
 use super::checks::Columns;
 use crate::estimate::input::LogInput;
-use crate::estimate::log_checks::{report_readings, sent_on_change, warn_of_dbc};
+use crate::estimate::log_checks::{check_dbc, report_readings, sent_on_change, warn_of_dbc};
 use crate::{Error, Notes};
 
 /// How a log of a car is read.
@@ -76,26 +76,22 @@ impl<'a> CarSource<'a> {
         let log = log.open(stop, threads)?;
         let own;
         let map = if map.channels.is_empty() {
-            own = own_map(&log, car).map_err(|missing| {
-                if log.lacks_dbc() {
-                    return Error::Input(format!(
-                        "{}: there are frames of a CAN bus, whose signals are not read\n\
-                         hint: a DBC defines the signals in them: give it with --dbc, and a channel map with --map",
-                        path.shown()
-                    ));
-                }
-                let gear = if missing.contains(&"gear") && log.channels().iter().any(|channel| channel.name == "gear") {
+            own = own_map(&log, car).or_else(|missing| {
+                check_dbc(path, &log)?;
+                let is_gear = |name: &&str| [signal::GEAR, signal::TARGET_GEAR].contains(name);
+                let has = |name: &str| log.channels().iter().any(|channel| channel.name == name);
+                let gear = if missing.iter().any(|name| is_gear(name) && has(name)) {
                     "; text that is no number is not read from this format: write `gear` and `target_gear` as numbers, 0 for none and -1 for reverse"
                 } else {
                     ""
                 };
-                Error::Input(format!(
+                Err(Error::Input(format!(
                     "{}: this log needs a channel map, because its channels have other names than those of `wetclutch simulate`: none with \
                      numbers is `{}`\n\
                      hint: `wetclutch inspect` names the channels that hold none; with --suggest it writes a first map, for --map{gear}",
                     path.shown(),
                     missing.join("` or `")
-                ))
+                )))
             })?;
             &own
         } else {

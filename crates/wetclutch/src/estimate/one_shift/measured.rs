@@ -15,7 +15,7 @@ use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use trace::{CsvRows, ShownPath as _, signal};
 
 use crate::estimate::input::LogInput;
-use crate::estimate::log_checks::{check_step, report_readings, sent_on_change};
+use crate::estimate::log_checks::{check_dbc, check_step, report_readings, sent_on_change};
 use crate::estimate::watched::{WatchedColumn, WatchedColumns};
 use crate::{Error, Notes, grouped};
 
@@ -173,6 +173,7 @@ impl<'a> Measured<'a> {
     pub(crate) fn rows(input: LogInput<'_>, vehicle: &Vehicle, stop: Option<&Arc<AtomicBool>>) -> Result<Self, Error> {
         let path = input.path;
         if !input.is_stream() && logs::needs_map(path)? {
+            check_dbc(path, &input.open(stop, 1)?)?;
             return Err(Error::Input(format!(
                 "{}: this log needs a channel map\nhint: `wetclutch inspect` with --suggest writes a first one, for --map",
                 path.shown()
