@@ -58,7 +58,7 @@ error: map.toml:3: `channel.engine_speed.delay_s` is 99, expected 0 to 10
 fn colours_come_when_they_are_asked_for_and_never_in_results() {
     let text = "\n\n\n\n\n\n\n\n[channel.engine_speed]\ndelay_s = \"soon\"\nname = \"N\"\n";
     let expected = "\
-\u{1b}[1m\u{1b}[31merror:\u{1b}[0m map.toml:10: invalid type: string \"soon\", expected f64
+\u{1b}[1m\u{1b}[31merror:\u{1b}[0m map.toml:10: invalid type: the text \"soon\", expected a number
   \u{1b}[1m\u{1b}[34m-->\u{1b}[0m map.toml:10:11
    \u{1b}[1m\u{1b}[34m|\u{1b}[0m
 \u{1b}[1m\u{1b}[34m10 |\u{1b}[0m delay_s = \"soon\"

@@ -135,7 +135,7 @@ impl Text<'_> {
         }
     }
 
-    /// The value on the line that a message of the parser describes, such as `invalid type: string "x", expected f64`.
+    /// The value on the line that a message of the parser describes, such as `invalid type: the text "x", expected a number`.
     fn of_value(&self, entries: &[Entry], message: &str) -> Option<Range<usize>> {
         let values = entries.iter().filter(|entry| !entry.is_table).flat_map(|entry| {
             let items = entry.items.iter().filter(|item| !self.is_here(&entry.value) || self.begins(item, &['[', '{']));
@@ -196,7 +196,7 @@ mod tests {
             (3, "`clutch.a.faces` is 8, expected 1 to 4", (3, 9, "8")),
             (4, "`clutch.a.map[1]` is 2, expected 3 to 4", (4, 11, "2")),
             (4, "`clutch.a.map[2]` is -3, expected 0 to 4", (5, 3, "-3")),
-            (7, "invalid type: string \"8\", expected f64", (7, 9, "\"8\"")),
+            (7, "invalid type: the text \"8\", expected a number", (7, 9, "\"8\"")),
             (7, "unknown field `faces`, expected `teeth`", (7, 1, "faces")),
             (6, "missing field `gain`", (6, 1, "[clutch.b]")),
             (6, "`clutch.b`: missing `gain`", (6, 9, "b")),
@@ -212,8 +212,8 @@ mod tests {
         let text = "list = [{ a = 1, b = 2.50 }, { a = 3, b = true }]\n";
         for (message, column, part) in [
             ("`list[1].a` is 3, expected 0 to 1", 36, "3"),
-            ("invalid type: floating point `2.5`, expected a string", 22, "2.50"),
-            ("invalid type: boolean `true`, expected f64", 43, "true"),
+            ("invalid type: the number `2.5`, expected text in quotes", 22, "2.50"),
+            ("invalid type: the word `true`, expected a number", 43, "true"),
         ] {
             assert_eq!(marked(text, 1, message), Some((1, column, part.to_owned())), "{message}");
         }

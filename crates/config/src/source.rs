@@ -312,7 +312,7 @@ impl Layers<'_> {
     /// What is wrong at a place.
     pub(crate) fn wrong(&self, place: usize, message: &str) -> ConfigError {
         let (path, line) = self.place(place);
-        ConfigError::Syntax { path, line, message: trace::printable(message).into_owned() }
+        ConfigError::Syntax { path, line, message: trace::plain_type(message) }
     }
 
     /// Reads the text into raw types.

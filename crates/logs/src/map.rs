@@ -166,7 +166,7 @@ impl ChannelMap {
         let raw: RawMap = toml::from_str(text).map_err(|error| {
             let begin = error.span().map_or(0, |span| span.start);
             let line = 1 + text.bytes().take(begin).filter(|byte| *byte == b'\n').count();
-            at(line, trace::printable(error.message()).as_ref())
+            at(line, &trace::plain_type(error.message()))
         })?;
         let of_role = |(role, raw): (String, RawChannel)| {
             mapped(&role, raw).map_err(|message| at(line_of(text, &format!("channel.{role}"), &message), &message))

@@ -40,6 +40,51 @@ impl ShownPath for Path {
     }
 }
 
+/// What the parser of TOML says of a value of a wrong type, in plain words and printable, with how to write it where that is known:
+/// `invalid type: string "8", expected f64` becomes `invalid type: the text "8", expected a number`. Other messages stay as they are.
+pub fn plain_type(message: &str) -> String {
+    let message = printable(message);
+    let Some((kind, (found, expected))) = ["invalid type: ", "invalid value: "]
+        .into_iter()
+        .find_map(|kind| Some((kind, message.strip_prefix(kind)?.rsplit_once(", expected ")?)))
+    else {
+        return message.into_owned();
+    };
+    const FOUND: [(&str, &str); 6] = [
+        ("string ", "the text "),
+        ("integer ", "the number "),
+        ("floating point ", "the number "),
+        ("boolean ", "the word "),
+        ("sequence", "a list"),
+        ("map", "a table"),
+    ];
+    let of_type = FOUND.iter().find_map(|(name, plain)| Some((*plain, found.strip_prefix(name)?)));
+    let (plain, value) = of_type.unwrap_or(("", found));
+    let wanted = match expected {
+        "f64" | "f32" => "a number",
+        "usize" | "u8" | "u16" | "u32" | "u64" => "a whole number from 0 on",
+        "integer" | "isize" | "i8" | "i16" | "i32" | "i64" => "a whole number",
+        "a string" | "string" | "path string" | "a character" => "text in quotes",
+        "a boolean" => "true or false",
+        "a sequence" => "a list in brackets",
+        "a map" => "a table",
+        _ if expected.starts_with("struct ") => "a table",
+        other => other,
+    };
+    let bare = value.trim_matches(['"', '`']);
+    let hint = match (plain, wanted) {
+        ("the number " | "the word ", "text in quotes") => format!("\nhint: write it in quotes: \"{bare}\""),
+        ("the text ", "a number" | "a whole number" | "a whole number from 0 on") if bare.parse::<f64>().is_ok() => {
+            format!("\nhint: write it without quotes: {bare}")
+        }
+        ("the text ", "true or false") if matches!(bare, "true" | "false") => {
+            format!("\nhint: write it without quotes: {bare}")
+        }
+        _ => String::new(),
+    };
+    format!("{kind}{plain}{value}, expected {wanted}{hint}")
+}
+
 struct Printable<'a>(&'a str);
 
 impl Display for Printable<'_> {
@@ -92,6 +137,37 @@ mod tests {
         for (value, text) in cases {
             assert_eq!(toml_number(value), text);
             assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
+        }
+    }
+
+    #[test]
+    fn the_type_of_a_value_is_told_in_plain_words() {
+        for (message, plain) in [
+            (
+                "invalid type: string \"8\", expected f64",
+                "invalid type: the text \"8\", expected a number\nhint: write it without quotes: 8",
+            ),
+            ("invalid type: string \"soon\", expected f64", "invalid type: the text \"soon\", expected a number"),
+            (
+                "invalid type: integer `5`, expected a string",
+                "invalid type: the number `5`, expected text in quotes\nhint: write it in quotes: \"5\"",
+            ),
+            (
+                "invalid type: floating point `2.5`, expected u32",
+                "invalid type: the number `2.5`, expected a whole number from 0 on",
+            ),
+            (
+                "invalid type: string \"a, expected b\", expected struct RawClutch",
+                "invalid type: the text \"a, expected b\", expected a table",
+            ),
+            (
+                "invalid value: integer `-1`, expected usize",
+                "invalid value: the number `-1`, expected a whole number from 0 on",
+            ),
+            ("invalid type: map, expected a sequence", "invalid type: a table, expected a list in brackets"),
+            ("unknown field `a\u{1b}`, expected `b`", r"unknown field `a\u{1b}`, expected `b`"),
+        ] {
+            assert_eq!(plain_type(message), plain);
         }
     }
 

@@ -293,15 +293,14 @@ fn first_guess(key: &str, guess: Guess) -> &'static str {
 /// A value of the type that a reader expects; none if it is not known, or the same again.
 fn guess(expected: &str, old: &str) -> Option<String> {
     let has = |word: &str| expected.contains(word);
-    let is_whole = ["u8", "u16", "u32", "u64", "usize", "i8", "i16", "i32", "i64", "integer"].into_iter().any(has);
     let new = match expected.split('`').nth(1).filter(|_| expected.starts_with("one of") || expected.starts_with('`')) {
         Some(word) => format!("\"{word}\""),
-        None if has("string") || has("path") || has("character") => "\"x\"".to_owned(),
-        None if has("boolean") => "true".to_owned(),
-        None if has("sequence") || has("array") || has("tuple") => "[1.0, 2.0]".to_owned(),
-        None if has("struct") || has("map") || has("table") => "{}".to_owned(),
-        None if is_whole => "1".to_owned(),
-        None if has("f64") || has("float") || has("number") => "1.0".to_owned(),
+        None if has("text") || has("string") => "\"x\"".to_owned(),
+        None if has("true or false") => "true".to_owned(),
+        None if has("list") || has("array") || has("tuple") => "[1.0, 2.0]".to_owned(),
+        None if has("table") || has("map") => "{}".to_owned(),
+        None if has("whole number") => "1".to_owned(),
+        None if has("number") => "1.0".to_owned(),
         None => return None,
     };
     (new != old).then_some(new)

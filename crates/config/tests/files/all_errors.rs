@@ -41,7 +41,7 @@ fn every_unknown_key_and_every_value_out_of_range_of_a_vehicle_file_is_named_wit
     assert!(found.iter().any(|error| error.ends_with(meant)), "{found:#?}");
     assert!(has(&found, &text, "wheel_radius_m = 1000", "`vehicle.wheel_radius_m` is 1000"), "{found:#?}");
     assert!(has(&found, &text, "more = ", "unknown field `more`"), "{found:#?}");
-    assert!(has(&found, &text, "front_area_m2 = \"\"", "invalid type: string"), "{found:#?}");
+    assert!(has(&found, &text, "front_area_m2 = \"\"", "invalid type: the text"), "{found:#?}");
     assert!(errors(VEHICLE, &vehicle).is_empty());
 }
 

@@ -47,7 +47,10 @@ fn an_unknown_key_a_missing_key_and_a_wrong_type_are_named() {
     assert!(missing.contains("missing field `slip_scale`"), "{missing}");
     let line = line_of(VEHICLE, "slip_scale");
     let wrong = vehicle_error("slip_scale = 0.1", "slip_scale = \"0.1\"");
-    assert!(wrong.starts_with(&format!("vehicle.toml:{line}:")) && wrong.contains("string"), "{wrong}");
+    assert!(
+        wrong.starts_with(&format!("vehicle.toml:{line}:")) && wrong.contains("the text \"0.1\", expected a number"),
+        "{wrong}"
+    );
     let broken = vehicle_error("[tyre]", "[tyre");
     assert!(broken.starts_with(&format!("vehicle.toml:{}:", line_of(VEHICLE, "[tyre]"))), "{broken}");
 }
