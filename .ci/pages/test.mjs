@@ -170,6 +170,15 @@ test("the table of shifts is sorted and filtered", () => on(DRIVE, async (page) 
   assert.deepEqual((await column(3)).map(Number), [...numbers].sort((a, b) => a - b));
   await sort();
   assert.deepEqual((await column(3)).map(Number), [...numbers].sort((a, b) => b - a));
+  const titles = await page.$$eval("table.sortable th button", (titles) => titles.map((title) => title.textContent));
+  for (const score of ["rating", "response s", "step m/s^2", "torque hole", "vibration dose m/s^1.75", "jerk m/s^3"]) {
+    const at = titles.indexOf(score);
+    assert(at > 0, score);
+    await (await page.$$("table.sortable th button"))[at].click();
+    const values = (await column(at)).map(parseFloat);
+    assert(values.every(Number.isFinite), `${score}: ${values}`);
+    assert.deepEqual(values, [...values].sort((a, b) => a - b), score);
+  }
   const kinds = [...new Set(await column(2))];
   assert(kinds.length > 1);
   const kind = await page.evaluateHandle(() => [...document.querySelectorAll(".filters label")].find((label) => label.textContent.startsWith("kind")).querySelector("select"));

@@ -67,6 +67,13 @@ fn the_demo_of_a_car_drives_through_all_gears_and_shows_every_shift() {
     assert!(filter.iter().zip(&valve).filter(|(filter, valve)| filter < valve).count() >= 8, "{filter:?} {valve:?}");
     let page = folder.read("one/report.html");
     assert_eq!(page.matches("<figure>").count(), 13);
+    for score in ["rating", "response s", "torque hole"] {
+        assert!(page.contains(&format!("\">{score}</th>")), "{score}");
+    }
+    assert!(
+        numbers(&shifts, "rating").iter().all(|rating| page.contains(&format!("<td>{rating:.1}</td>"))),
+        "{shifts}"
+    );
     assert!(!page.contains("src=") && !page.contains("@import") && page.trim_end().ends_with("</html>"));
     run("again", "1");
     run("other", "2");

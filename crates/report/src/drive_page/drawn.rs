@@ -5,8 +5,8 @@ use serde::Serialize;
 use study::gearbox::drive::{ScoredDrive, ScoredShift};
 
 use super::figures::{overview_figure, shift_figure};
-use super::shifts::filled_columns;
-use super::{clutch_words, shift_rows, title};
+use super::shifts::{filled_columns, rows_of};
+use super::{clutch_words, title};
 
 /// The figures of a drive, each as the script of the pages reads it, and the table of its shifts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,6 +51,6 @@ pub fn drawn(drive: &ScoredDrive, car: &Car) -> Drawn {
         missing,
         shifts: drive.shifts.iter().filter(|shift| shift.is_drawn).map(one).collect(),
         columns: columns.iter().map(|column| [column.title, column.meaning]).collect(),
-        rows: shift_rows(drive, car).1,
+        rows: rows_of(&columns, drive, car).1,
     }
 }

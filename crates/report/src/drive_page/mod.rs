@@ -24,7 +24,7 @@ use crate::tables::{health_meaning, number};
 use crate::words::found;
 pub use drawn::{Drawn, DrawnShift, drawn};
 use figures::{overview_figure, shift_figure};
-use shifts::filled_columns;
+use shifts::{Column, filled_columns, rows_of};
 pub use shifts::{shift_cells, shift_rows, shift_words};
 
 /// Shifts that are drawn; of a drive with more, the worst, or those worth a look.
@@ -70,7 +70,8 @@ impl DrivePage<'_> {
             }
         });
         let figures: Vec<Value> = figures.collect();
-        let (columns, (titles, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
+        let columns = filled_columns(drive, car);
+        let (titles, rows) = rows_of(&columns, drive, car);
         let mut rows: Vec<_> = rows.into_iter().zip(&drive.shifts).collect();
         rows.sort_by(|(_, a), (_, b)| by_need(a, b));
         let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
@@ -96,7 +97,7 @@ impl DrivePage<'_> {
                 found => found(&findings(drive)),
                 kind_titles,
                 kinds,
-                columns => titles.iter().zip(columns).map(|(title, column)| context! { title, meaning => column.meaning }).collect::<Vec<_>>(),
+                columns => column_words(&titles, &columns),
                 rows,
                 healths => healths(drive),
                 figures,
@@ -119,6 +120,19 @@ impl DrivePage<'_> {
 const RATIOS_ALONE: &str = "Of this gearbox the ratios alone are known: torques are those of all clutches together at the turbine. The \
                             torque of a clutch needs the holding torques of the gears (level = \"shares\" in the gearbox file), its pressure \
                             plates and piston besides (`pack`).";
+
+/// The columns of the table of shifts: title, meaning, and a name that no other column has.
+fn column_words(titles: &[String], columns: &[&Column]) -> Vec<Value> {
+    let name = |at: usize| match (columns[at].title, at) {
+        ("N m", 1..) => format!("{}, {}", columns[at - 1].title, titles[at]),
+        _ => titles[at].clone(),
+    };
+    // A unit is not broken.
+    let one = |(at, column): (usize, &&Column)| {
+        context! { title => titles[at].replace("N m", "N\u{a0}m"), meaning => column.meaning, name => name(at) }
+    };
+    columns.iter().enumerate().map(one).collect()
+}
 
 /// The healths of the drive, each with its meaning.
 fn healths(drive: &ScoredDrive) -> Vec<Value> {

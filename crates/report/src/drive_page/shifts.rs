@@ -19,10 +19,17 @@ pub(super) struct Column {
     /// What it holds, for those who have not met it.
     pub(super) meaning: &'static str,
     cell: fn(&ScoredShift, &Car) -> String,
+    /// Whether pages alone show it: a terminal has less room.
+    is_of_pages: bool,
 }
 
 const fn column(title: &'static str, meaning: &'static str, cell: fn(&ScoredShift, &Car) -> String) -> Column {
-    Column { title, meaning, cell }
+    Column { title, meaning, cell, is_of_pages: false }
+}
+
+/// A column of what the occupants feel.
+const fn felt(title: &'static str, meaning: &'static str, cell: fn(&ScoredShift, &Car) -> String) -> Column {
+    Column { is_of_pages: true, ..column(title, meaning, cell) }
 }
 
 /// RMS errors of filter and open loop.
@@ -37,6 +44,17 @@ const COLUMNS: &[Column] = &[
     column("time s", "from the request until the shift is complete", |s, _| {
         number(s.quality.complete_s.unwrap_or(f64::NAN), 2)
     }),
+    felt(
+        "rating",
+        "10 is the best and 1 the lowest; 7 is a shift that is just accepted in vibration dose, jerk, step, torque hole, time and flare",
+        |s, _| {
+            let rating = s.comfort.as_ref().and_then(|comfort| comfort.rating(&s.quality));
+            rating.map_or(String::new(), |rating| number(rating, 1))
+        },
+    ),
+    felt("response s", "from the request to the first slip of the old gear", |s, _| {
+        comfort(s, |felt| number(felt.response_s, 2))
+    }),
     column("torque phase s", "one clutch holds and the other carries torque while it slips", |s, car| {
         // The ratios do not say when a clutch begins to carry.
         let is_known = !car.gearbox.has_ratios_alone();
@@ -49,6 +67,21 @@ const COLUMNS: &[Column] = &[
     column("overshoot rad/s", "largest slip of the turbine beyond the synchronous speed of the new gear", |s, _| {
         number(s.quality.past_synchronous_rad_s, 1)
     }),
+    felt(
+        "step m/s^2",
+        "how far the acceleration of the car, averaged over 50 ms, lies beyond those before and after the shift, at most",
+        |s, _| comfort(s, |felt| number(felt.step_m_s2(), 2)),
+    ),
+    felt(
+        "torque hole",
+        "how deep the acceleration falls below those before and after the shift, at most, relative to that before",
+        |s, _| comfort(s, |felt| format!("{} %", number(100.0 * felt.hole, 0))),
+    ),
+    felt(
+        "vibration dose m/s^1.75",
+        "vibration dose value of the acceleration from the request to 0.5 s after the end, weighted by ISO 2631-1",
+        |s, _| comfort(s, |felt| number(felt.vibration_dose_m_s1_75, 2)),
+    ),
     column("jerk m/s^3", "maximum jerk of the car, from parabolas over 0.3 s of its speed", |s, _| {
         if s.quality.jerk_m_s3.is_nan() { String::new() } else { number(s.quality.jerk_m_s3, 1) }
     }),
@@ -143,10 +176,19 @@ pub(super) fn filled_columns(drive: &ScoredDrive, car: &Car) -> Vec<&'static Col
     COLUMNS.iter().filter(is_filled).collect()
 }
 
-/// Titles and rows of the table of shifts. Errors of the clutch torque where the truth is known, else means of the estimates; columns
-/// that no shift fills are left out.
+/// The columns of a terminal that a shift of the drive fills.
+fn columns_of_terminal(drive: &ScoredDrive, car: &Car) -> Vec<&'static Column> {
+    filled_columns(drive, car).into_iter().filter(|column| !column.is_of_pages).collect()
+}
+
+/// Titles and rows of the table of shifts for a terminal. Errors of the clutch torque where the truth is known, else means of the
+/// estimates; columns that no shift fills are left out.
 pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<String>, Vec<Vec<String>>) {
-    let columns = filled_columns(drive, car);
+    rows_of(&columns_of_terminal(drive, car), drive, car)
+}
+
+/// Titles and rows of the table of shifts in these columns.
+pub(super) fn rows_of(columns: &[&Column], drive: &ScoredDrive, car: &Car) -> (Vec<String>, Vec<Vec<String>>) {
     let row = |shift: &ScoredShift| columns.iter().map(|column| (column.cell)(shift, car)).collect();
     let mut titles: Vec<String> = columns.iter().map(|column| column.title.to_owned()).collect();
     let mut rows: Vec<Vec<String>> = drive.shifts.iter().map(row).collect();
@@ -166,7 +208,7 @@ pub fn shift_words(drive: &ScoredDrive, car: &Car) -> Vec<(String, &'static str)
         "hidden",
         "health",
     ];
-    let columns = filled_columns(drive, car).into_iter().filter(|column| EXPLAINED.contains(&column.title));
+    let columns = columns_of_terminal(drive, car).into_iter().filter(|column| EXPLAINED.contains(&column.title));
     let word = |title: &str| {
         [" rad/s", " N m", " kJ", " kPa"].iter().fold(title, |title, unit| title.trim_end_matches(unit)).to_owned()
     };
@@ -175,6 +217,11 @@ pub fn shift_words(drive: &ScoredDrive, car: &Car) -> Vec<(String, &'static str)
         |health: &Health| drive.shifts.iter().any(|shift| shift.worst_health().is_some_and(|(it, _)| it == *health));
     let healths = Health::ALL.into_iter().filter(|health| *health != Health::Good).filter(worst);
     columns.chain(healths.map(|health| (health.name().replace('_', " "), health_meaning(health)))).collect()
+}
+
+/// A cell of what the occupants feel of a shift.
+fn comfort(shift: &ScoredShift, cell: fn(&ShiftComfort) -> String) -> String {
+    shift.comfort.as_ref().map_or(String::new(), cell)
 }
 
 /// A cell of a shift whose truth is known.
