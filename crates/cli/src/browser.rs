@@ -7,8 +7,14 @@ use trace::ShownPath as _;
 
 use crate::output;
 
-/// Opens a page; where that cannot be done, says where it is.
-pub(crate) fn open(page: &Path) {
+/// Opens a page if that is wanted; where it cannot be done, says where it is.
+pub(crate) fn open_if(is_wanted: bool, page: &Path) {
+    if is_wanted {
+        open(page);
+    }
+}
+
+fn open(page: &Path) {
     // The whole path: a name may begin with a dash.
     let place = std::fs::canonicalize(page).unwrap_or_else(|_| page.to_owned());
     let opened = has_desktop()

@@ -7,7 +7,7 @@ use config::vehicle::short::ValveKind;
 use trace::TableFormat;
 use wetclutch::estimate::{GearPair, ShiftChoice};
 
-use super::{MethodChoice, ObserverChoice, PageChoice, Threads, within};
+use super::{MethodChoice, ObserverChoice, OpenOutput, PageChoice, Threads, within};
 
 /// Which channels of a log are which signals.
 #[derive(Debug, Args)]
@@ -51,9 +51,8 @@ pub(crate) struct Inspect {
     /// With --shifts: a page of the drive, with its shifts, the converter, engine torque and the torque at the turbine
     #[arg(short, long, value_name = "PAGE.html", requires = "shifts")]
     pub(crate) output: Option<PathBuf>,
-    /// Open the page in the browser
-    #[arg(long, requires = "output")]
-    pub(crate) open: bool,
+    #[command(flatten)]
+    pub(crate) open: OpenOutput,
     /// With --shifts: the converter that the log shows, as a table of a vehicle file; needs the engine torque
     #[arg(long, value_name = "OUT.toml", requires = "shifts")]
     pub(crate) write_converter: Option<PathBuf>,
@@ -107,9 +106,8 @@ pub(crate) struct Estimate {
     /// standard output, as CSV
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
-    /// Open the page in the browser
-    #[arg(long, requires = "output")]
-    pub(crate) open: bool,
+    #[command(flatten)]
+    pub(crate) open: OpenOutput,
     /// File of what the filter of a car with a gearbox has learnt of it: read before the first row if it is there, written after the last.
     /// Several logs are then estimated one after the other, each with what the logs before it have left
     #[arg(long, value_name = "LEARNT.toml")]

@@ -362,9 +362,8 @@ pub(crate) struct Demo {
     /// Folder for the report
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-demo")]
     pub(crate) output: PathBuf,
-    /// Open the page in the browser
-    #[arg(long)]
-    pub(crate) open: bool,
+    #[command(flatten)]
+    pub(crate) open: Open,
     /// Print files and errors as JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -440,6 +439,22 @@ pub(crate) struct Export {
     pub(crate) json: bool,
 }
 
+/// Whether a page that is written always is opened.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct Open {
+    /// Open the page in the browser
+    #[arg(id = "open", long = "open")]
+    pub(crate) is_wanted: bool,
+}
+
+/// Whether a page that is written to the place of `--output` is opened.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct OpenOutput {
+    /// Open the page in the browser
+    #[arg(id = "open", long = "open", requires = "output")]
+    pub(crate) is_wanted: bool,
+}
+
 /// A page of what a command prints.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PageChoice {
@@ -447,8 +462,8 @@ pub(crate) struct PageChoice {
     #[arg(long, value_name = "PAGE.html")]
     pub(crate) page: Option<PathBuf>,
     /// Open the page in the browser
-    #[arg(long, requires = "page")]
-    pub(crate) open: bool,
+    #[arg(id = "open", long = "open", requires = "page")]
+    pub(crate) is_opened: bool,
 }
 
 /// A number in this range, as a vehicle file has it.

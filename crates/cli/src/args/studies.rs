@@ -8,7 +8,7 @@ use std::str::FromStr;
 use car::ObserverKind;
 use clap::{Args, ValueEnum};
 
-use super::PhaseChoice;
+use super::{Open, OpenOutput, PhaseChoice};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ObserverChoice {
@@ -65,6 +65,8 @@ pub(crate) struct Reproduce {
     /// Folder for page and figures
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-reproduction")]
     pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) open: Open,
     /// Print the rows as JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -96,6 +98,8 @@ pub(crate) struct Bench {
     /// Folder for the page, and for the table of shifts (bench.csv)
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) open: OpenOutput,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -110,6 +114,8 @@ pub(crate) struct StudyOptions {
     /// Folder for rows and page
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-study")]
     pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) open: Open,
     /// Complete the unfinished study in the folder
     #[arg(long)]
     pub(crate) resume: bool,
@@ -119,7 +125,7 @@ pub(crate) struct StudyOptions {
     #[command(flatten)]
     pub(crate) threads: Threads,
     /// Make only this run again, and write all its signals and its figure
-    #[arg(long, value_name = "RUN", allow_negative_numbers = true, conflicts_with_all = ["resume", "shard"])]
+    #[arg(long, value_name = "RUN", allow_negative_numbers = true, conflicts_with_all = ["resume", "shard", "open"])]
     pub(crate) run: Option<u64>,
     /// Print files and errors as JSON
     #[arg(long)]
@@ -158,6 +164,8 @@ pub(crate) struct ErrorBoundOptions {
     #[arg(short, long, value_name = "BOUNDS.toml")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
+    pub(crate) open: OpenOutput,
+    #[command(flatten)]
     pub(crate) threads: Threads,
     /// Print JSON
     #[arg(long)]
@@ -175,6 +183,8 @@ pub(crate) struct SensitivityOptions {
     /// Folder for the page
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) open: OpenOutput,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -201,6 +211,8 @@ pub(crate) struct WorstCaseOptions {
     /// Folder for the worst case (a study file) and its figure
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-worst-case")]
     pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) open: Open,
     #[command(flatten)]
     pub(crate) threads: Threads,
     /// Print the worst cases as JSON
@@ -254,6 +266,8 @@ pub(crate) struct Merge {
     /// Folder for the merged study
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) open: Open,
     /// Print files and errors as JSON
     #[arg(long)]
     pub(crate) json: bool,

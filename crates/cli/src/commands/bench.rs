@@ -1,5 +1,7 @@
 //! `wetclutch bench`.
 
+use std::path::Path;
+
 use config::{ExperimentFile, VehicleFile};
 use report::bench_page;
 use report::tables::{coverage, number};
@@ -9,6 +11,7 @@ use trace::quantity;
 use trace::{ShownPath as _, units};
 
 use crate::args;
+use crate::browser;
 use crate::commands::{progress, replaceable, warn_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -38,23 +41,25 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
     let bar = progress(all as u64, 0);
     let result = study::bench(&vehicle, &experiment, |_| bar.inc(1))?;
     bar.finish_and_clear();
-    if let Some(folder) = &options.output {
-        write_text(&folder.join("bench.html"), &bench_page(&result, &vehicle, &experiment)?)?;
+    let page = options.output.as_ref().map(|folder| folder.join("bench.html"));
+    if let Some(page) = &page {
+        write_text(page, &bench_page(&result, &vehicle, &experiment)?)?;
     }
-    if options.json {
-        output::json(&result)?;
-        return Ok(());
-    }
+    if options.json { output::json(&result) } else { print(&result, page.as_deref()) }?;
+    page.iter().for_each(|page| browser::open_if(options.open.is_wanted, page));
+    Ok(())
+}
 
-    errors(&result)?;
-    ranking(&result)?;
-    ranges(&result)?;
+fn print(result: &Bench, page: Option<&Path>) -> Result<(), Failure> {
+    errors(result)?;
+    ranking(result)?;
+    ranges(result)?;
     if let Some(consistency) = &result.consistency {
         output::line(&consistent(consistency))?;
     }
-    failures(&result)?;
-    if let Some(folder) = &options.output {
-        output::line(&format!("\npage: {}", folder.join("bench.html").shown()))?;
+    failures(result)?;
+    if let Some(page) = page {
+        output::line(&format!("\npage: {}", page.shown()))?;
     }
     Ok(())
 }

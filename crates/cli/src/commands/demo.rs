@@ -89,9 +89,7 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     } else {
         print(&comparison, &report)?;
     }
-    if options.open {
-        browser::open(&report);
-    }
+    browser::open_if(options.open.is_wanted, &report);
     Ok(())
 }
 

@@ -80,9 +80,7 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     } else {
         print(&scored, &car, &folder.join(PAGE))?;
     }
-    if options.open {
-        browser::open(&folder.join(PAGE));
-    }
+    browser::open_if(options.open.is_wanted, &folder.join(PAGE));
     Ok(())
 }
 

@@ -7,12 +7,13 @@ use report::error_bound_page;
 use report::error_bound_page::named;
 use report::tables::phase_name;
 use study::campaign::PHASES;
-use study::error_bound as find;
+use study::{ErrorBound, error_bound as find};
 use trace::ShownPath as _;
 
 use crate::args::ErrorBoundOptions;
+use crate::browser;
 use crate::commands::written::{is_page, replaces_only};
-use crate::commands::{check_output, not_an_input, progress, write_text};
+use crate::commands::{check_output, not_an_input, progress, warn_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -50,10 +51,18 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
             write_text(&page, &error_bound_page(&found, &study)?)?;
         }
     }
-    if options.json {
-        output::json(&found)?;
-        return Ok(());
+    if options.json { output::json(&found) } else { print(&found, &study, options) }?;
+    match options.output.as_deref().map(page_beside) {
+        Some(Some(page)) => browser::open_if(options.open.is_wanted, &page),
+        Some(None) if options.open.is_wanted => {
+            warn_without_effect("--open", "the bounds go to a device or a pipe, and there is no page");
+        }
+        _ => (),
     }
+    Ok(())
+}
+
+fn print(found: &ErrorBound, study: &Study, options: &ErrorBoundOptions) -> Result<(), Failure> {
     output::line(&format!("{} runs, {} without a complete shift\n", found.runs, found.unfinished))?;
     let head = ["phase", "model error, rad/s^2", "largest", "50 % of runs below", "95 %", "99 %", "settled after run"];
     let mut rows = Vec::new();
@@ -75,7 +84,7 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
                 output::line(&format!("page: {}", page.shown()))?;
             }
         }
-        None => output::toml(&format!("\n{}", found.toml(&study)))?,
+        None => output::toml(&format!("\n{}", found.toml(study)))?,
     }
     Ok(())
 }

@@ -72,9 +72,7 @@ pub(super) fn page(
         output::line(&sentence)?;
     }
     output::note(&format!("page: {}", path.shown()));
-    if options.open {
-        browser::open(path);
-    }
+    browser::open_if(options.open.is_wanted, path);
     Ok(())
 }
 

@@ -12,6 +12,7 @@ use wetclutch::studies::bench_sensors;
 
 use super::car::no_shift;
 use crate::args::Bench;
+use crate::browser;
 use crate::commands::{JsonObject, progress, read_car, replaceable, write_cells, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -43,12 +44,16 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
     if options.json {
         let objects: Vec<_> = cells.into_iter().map(JsonObject::of).collect();
         output::json(&json!({ "shifts": objects }))?;
-        return Ok(());
+    } else {
+        print(&result, &car)?;
     }
-    print(&result, &car)?;
     if let Some(folder) = &options.output {
-        output::line(&format!("\ntable: {}", folder.join(TABLE).shown()))?;
-        output::line(&format!("page: {}", folder.join(PAGE).shown()))?;
+        let page = folder.join(PAGE);
+        if !options.json {
+            output::line(&format!("\ntable: {}", folder.join(TABLE).shown()))?;
+            output::line(&format!("page: {}", page.shown()))?;
+        }
+        browser::open_if(options.open.is_wanted, &page);
     }
     Ok(())
 }

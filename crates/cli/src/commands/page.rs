@@ -35,8 +35,6 @@ pub(super) fn write_html(choice: &PageChoice, html: &str) -> Result<(), Failure>
     let Some(page) = &choice.page else { return Ok(()) };
     write_text(page, html)?;
     output::note(&format!("page: {}", page.shown()));
-    if choice.open {
-        browser::open(page);
-    }
+    browser::open_if(choice.is_opened, page);
     Ok(())
 }

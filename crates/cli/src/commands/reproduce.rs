@@ -1,5 +1,7 @@
 //! `wetclutch reproduce`.
 
+use std::path::Path;
+
 use config::{ExperimentFile, Study, VehicleFile};
 use report::Reproduction;
 use report::reproduction::{agreeing, ours};
@@ -8,6 +10,7 @@ use study::statements::Case;
 use trace::ShownPath as _;
 
 use crate::args::Reproduce;
+use crate::browser;
 use crate::commands::{progress, replaceable, warn_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -35,9 +38,13 @@ pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
     for (name, svg) in &reproduction.figures {
         write_text(&options.output.join(name), svg)?;
     }
-    if options.json {
-        return output::json(&numbers);
-    }
+    let page = options.output.join(FILES[0]);
+    if options.json { output::json(&numbers) } else { print(&chapter, &page) }?;
+    browser::open_if(options.open.is_wanted, &page);
+    Ok(())
+}
+
+fn print(chapter: &Chapter, page: &Path) -> Result<(), Failure> {
     for row in &chapter.statements {
         let verdict = row.agrees.map_or("", |agrees| if agrees { "agrees" } else { "differs" });
         let case = row.case.map_or_else(String::new, |case| format!(" ({})", Case::label(case)));
@@ -45,10 +52,10 @@ pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
         output::line(&line.replace('’', "'").replace('−', "-"))?;
     }
     output::line("")?;
-    for line in agreeing(&chapter) {
+    for line in agreeing(chapter) {
         output::line(&line.replace('−', "-"))?;
     }
-    output::line(&format!("\nreport: {}", options.output.join(FILES[0]).shown()))?;
+    output::line(&format!("\nreport: {}", page.shown()))?;
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! `wetclutch sensitivity`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use car::{Car, ErrorBudget};
 use config::{Kind, Source, VehicleFile};
@@ -8,13 +8,14 @@ use report::car_sensitivity_page::{BOUND_AND_STD_DEV, car_sensitivity_page, hidd
 use report::sensitivity_page;
 use serde_json::json;
 use study::gearbox::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity, car_sensitivity};
-use study::sensitivity as find;
 use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
+use study::{PhaseSensitivity, sensitivity as find};
 use trace::ShownPath as _;
 
 use super::car::no_shift;
 use super::matrix::sensors_or_bench;
 use crate::args::SensitivityOptions;
+use crate::browser;
 use crate::commands::{read_car, replaceable, sensors_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -30,14 +31,34 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         None => VehicleFile::built_in()?,
     };
     let (phases, valve, shaft) = (find(&vehicle), valve_alone(&vehicle), shaft_level(&vehicle));
-    if let Some(folder) = &options.output {
-        write_text(&folder.join("sensitivity.html"), &sensitivity_page(&phases, &valve, &shaft, &vehicle)?)?;
+    if let Some(page) = page_of(options) {
+        write_text(&page, &sensitivity_page(&phases, &valve, &shaft, &vehicle)?)?;
     }
     if options.json {
         output::json(&json!({ "phases": phases, "valve": valve, "shaft": shaft }))?;
-        return Ok(());
+    } else {
+        print(&phases, &valve, &shaft)?;
     }
-    for phase in &phases {
+    show_page(options)
+}
+
+/// The place of the page.
+fn page_of(options: &SensitivityOptions) -> Option<PathBuf> {
+    options.output.as_ref().map(|folder| folder.join("sensitivity.html"))
+}
+
+/// Says where the page is, and opens it.
+fn show_page(options: &SensitivityOptions) -> Result<(), Failure> {
+    let Some(page) = page_of(options) else { return Ok(()) };
+    if !options.json {
+        output::line(&format!("page: {}", page.shown()))?;
+    }
+    browser::open_if(options.open.is_wanted, &page);
+    Ok(())
+}
+
+fn print(phases: &[PhaseSensitivity], valve: &[ValveEffect], shaft: &[ShaftEffect]) -> Result<(), Failure> {
+    for phase in phases {
         output::line(&format!(
             "{}, {}: the accelerations change by {:.0} rad/s^2 per MPa\n",
             phase.phase.replace('_', " "),
@@ -77,9 +98,6 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         "error of the level of the shaft torque, which the speeds do not show: {}\n",
         shaft.iter().map(n_m).collect::<Vec<_>>().join(", ")
     ))?;
-    if let Some(folder) = &options.output {
-        output::line(&format!("page: {}", folder.join("sensitivity.html").shown()))?;
-    }
     Ok(())
 }
 
@@ -90,32 +108,34 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     if shifts.is_empty() {
         return Err(Failure::Input(no_shift(&car, path)));
     }
-    if let Some(folder) = &options.output {
-        write_text(&folder.join("sensitivity.html"), &car_sensitivity_page(&shifts, &car)?)?;
+    if let Some(page) = page_of(options) {
+        write_text(&page, &car_sensitivity_page(&shifts, &car)?)?;
     }
     if options.json {
         let objects: Vec<_> = shifts.iter().map(|shift| json_of(shift, &car)).collect();
         output::json(&json!({ "shifts": objects }))?;
-        return Ok(());
+    } else {
+        print_of_car(&shifts, &car, path)?;
     }
+    show_page(options)
+}
+
+fn print_of_car(shifts: &[ShiftSensitivity], car: &Car, path: &Path) -> Result<(), Failure> {
     output::line(
         "standard deviation of the estimated torque of the clutch that drives the inertia phase: filter / valve model alone, and their ratio,\n\
          where each error is anywhere within its bound, independent of the others; hidden: the ratio is above 0.9, the speeds show nothing of\n\
          this torque, and the estimate is that of the valve model\n",
     )?;
-    let (titles, rows) = sensitivity_rows(&shifts, &car);
+    let (titles, rows) = sensitivity_rows(shifts, car);
     output::table(3, titles, rows)?;
-    let budget = ErrorBudget::of_car(&car);
+    let budget = ErrorBudget::of_car(car);
     let bound = |error: ShiftErrorKind| format!("{} {}", error.name(), error.bound(&budget));
-    let bounds: Vec<String> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(&car)).map(bound).collect();
-    let [hidden, all] = hidden_phases(&shifts);
+    let bounds: Vec<String> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(car)).map(bound).collect();
+    let [hidden, all] = hidden_phases(shifts);
     output::line(&format!("\nbounds, either way: {}\nhidden: {hidden} of {all} phases", bounds.join(", ")))?;
     // A car without converter has no designs.
     if car.converter.is_some() {
         output::line(&format!("{BOUND_AND_STD_DEV}: `wetclutch design {}`.", shell_quoted(path)))?;
-    }
-    if let Some(folder) = &options.output {
-        output::line(&format!("page: {}", folder.join("sensitivity.html").shown()))?;
     }
     Ok(())
 }

@@ -52,7 +52,7 @@ pub(super) fn estimate(
     let found = found.with_times_from_origin();
     report(&found, file, setup.is_output_free(output), say)?;
     found.said_of_sensors().into_iter().for_each(|sentence| say.note(sentence));
-    finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open, say)?;
+    finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open.is_wanted, say)?;
     learnt_file.map_or(Ok(()), |path| Kept::of(path, file, &found.learnt).write(say))
 }
 

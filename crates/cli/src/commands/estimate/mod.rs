@@ -110,9 +110,7 @@ fn finish(
     write_text(html, &page()?.unwrap_or_default())?;
     say.note(&format!("table of shifts: {}, {}", csv.shown(), json.shown()));
     say.note(&format!("report: {}", html.shown()));
-    if opens {
-        browser::open(html);
-    }
+    browser::open_if(opens, html);
     Ok(())
 }
 
@@ -277,7 +275,7 @@ fn several<S: Sync>(
                 .to_owned(),
         ));
     };
-    if options.open {
+    if options.open.is_wanted {
         return Err(Failure::Input(
             "--open takes one log\nhint: leave it out, and open the pages that you want".to_owned(),
         ));

@@ -43,7 +43,7 @@ pub(super) fn estimate(
              train the torque of a clutch in another place differs by a constant factor",
         );
     }
-    finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open, say)
+    finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open.is_wanted, say)
 }
 
 /// The shifts as a table, if there are any.

@@ -16,7 +16,7 @@ use wetclutch::studies::bench_sensors;
 use super::part::{Part, lock, merged};
 use crate::args::{Merge, StudyOptions};
 use crate::commands::car::{describe_car, warn_of_slipping};
-use crate::commands::writable;
+use crate::commands::{warn_without_effect, writable};
 use crate::failure::Failure;
 use crate::output;
 
@@ -25,6 +25,7 @@ pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
         let message = "--run has no effect on a study of a car with a gearbox\nhint: `wetclutch demo --vehicle CAR --drive DRIVE --seed N` shows one car with every shift";
         return Err(Failure::Input(message.to_owned()));
     }
+    warn_of_open(options.open.is_wanted);
     let _lock = lock(&options.output)?;
     writable(&options.output, &["runs.csv", "runs.parquet"])?;
     let campaign = CarCampaign::new(CarStudy::read(&options.study)?, &bench_sensors()?)?;
@@ -39,10 +40,17 @@ pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
 }
 
 pub(super) fn merge(options: &Merge) -> Result<(), Failure> {
+    warn_of_open(options.open.is_wanted);
     let campaign = CarCampaign::new(CarStudy::read(&options.study)?, &bench_sensors()?)?;
     let mut summary = campaign.summary();
     let (whole, _lock) = merged(&campaign, options, |row| campaign.push(&mut summary, row))?;
     finish(&whole, &summary, options.json)
+}
+
+fn warn_of_open(is_wanted: bool) {
+    if is_wanted {
+        warn_without_effect("--open", "a study of a car with a gearbox has a table and no page");
+    }
 }
 
 /// Warns of sampled cars beyond the error bounds of the file.

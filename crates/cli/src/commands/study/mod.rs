@@ -22,7 +22,8 @@ pub(super) use self::cars::describe as describe_cars;
 use self::one_run::one_run;
 use self::part::{Part, lock, merged};
 use crate::args::{Merge, StudyOptions};
-use crate::commands::{writable, write_text};
+use crate::browser;
+use crate::commands::{warn_without_effect, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -44,7 +45,7 @@ pub(crate) fn study(options: &StudyOptions) -> Result<(), Failure> {
     let part = Part { campaign: &campaign, folder: &options.output, shard: options.shard };
     let mut summary = Summary::new(&campaign.study);
     part.make(options, |row| summary.push(row))?;
-    finish(&part, &summary, (&options.study, options.json))
+    finish(&part, &summary, &Wanted { file: &options.study, json: options.json, opens: options.open.is_wanted })
 }
 
 pub(crate) fn merge(options: &Merge) -> Result<(), Failure> {
@@ -54,26 +55,41 @@ pub(crate) fn merge(options: &Merge) -> Result<(), Failure> {
     let campaign = Campaign::new(Study::read(&options.study)?)?;
     let mut summary = Summary::new(&campaign.study);
     let (whole, _lock) = merged(&campaign, options, |row| summary.push(row))?;
-    finish(&whole, &summary, (&options.study, options.json))
+    finish(&whole, &summary, &Wanted { file: &options.study, json: options.json, opens: options.open.is_wanted })
+}
+
+/// What is shown of a finished study.
+struct Wanted<'a> {
+    /// Its file.
+    file: &'a Path,
+    /// Whether JSON is printed.
+    json: bool,
+    /// Whether the page is opened.
+    opens: bool,
 }
 
 /// Writes everything that is computed from the rows, and prints it, or as JSON.
-fn finish(part: &Part<'_, Campaign>, summary: &Summary, (file, json): (&Path, bool)) -> Result<(), Failure> {
+fn finish(part: &Part<'_, Campaign>, summary: &Summary, wanted: &Wanted<'_>) -> Result<(), Failure> {
     let campaign = part.campaign;
     part.write_parquet()?;
     if summary.runs() == 0 {
         output::note("this shard has no runs: the table is empty, and no page is written");
-        return if json { print_json(part, summary, None) } else { Ok(()) };
+        if wanted.opens {
+            warn_without_effect("--open", "there is no page without a run");
+        }
+        return if wanted.json { print_json(part, summary, None) } else { Ok(()) };
     }
     let worst = summary.worst.iter().map(|row| campaign.run_in_full(row.run)).collect::<Result<Vec<_>, _>>()?;
-    let command = format!("wetclutch study {}", shell_quoted(file));
+    let command = format!("wetclutch study {}", shell_quoted(wanted.file));
     let page = StudyPage::of(summary, &campaign.study, &worst, &command)?;
     let html = part.folder.join("study.html");
     write_text(&html, &page.html)?;
     for (name, svg) in &page.figures {
         write_text(&part.folder.join("figures").join(name), svg)?;
     }
-    if json { print_json(part, summary, Some(&html)) } else { print(summary, &html) }
+    if wanted.json { print_json(part, summary, Some(&html)) } else { print(summary, &html) }?;
+    browser::open_if(wanted.opens, &html);
+    Ok(())
 }
 
 /// Prints runs, files and errors as JSON.
