@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{Folder, ROOT, printed, said, wetclutch};
+use crate::support::{Folder, ROOT, printed, said, shown, wetclutch};
 
 /// What other tests run, or needs a bus or a library that is built.
 const ELSEWHERE: [&str; 4] = ["candump ", "--check-elf", "--fmu", "--car-fmu"];
@@ -146,4 +146,61 @@ fn no_page_has_commands_that_no_test_runs() {
     let readme = commands(Path::new(&format!("{ROOT}README.md")));
     let tutorial: Vec<String> = tutorial.iter().map(|command| plain(command)).collect();
     assert!(readme.len() > 4 && readme.iter().all(|command| tutorial.contains(&plain(command))), "{readme:?}");
+}
+
+#[test]
+fn pages_quote_what_the_program_prints() {
+    let page = |name: &str| std::fs::read_to_string(format!("{ROOT}docs/{name}.md")).unwrap();
+    let folder = Folder::new("quoted");
+
+    let (drive, car) = (format!("{ROOT}drives/city.toml"), format!("{ROOT}vehicles/eight_speed.toml"));
+    said(&wetclutch(&["simulate", &drive, "-o", &folder.path("out")]));
+    let (log, learnt) = (folder.path("out/city_measured.csv"), folder.path("learnt.toml"));
+    let rows = folder.path("estimate.csv");
+    let estimate = wetclutch(&["estimate", &log, "--vehicle", &car, "-o", &rows, "--learnt", &learnt]);
+    let estimate = shown(&estimate).replace(&learnt, "learnt.toml");
+    let of_page = page("how-to/estimate-logs");
+    let quoted: Vec<&str> = of_page.lines().filter(|line| line.starts_with("learnt")).collect();
+    assert_eq!(quoted.len(), 8);
+    for line in quoted {
+        assert!(estimate.lines().any(|printed| printed == line), "{line}\nis not in\n{estimate}");
+    }
+
+    let one_shift = printed(&wetclutch(&["demo", "-o", &folder.path("demo")]));
+    let gears = printed(&wetclutch(&["demo", "--vehicle", &car, "-o", &folder.path("gears")]));
+    let tutorial = page("tutorial/2-run-it");
+    let rms = |observer: &str| {
+        let line = one_shift.lines().find(|line| line.starts_with("torque phase") && line.contains(observer)).unwrap();
+        line.split_whitespace().rev().nth(2).unwrap().to_owned()
+    };
+    for (observer, words) in
+        [("open loop", "the open loop errs by"), ("rigid ISS", "the chapter by"), ("Kalman", "Kalman filter by")]
+    {
+        let quoted = format!("{words} {} MPa", rms(observer));
+        assert!(tutorial.contains(&quoted), "{quoted}");
+    }
+    assert!(gears.contains("10148 of 10148 pressures") && tutorial.contains("all 10,148 pressures"), "{gears}");
+    assert!(gears.contains("28 of 28 shifts") && tutorial.contains("28 shifts"), "{gears}");
+    let hardest = gears.lines().find(|line| line.contains("6-5") && line.contains("coast downshift")).unwrap();
+    assert!(hardest.contains("10.3 / 10.8") && tutorial.contains("10.3 N m in the torque phase"), "{hardest}");
+
+    let two_speed = format!("{ROOT}vehicles/two_speed_at.toml");
+    let method = |name| ["design", &two_speed, "--method", name, "--sample-time", "0.01"].map(str::to_owned);
+    let design = |name| printed(&wetclutch(&method(name).each_ref().map(String::as_str)));
+    let peak_to_peak = design("peak-to-peak");
+    for (name, line) in [
+        ("how-to/choose-an-observer", "the gain is the open loop: no gain reduces the bound"),
+        ("how-to/read-ranges-and-certificates", "the gain is the open loop: no gain reduces the bound"),
+        ("how-to/read-ranges-and-certificates", "corrects over steps of at most"),
+    ] {
+        assert!(page(name).contains(line) && peak_to_peak.contains(line), "{line}\n{peak_to_peak}");
+    }
+    for name in ["iss-discrete", "interval", "peak-to-peak", "scheduled"] {
+        let printed = design(name);
+        let bound = printed.split("steady-state bound on the error of the clutch torque: ").nth(2).unwrap();
+        let row = format!("| {} /", bound.split(" N m").next().unwrap());
+        let choose = page("how-to/choose-an-observer");
+        let of_page = choose.lines().find(|line| line.starts_with(&format!("| `{name}` |"))).unwrap();
+        assert!(of_page.contains(&row), "{row}\n{of_page}");
+    }
 }
