@@ -16,7 +16,7 @@ use super::{PageChoice, within};
 pub(crate) struct Design {
     /// Vehicle file
     pub(crate) vehicle: PathBuf,
-    /// Shift of a car with a gearbox, by its gears; without it, a table of all upshifts from each gear to the next
+    /// Shift of a car with a gearbox, such as 1-2; without it, a table of all upshifts from each gear to the next
     #[arg(long, value_name = "FROM-TO")]
     pub(crate) shift: Option<String>,
     /// File with values that replace those of the vehicle file, such as the output of `error-bound`
@@ -34,7 +34,7 @@ pub(crate) struct Design {
     /// Phase to design for
     #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
     pub(crate) phase: PhaseChoice,
-    /// kappa1 in 1/s; if it is neither here nor in the file, it is increased step by step
+    /// kappa1 in 1/s; if neither this option nor the file gives it, it is increased step by step
     #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(KAPPA1_PER_S))]
     pub(crate) kappa1: Option<f64>,
     /// kappa2 in 1/s: decay rate of the error; the settling time is 4/kappa2

@@ -48,12 +48,12 @@ pub(crate) struct Inspect {
     /// List the shifts; needs --map or --channel
     #[arg(long)]
     pub(crate) shifts: bool,
-    /// With --shifts: a page of the drive, with its shifts, the converter, engine torque and the torque at the turbine
+    /// With --shifts: write a page of the drive, with its shifts, converter, engine torque and turbine torque
     #[arg(short, long, value_name = "PAGE.html", requires = "shifts")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) open: OpenOutput,
-    /// With --shifts: the converter that the log shows, as a table of a vehicle file; needs the engine torque
+    /// With --shifts: write the fitted converter as a table of a vehicle file; needs the engine torque
     #[arg(long, value_name = "OUT.toml", requires = "shifts")]
     pub(crate) write_converter: Option<PathBuf>,
     /// Ratios of the forward gears, 1st first; they replace those of the map
@@ -71,7 +71,7 @@ pub(crate) struct Convert {
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) mapping: Mapping,
-    /// The table, by its ending .csv, .parquet or .mf4, or a folder, which gets a table of each log. No table is replaced without --force
+    /// The table; the ending .csv, .parquet or .mf4 gives the format. Or a folder, which gets a table of each log. No table is replaced without --force
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     /// Format of files in a folder [default: csv]
@@ -84,7 +84,7 @@ pub(crate) struct Convert {
 
 #[derive(Debug, Args)]
 pub(crate) struct Estimate {
-    /// Logs; `-` is standard input. Several are estimated at a time, each into a separate file
+    /// Logs; `-` is standard input. Several logs are estimated in parallel, each into a separate file
     #[arg(required = true, value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
@@ -98,37 +98,37 @@ pub(crate) struct Estimate {
     /// Design method of the gains, for `--observer` rigid and compliant [default: iss]
     #[arg(long, value_enum)]
     pub(crate) method: Option<MethodChoice>,
-    /// File whose table `sensors` describes the sensors of the log, such as an experiment file. The Kalman filters use
-    /// their noise and lag; without the file they assume the noise of the error budget and no lag
+    /// File whose table `sensors` describes the sensors of the log, such as an experiment file. The Kalman filters use their noise and
+    /// delay; without the file they assume the noise of the error budget and no delay
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
-    /// File for the estimate, by its ending CSV, .parquet or .mf4, or an existing folder; of several logs the folder for their files. Default:
-    /// standard output, as CSV
+    /// File for the estimate; the ending .csv, .parquet or .mf4 gives the format. For several logs a folder, which gets a file for each log.
+    /// Default: standard output, as CSV
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) open: OpenOutput,
-    /// File of what the filter of a car with a gearbox has learnt of it: read before the first row if it is there, written after the last.
-    /// Several logs are then estimated one after the other, each with what the logs before it have left
+    /// File with the values that the gearbox filter has learnt of the car: read before the first row if it exists, written after the last.
+    /// Several logs are then estimated in sequence
     #[arg(long, value_name = "LEARNT.toml")]
     pub(crate) learnt: Option<PathBuf>,
-    /// Columns of the estimate, in this order; time_s is always the first. Readings too, by the names of a table, such as
+    /// Columns of the estimate, in this order; time_s is always first. Readings can be included by their column names, such as
     /// turbine_speed_rad_s
     #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,
-    /// Only the Nth shift of the log: its estimates, quality and figure
+    /// Only the Nth shift of the log
     #[arg(long, value_name = "N", conflicts_with = "shifts", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) shift: Option<u32>,
-    /// Only shifts between these gears, called as in the table of shifts, such as 1-2,2-3
+    /// Only shifts between these gears, named as in the table of shifts, such as 1-2,2-3
     #[arg(long, value_name = "FROM-TO,...", value_delimiter = ',')]
     pub(crate) shifts: Vec<GearPair>,
-    /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV or a bus log as text, a file or `-`
+    /// Estimate a log while it is written, until Ctrl-C or the end of the pipe. The log is CSV or a bus log as text, a file or `-`
     #[arg(long)]
     pub(crate) follow: bool,
     /// Format of files in a folder [default: csv]; the ending of the file after -o sets its format
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatChoice>,
-    /// Print the shifts of each log as JSON, in place of the table; needs -o
+    /// Print the shifts of each log as JSON instead of the table; needs -o
     #[arg(long, requires = "output", conflicts_with = "follow")]
     pub(crate) json: bool,
     #[command(flatten)]
@@ -193,8 +193,8 @@ pub(crate) struct Init {
     /// Name of the car
     #[arg(long, default_value = "my car")]
     pub(crate) name: String,
-    /// Log of a drive: without --gearbox the ratios in which the car was driven become the gearbox file; final ratio, wheel radius and engine
-    /// torque that are not given are those of the log, as far as it shows them
+    /// Log of a drive. Without --gearbox, the ratios in which the car was driven become the gearbox file. Final ratio, wheel radius and
+    /// engine torque are those of the log, where it shows them and no option gives them
     #[arg(long, value_name = "LOG", conflicts_with_all = ["ratios", "complete"])]
     pub(crate) from_log: Option<PathBuf>,
     #[command(flatten)]
@@ -226,7 +226,7 @@ pub(crate) struct Init {
     /// The pistons of the clutches have a stroke: the fill takes time
     #[arg(long)]
     pub(crate) stroke: bool,
-    /// Write every key, with where its value is from, in place of a short file
+    /// Write every key with the source of its value, instead of a short file
     #[arg(long)]
     pub(crate) complete: bool,
     /// The vehicle file
@@ -289,7 +289,7 @@ pub(crate) struct Fit {
     /// The fitted vehicle file
     #[arg(short, long, value_name = "FITTED.toml")]
     pub(crate) output: PathBuf,
-    /// The channel map of --map with the delays, scales and zero offsets that were found
+    /// Write the channel map of --map with the fitted delays, scales and zero offsets
     #[arg(long, value_name = "OUT.toml", requires = "map", conflicts_with = "channel")]
     pub(crate) write_map: Option<PathBuf>,
     #[command(flatten)]

@@ -28,7 +28,7 @@ Examples:
   wetclutch bench                                             all observers on many drives, ranked
   wetclutch bench --vehicle vehicles/eight_speed.toml         every shift of a gearbox, in every kind
   wetclutch study experiments/settings.toml -o out            two thousand shifts: errors and sensitivities
-  wetclutch simulate experiments/e1.toml -o out               a drive as CSV
+  wetclutch simulate experiments/e1.toml -o out               a simulated shift as CSV
   wetclutch design vehicles/two_speed_at.toml                 gains with their certificate
   wetclutch design vehicles/eight_speed.toml                  in which upshifts the pressure is not observable
   wetclutch inspect drive.mf4                                 channels, units, rates and gaps of a log
@@ -38,6 +38,9 @@ Examples:
 All files use SI units, which are part of keys and column names. Column names of measured files may also
 end in _rpm, _bar, _mpa, _ma, _ms, _km_h; these columns are converted when they are read.
 Exit codes: 0 done, 1 the work failed (infeasible, diverged), 2 wrong usage or input.";
+
+/// The options of every command.
+const GLOBAL: &str = "Global options";
 
 /// The version, and the commit that a release is made of.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("WETCLUTCH_OF_COMMIT"));
@@ -49,20 +52,20 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("WETCLUTCH_OF_COMM
 #[derive(Debug, Parser)]
 #[command(name = "wetclutch", version = VERSION, about, after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Arguments {
-    /// No messages but errors and warnings; results are printed as without it
-    #[arg(short, long, global = true)]
+    /// Print only errors and warnings, and the results
+    #[arg(short, long, global = true, help_heading = GLOBAL)]
     pub(crate) quiet: bool,
-    /// Also say which files are read and written, what is assumed, and the stages of the work, each with the time since the start
-    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    /// Also print the files that are read and written, the assumptions, and each stage of the work with the time since the start
+    #[arg(short, long, global = true, help_heading = GLOBAL, conflicts_with = "quiet")]
     pub(crate) verbose: bool,
-    /// Replace files at the places of outputs also where this program did not write them
-    #[arg(long, global = true)]
+    /// Replace existing output files that this program did not write
+    #[arg(long, global = true, help_heading = GLOBAL)]
     pub(crate) force: bool,
-    /// When messages have colours; results have none
-    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t)]
+    /// When messages are coloured; results never are
+    #[arg(long, global = true, help_heading = GLOBAL, value_enum, value_name = "WHEN", default_value_t)]
     pub(crate) color: Colors,
     /// Units of tables, messages and pages, such as rpm,bar,degC: one for each quantity; files and JSON keep SI units
-    #[arg(long, global = true, value_name = "UNIT,...", env = "WETCLUTCH_UNITS", hide_env_values = true)]
+    #[arg(long, global = true, help_heading = GLOBAL, value_name = "UNIT,...", env = "WETCLUTCH_UNITS", hide_env_values = true)]
     pub(crate) units: Option<ShownUnits>,
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -82,10 +85,10 @@ pub(crate) enum Command {
     ///   measured.csv   only the signals that a car measures
     ///   estimate.csv   the output of `estimate measured.csv`
     ///
-    /// With the vehicle file of a car with a gearbox: drives through all of its gears, up under power, down coasting, up
-    /// without power, down under power, or through a drive file. The car differs from the vehicle file. The gearbox
-    /// filter reads its speeds by toothed wheels and estimates pressure and torque of both clutches. Prints every shift with its
-    /// quality and the errors of filter and open loop, and writes:
+    /// With the vehicle file of a car with a gearbox it drives through all gears: upshifts with the accelerator pressed,
+    /// downshifts with it released, then the reverse. --drive gives another drive. The car differs from the vehicle file.
+    /// The gearbox filter reads the speeds by toothed wheels and estimates pressure and torque of both clutches. Prints every
+    /// shift with its quality and the errors of filter and open loop, and writes:
     ///
     ///   report.html    the drive, the shifts, a figure of each shift
     ///   shifts.csv     the shifts as numbers
@@ -95,17 +98,17 @@ pub(crate) enum Command {
     ///   wetclutch demo --vehicle vehicles/ten_speed.toml --drive drives/city.toml -o out
     #[command(verbatim_doc_comment)]
     Demo(Demo),
-    /// Simulate an experiment and write its signals as CSV
+    /// Simulate an experiment or a drive and write its signals as CSV
     ///
     /// Simulates an experiment and writes two files: NAME.csv with every signal, true values included, and
     /// NAME_measured.csv with only the signals that a car measures. The same experiment gives the same bytes. Rows are
     /// written during the simulation; the size is printed first if it is more than 1 GB. If the experiment has scenarios,
     /// the drive is simulated without them, or with the scenario given by --scenario. With a table of sensors NAME_measured.csv
-    /// has what the sensors read.
+    /// has the readings of the sensors.
     ///
-    /// A drive file (with segments) is driven with all its shifts: throttle, brake and grade over time, a shift schedule or
-    /// listed shifts, and a vehicle file with a gearbox. The columns of the offgoing and oncoming clutch are empty between
-    /// shifts.
+    /// A drive file (with segments) gives throttle, brake and grade over time, a shift schedule or a list of shifts, and a
+    /// vehicle file with a gearbox. All its shifts are simulated. The columns of the offgoing and oncoming clutch are empty
+    /// between shifts.
     ///
     ///   wetclutch simulate drives/city.toml -o out
     ///   wetclutch simulate drives/city.toml --vehicle vehicles/ten_speed.toml -o out
@@ -119,9 +122,10 @@ pub(crate) enum Command {
     /// file; options replace them. If no gain meets a requirement, the best certified gain is printed, with
     /// its error bound and the settling time that would meet the requirement; the exit code is then 1.
     ///
-    /// Of a car with a gearbox: a table of all upshifts from each gear to the next, with the certified bounds of
-    /// the open loop and of the best gain; `--shift` gives the gains of one of them. Its requirements are
-    /// defaults, which are no failure if they are not met. Gains are for upshifts with a driving engine.
+    /// For a car with a gearbox it prints a table of all upshifts from each gear to the next, with the certified bounds
+    /// of the open loop and of the best gain; `--shift` prints the gains of one of them. The requirements of such a car
+    /// are defaults, and the exit code is 0 also where they are not met. Gains are for power-on upshifts.
+    ///
     ///   wetclutch design vehicles/eight_speed.toml
     ///   wetclutch design vehicles/eight_speed.toml --shift 1-2
     ///
@@ -132,7 +136,7 @@ pub(crate) enum Command {
     Design(Design),
     /// List what is in a log, suggest a channel map, find the shifts
     ///
-    /// Reads a log of any format: CSV (any delimiter, decimal comma, units in names or in a row), Parquet, ASAM MDF 4,
+    /// Reads a log of any of these formats: CSV (any delimiter, decimal comma, units in names or in a row), Parquet, ASAM MDF 4,
     /// CAN logs (candump, ASC, BLF, PCAN, SavvyCAN, python-can) with a DBC, also of J1939. `-` is standard input. Lists channels, units, groups,
     /// samples, rates, spans, values, gaps, and samples that cannot be used.
     ///
@@ -143,11 +147,12 @@ pub(crate) enum Command {
     Inspect(Inspect),
     /// Write the channels of logs as tables: CSV, Parquet or MDF 4
     ///
-    /// Writes the decoded channels of a log of any format that is read, with their names and units. A row has the values of one time; a channel
-    /// that has none there is empty. Samples that are not good, such as repeated ones, are left out.
+    /// Writes the decoded channels of logs with their names and units. Logs have the formats that `inspect` reads. A row has the
+    /// values of one time; the cell of a channel without a value at that time is empty. Samples that are not good, such as
+    /// repeated ones, are left out.
     ///
-    /// With --map or --channel only the mapped channels, under the names of their signals and in SI, and next to the table OUT_map.toml: a channel map
-    /// with the delays and ranges, by which the table is estimated as the log.
+    /// With --map or --channel only the mapped channels are written, under the names of their signals and in SI units. Next to the
+    /// table is OUT_map.toml, a channel map with delays and ranges. With it the table gives the same estimates as the log.
     ///
     ///   wetclutch convert drive.blf --dbc bus.dbc -o drive.parquet
     ///   wetclutch convert drive.mf4 --map map.toml -o drive.csv
@@ -163,20 +168,20 @@ pub(crate) enum Command {
     ///   oncoming_slip_rad_s or output_speed_rad_s,
     ///   and for some observers wheel_speed_rad_s (or wheel_speed_km_h, read with the wheel radius of the vehicle file)
     ///
-    /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell or `nan` is a reading that did
-    /// not come. If the file also contains the true pressure (a simulated drive), the error is reported.
+    /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell or `nan` means that
+    /// there is no reading. If the file also contains the true pressure (a simulated drive), the error is reported.
     ///
     /// A log with other names, or of another format (Parquet, MDF 4, CAN with a DBC), needs a channel map, see `inspect
     /// --suggest`; every reading then comes with its own time.
     ///
-    /// Every shift of the log is found by the gears that the speeds show, and by gear signals where a channel map has
-    /// them. For the shifts of the vehicle file the summary gives pressure, torque and friction work with their range, the
-    /// lowest shaft torque, and the error where pressure or torque was measured. With -o OUT.csv there are also
+    /// Shifts are found by the ratio of the speeds, and by gear signals where a channel map has them. For the shifts of the
+    /// vehicle file the summary gives pressure, torque and friction work with their range, the lowest shaft torque, and the
+    /// error where pressure or torque was measured. With -o OUT.csv, and if there is a shift, it also writes
     ///
     ///   OUT_report.html   the drive and each shift as figures; opens from disk
     ///   OUT_shifts.csv, OUT_shifts.json   the shifts as numbers
     ///
-    /// if there is a shift. --shift and --shifts choose shifts; the estimate then has only their rows.
+    /// --shift and --shifts choose shifts; the estimate then has only their rows.
     ///
     /// With the vehicle file of a car with a gearbox, both clutches of every shift are estimated from a log with the
     /// columns that `simulate` writes for a drive, or by a channel map with the commands of all elements:
@@ -185,32 +190,32 @@ pub(crate) enum Command {
     ///
     /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
     /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
-    /// appears when it contains all rows; it cannot be the log itself. A log of which a signal is unusable in most samples,
-    /// or in another unit by all appearances, is an error.
+    /// appears when it contains all rows; it cannot be the log itself. A log is refused if a signal is unusable in most of
+    /// its samples, or if the values of a signal contradict its unit.
     #[command(verbatim_doc_comment)]
     Estimate(Estimate),
     /// Fit a vehicle file to logs of measured shifts
     ///
-    /// Finds the power-on upshifts of the vehicle's gears in the logs and fits converter, clutch, valve, inertias, shafts, tyres,
-    /// mass and delays to them. Prints each value with its interval, what these logs do not identify, and which measurement would. Writes
-    /// the vehicle file with the fitted values; comments and all other keys stay, and the error budget follows from the fit.
+    /// Fits converter, clutches, valves, inertias, shafts, mass and delays to the logs. For a car with a gearbox it uses every
+    /// shift from one clutch to another and the driving between them; for a vehicle file of one shift its power-on upshifts.
+    /// Prints each value with its interval, what these logs do not identify, and which measurement would. Writes the vehicle
+    /// file with the fitted values; comments and all other keys stay, and the error budget follows from the fit.
     ///
-    /// Needs engine, turbine and output speed and the command of the oncoming clutch's valve. Used where the log has them:
-    /// wheel speed, command of the offgoing clutch's valve, engine torque, pressure of the oncoming clutch. Columns with
-    /// the names of `estimate` need no channel map. The last fifth of the shifts is held out to check the result.
+    /// Needs the signals of `estimate`. Used where the log has them: wheel speed, engine torque, measured pressures. Columns
+    /// with the names of `estimate` need no channel map. A fifth of the shifts is held out to check the result.
     ///
-    /// Where the fitted values are worse on those, or end at the limit of what is held possible, the new file has the given values
-    /// and the reason in its first line; a warning reports it, and the exit code is 0. Without a fit no file is written; the exit code
-    /// is 1 or 2.
+    /// If the fitted values are worse on the shifts that are held out, or end at the limit of their prior, the given values are
+    /// kept. The new file then has the reason in its first line, a warning reports it, and the exit code is 0. Without a fit no
+    /// file is written, and the exit code is 1 or 2.
     ///
     ///   wetclutch fit drive1.mf4 drive2.mf4 --map map.toml --vehicle car.toml -o fitted.toml
     #[command(verbatim_doc_comment)]
     Fit(Fit),
     /// Write a first vehicle file for a car from a few numbers
     ///
-    /// Writes a short vehicle file: with --gearbox for all gears of an automatic, with --ratios for one upshift. What is not in it is
-    /// a default, scaled to the car where it depends on its size. What an estimate uses and somebody may know stands in it as comments.
-    /// `check` lists the defaults, and reports which values matter most for the estimate; `fit` finds them from logs.
+    /// Writes a short vehicle file: with --gearbox for all gears of an automatic, with --ratios for one upshift. All other
+    /// values are defaults, scaled to the size of the car. Comments in the file list values that you may know and that change the
+    /// estimate. `check` lists the defaults and shows which values matter most for the estimate; `fit` identifies them from logs.
     ///
     ///   wetclutch init --gearbox 8hp --mass-kg 1900 --wheel-radius-m 0.33 --final-ratio 2.8 --engine-torque-n-m 400 -o car.toml
     ///   wetclutch init --ratios 4.17,2.34 --mass-kg 1650 --wheel-radius-m 0.32 --final-ratio 3.2 --engine-torque-n-m 250 -o car.toml
@@ -235,7 +240,7 @@ pub(crate) enum Command {
     /// Runs every observer of an experiment file on every scenario of the file. All observers get the same drives; the
     /// built-in bench runs them at 100 Hz with real sensors. Prints the RMS error of each observer in each phase, and its
     /// ratio to the RMS error of the open loop; with -o, also writes them as a page. experiments/field.toml is a bench of
-    /// errors of the readings: scale, delays, outliers, lost readings, channels with clocks of their own.
+    /// errors of the readings: scale, delays, outliers, lost readings, channels with separate clocks.
     ///
     /// With the vehicle file of a car with a gearbox: every shift between neighbouring gears, up and down, with power and
     /// without, each in --draws cars, estimated by the gearbox filter and by the open loop. Prints the RMS errors of the
@@ -246,8 +251,9 @@ pub(crate) enum Command {
     Bench(Bench),
     /// Run thousands of shifts with varied parameters
     ///
-    /// Runs a study file: an experiment in which any numbers of car, drive, controller, valves and sensors vary; or a drive, or
-    /// shifts, of many cars with a gearbox, which differ in friction, valves and converter (no page and figures). Writes
+    /// Runs a study file. A study of one shift varies any numbers of car, drive, controller, valves and sensors of an
+    /// experiment. A study of cars with a gearbox simulates a drive, or shifts, of many cars that differ in friction, valves
+    /// and converter; it writes no page and no figures. Writes
     ///
     ///   runs.csv, runs.parquet    one row for each run: factors, seed, status, shift quality, scores
     ///   study.html                distributions, sensitivity of the error, worst runs; opens from disk
@@ -272,7 +278,7 @@ pub(crate) enum Command {
     ErrorBound(ErrorBoundOptions),
     /// Search a study's factors for the run with the largest error of an observer
     ///
-    /// Makes the runs of a study, then continues from the worst of them with the simplex method of Nelder and Mead.
+    /// Runs the study, then continues from its worst runs with the simplex method of Nelder and Mead.
     #[command(verbatim_doc_comment)]
     WorstCase(WorstCaseOptions),
     /// Show the effect of the pressure, and of each error, on the speeds
@@ -280,8 +286,9 @@ pub(crate) enum Command {
     /// Reads the error bounds of a vehicle file. For each phase it prints the equivalent pressure error of each of them,
     /// and whether an observer can distinguish the error from a pressure.
     ///
-    /// With the vehicle file of a car with a gearbox: what each error does to the estimate of every shift between neighbouring gears, and
-    /// in which of them the speeds show nothing of the clutch torque, so that the estimate is that of the valve model.
+    /// For a car with a gearbox it prints the effect of each error on the estimate of every shift between neighbouring gears.
+    /// It also lists the shifts in which the clutch torque is not observable by the speeds; there the estimate is the valve
+    /// model's.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
     /// Check vehicle, gearbox, experiment, drive and study files
@@ -291,13 +298,13 @@ pub(crate) enum Command {
     /// and missing keys and all values outside their ranges. All files are checked; the exit code is that of the worst.
     /// Warns of given gains that are unstable at a vertex.
     ///
-    /// Of a vehicle file it lists what the file leaves to defaults, and which of them matter most: the RMS change of the estimated
-    /// pressure and clutch torque in the torque and inertia phase of a simulated upshift, where each default is off by as much as the
-    /// error budget or a stated fraction allows. --all shows every one.
+    /// For a vehicle file it lists the values that are defaults, and which of them matter most. The measure is the RMS change of
+    /// the estimated pressure and clutch torque in a simulated upshift when one default is wrong by its error bound, or by a
+    /// stated fraction. --all shows every one.
     ///
-    /// Of a gearbox file, or of a vehicle file that names one, it prints the gears with ratios and holding torques, the capacity of
-    /// the elements, and the shifts with their elements. Warns of elements of a car that slip at full throttle. With -o it draws
-    /// the gearbox:
+    /// For a gearbox file, or a vehicle file that names one, it prints the gears with ratios and holding torques, the capacity of
+    /// the elements, and the shifts with their elements. Warns of elements that slip at full throttle. With -o it draws the
+    /// gearbox:
     ///
     ///   train.svg      shafts, planetary sets, gear pairs and elements
     ///   gear_NAME.svg  the same in a gear: engaged elements, shaft speeds, levers of the sets
@@ -392,8 +399,7 @@ pub(crate) struct Check {
     /// Vehicle, gearbox, experiment, drive, study, bounds or sensors files, or channel maps
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// File whose table `sensors` describes how the speeds of a car with a gearbox are read; default: those of
-    /// experiments/bench.toml
+    /// File whose table `sensors` describes the sensors of a car with a gearbox; default: those of experiments/bench.toml
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
     /// Folder for the diagrams of a gearbox
@@ -419,16 +425,16 @@ pub(crate) struct Export {
     /// All shifts of the car, as without --shift
     #[arg(long, conflicts_with = "shift")]
     pub(crate) all: bool,
-    /// File whose table `sensors` describes how the speeds are read; default: readings of the moment with usual noise
+    /// File whose table `sensors` describes the sensors; default: readings without delay, with usual noise
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
-    /// Linked program of the controller with these parameters: its addresses go into the .a2l; fails if its parameters are others
+    /// Linked program of the controller: its addresses go into the .a2l. Fails if it has the parameters of another car or version
     #[arg(long, value_name = "FIRMWARE.elf")]
     pub(crate) check_elf: Option<PathBuf>,
-    /// Models for co-simulation as well (FMI 2.0 and 3.0), with this shared library of embedded/fmu; repeat it for another platform
+    /// Also write the filter for co-simulation (FMI 2.0 and 3.0), with this shared library of embedded/fmu; repeat it for another platform
     #[arg(long, value_name = "LIBRARY")]
     pub(crate) fmu: Vec<PathBuf>,
-    /// Models of the simulated car with its shift controller as well, with this shared library of embedded/car_fmu
+    /// Also write the simulated car with its shift controller for co-simulation, with this shared library of embedded/car_fmu
     #[arg(long, value_name = "LIBRARY")]
     pub(crate) car_fmu: Vec<PathBuf>,
     /// Folder for the files

@@ -70,7 +70,7 @@ pub(crate) struct Reproduce {
     /// Print the rows as JSON
     #[arg(long)]
     pub(crate) json: bool,
-    /// Number of settings in which the statements are tested; default and most: all of experiments/plausible.toml
+    /// Number of settings in which the statements are tested; default and maximum: all of experiments/plausible.toml
     #[arg(long, value_name = "N")]
     pub(crate) settings: Option<u32>,
     #[command(flatten)]
@@ -82,17 +82,17 @@ pub(crate) struct Bench {
     /// Experiment file with scenario tables; default: the built-in experiments/bench.toml
     #[arg(conflicts_with = "vehicle")]
     pub(crate) experiment: Option<PathBuf>,
-    /// Vehicle file with a gearbox: every shift between its neighbouring gears, in every kind
+    /// Vehicle file with a gearbox: every shift between neighbouring gears, of every kind
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Cars sampled for each shift, whose friction, valve gains, converter and strokes of pistons differ from those of the vehicle file
+    /// Number of cars sampled for each shift; friction, valve gains, converter and piston strokes differ from the vehicle file
     #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "vehicle")]
     pub(crate) draws: u32,
-    /// Seed of the first car; each next one has the next seed
+    /// Seed of the first car; the next cars have the next seeds
     #[arg(long, value_name = "N", default_value_t = 1, requires = "vehicle")]
     pub(crate) seed: u64,
-    /// File whose table `sensors` describes how the speeds are read; default: those of experiments/bench.toml
+    /// File whose table `sensors` describes the sensors; default: those of experiments/bench.toml
     #[arg(long, value_name = "SENSORS.toml", requires = "vehicle")]
     pub(crate) sensors: Option<PathBuf>,
     /// Folder for the page, and for the table of shifts (bench.csv)
@@ -119,12 +119,12 @@ pub(crate) struct StudyOptions {
     /// Complete the unfinished study in the folder
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Make only the Ith of N equal parts
+    /// Run only the Ith of N equal parts
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<Shard>,
     #[command(flatten)]
     pub(crate) threads: Threads,
-    /// Make only this run again, and write all its signals and its figure
+    /// Repeat only this run, and write all its signals and its figure
     #[arg(long, value_name = "RUN", allow_negative_numbers = true, conflicts_with_all = ["resume", "shard", "open"])]
     pub(crate) run: Option<u64>,
     /// Print files and errors as JSON
@@ -176,8 +176,7 @@ pub(crate) struct ErrorBoundOptions {
 pub(crate) struct SensitivityOptions {
     /// Vehicle file; default: the built-in car
     pub(crate) vehicle: Option<PathBuf>,
-    /// File whose table `sensors` describes how the speeds of a car with a gearbox are read; default: those of
-    /// experiments/bench.toml
+    /// File whose table `sensors` describes the sensors of a car with a gearbox; default: those of experiments/bench.toml
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
     /// Folder for the page
