@@ -132,20 +132,23 @@ fn values_that_are_not_written_leave_the_given_file_with_the_reason_and_no_failu
     let found: serde_json::Value = serde_json::from_str(&printed(&output)).unwrap();
     assert!((&found["json_version"], &found["shifts"]) == (&1.into(), &1.into()), "{found}");
     let reason = found["given_values_kept_because"].as_str().unwrap();
-    assert!(reason.starts_with("at the end of what is held possible: "), "{found}");
+    assert!(reason.starts_with("at the limit of the prior (4 standard deviations): "), "{found}");
     for parameter in found["parameters"].as_array().unwrap() {
         let [lower, value, upper] = ["lower", "value", "upper"].map(|name| parameter[name].as_f64().unwrap());
         assert!(lower <= value && value <= upper && parameter["unit"].is_string(), "{parameter}");
     }
     assert!(
-        said(&output).contains("warning: the given values are kept: at the end of what is held possible: "),
+        said(&output)
+            .contains("warning: the given values are kept: at the limit of the prior (4 standard deviations): "),
         "{}",
         stderr(&output)
     );
     let text = folder.read("fitted.toml");
     let (head, rest) = text.split_once('\n').unwrap();
     assert!(
-        head.starts_with("# fit: all values are those of the given file. at the end of what is held possible: "),
+        head.starts_with(
+            "# fit: all values are those of the given file. at the limit of the prior (4 standard deviations): "
+        ),
         "{head}"
     );
     assert_eq!(rest, std::fs::read_to_string(VEHICLE).unwrap());

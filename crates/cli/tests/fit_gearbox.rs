@@ -46,7 +46,7 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     // The ratio of two frictions does not contain the common factor of all torques; in the given file it is 15 % low.
     let ratio = clutch_e[0] / clutch_c[0];
     assert!((ratio / 1.15 - 1.0).abs() < 0.12, "{ratio}: {table}");
-    assert!(!table.contains("they do not ask for another file"), "{table}");
+    assert!(!table.contains("these logs do not contradict the file"), "{table}");
     let page = folder.read("fit.html");
     assert!(page.matches("class=\"interval\"").count() > 10 && page.contains("E: friction x valve gain"));
     for words in [

@@ -309,7 +309,7 @@ fn commands_that_come_late_keep_the_given_file() {
     let log = folder.write("late.csv", log);
     let text = shown(&wetclutch(&["fit", &log, "--vehicle", &car(), "-o", &folder.path("fitted.toml")]));
     assert!(text.contains("warning: the commands of these logs are 8"), "{text}");
-    assert!(text.contains("Then fit again. The values above are those with commands at the right times"), "{text}");
+    assert!(text.contains("Then fit again. The values above are those with corrected times of the commands"), "{text}");
 }
 
 #[test]

@@ -76,14 +76,15 @@ impl Fit {
         if !self.freed.is_empty() {
             let names: Vec<&str> = self.freed.iter().map(|map| map.name()).collect();
             lines.push(format!(
-                "freed, because the shifts ask for another shape than the file's: {} (level {LEVEL})",
+                "shape fitted too, because the shifts contradict the shape in the file: {} (level {LEVEL})",
                 names.join(", ")
             ));
         }
         lines.extend(self.misfits());
         if self.freed.is_empty() && self.given_is_possible() {
             lines.push(
-                "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned(),
+                "every value of the given vehicle file is within its interval: these logs do not contradict the file"
+                    .to_owned(),
             );
         }
         lines.push(self.torque_said());
@@ -116,11 +117,12 @@ impl Fit {
         let change = &self.torque_change;
         let open = SIDES * change.open_n_m;
         let mut text = format!(
-            "clutch torque in these shifts at the same commands: changed by {:.1} N m RMS, of which +- {open:.1} N m is open",
+            "clutch torque in these shifts at the same commands: changed by {:.1} N m RMS, of which +- {open:.1} N m is not identified",
             change.rms_n_m
         );
         if change.rms_n_m <= open {
-            text += ". These logs are too few, or contain too little information, to show that the fitted file is better than the given one";
+            text +=
+                ". These logs have too little information to show that the fitted file is better than the given one";
         }
         text
     }
@@ -134,13 +136,12 @@ impl Fit {
         };
         if self.driving_s == 0.0 {
             return format!(
-                "driving between shifts is not fitted: no log has enough of it with the engine pulling in the gears of the file{reasons}. It would identify \
-                 the mass"
+                "driving between shifts is not fitted: no log has enough driving with the accelerator pressed in the gears of the file{reasons}. It would identify the mass"
             );
         }
         let [_, mass] = self.combination_sd(&[(Parameter::Mass, 1.0), (Parameter::Capacity, -1.0)]);
         format!(
-            "driving between shifts: {:.0} s in gear with the engine pulling{reasons}. Mass over converter capacity is known within +- {:.1} %. {MEAN_GRADE}",
+            "driving between shifts: {:.0} s in gear with the accelerator pressed{reasons}. Mass over converter capacity is known within +- {:.1} %. {MEAN_GRADE}",
             self.driving_s,
             100.0 * SIDES * mass
         )
@@ -149,13 +150,12 @@ impl Fit {
     fn misfits(&self) -> Vec<String> {
         let wrong = |(channel, _, gain): &(Channel, f64, f64)| *channel == Channel::Turbine && *gain > MISFIT_GAIN;
         let warn = |_: &(Channel, f64, f64)| {
-            "warning: the model does not follow the turbine speed: its errors last. The converter or the valve works in another way \
-             than in the vehicle file, which the fit does not change; the intervals are too small"
+            "warning: the model does not follow the turbine speed: its errors do not decay. Converter or valve differ from the vehicle file in a way that the fit does not change; the intervals are too small"
                 .to_owned()
         };
         let limited = (!self.at_limit.is_empty()).then(|| {
             format!(
-                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not that \
+                "warning: at the limit of the prior (4 standard deviations): {}. The vehicle file is not of this car, or a signal is not that \
                  of the channel map; do not use the fitted file before the reason is known",
                 self.at_limit.join(", ")
             )
@@ -163,9 +163,7 @@ impl Fit {
         let finer = (!self.misfits.is_empty()).then(|| {
             let names: Vec<&str> = self.misfits.iter().map(|map| map.name()).collect();
             format!(
-                "warning: the shifts do not follow the fitted model: they need another shape of {} than the fit gives it (Hotelling's T2 \
-                 over the shifts, level {LEVEL}), or for what no map of the vehicle file has. The intervals contain how far that moves the \
-                 values",
+                "warning: the shifts contradict the fitted model (Hotelling's T2 over the shifts, level {LEVEL}): the shape of {} differs from any that the fit can give it, or the car has an effect that no map of the vehicle file describes. The intervals contain the effect on the values",
                 names.join(", ")
             )
         });

@@ -106,7 +106,7 @@ impl Fit {
 /// shifts that were held out, with the given and with the fitted file.
 pub(crate) fn reason_to_keep(at_limit: &[String], checked: Option<(usize, [f64; 2])>, error: &str) -> Option<String> {
     if !at_limit.is_empty() {
-        return Some(format!("at the end of what is held possible: {}", at_limit.join(", ")));
+        return Some(format!("at the limit of the prior (4 standard deviations): {}", at_limit.join(", ")));
     }
     let (shifts, [given, fitted]) = checked?;
     // An error that is not a number counts against the fit.

@@ -119,7 +119,7 @@ impl WheelFit {
                 )
             }
             verdict => format!(
-                "stiffness of the drive shafts: x {:.3} +- {half:.0} %, {}; the common factor of all torques is in it. Their damping is not looked for",
+                "stiffness of the drive shafts: x {:.3} +- {half:.0} %, {}; the common factor of all torques is in it. Their damping is not fitted",
                 self.stiffness_factor(),
                 verdict.name()
             ),

@@ -18,7 +18,7 @@ const SIDES_OF_ALL: f64 = 3.3;
 
 /// What no shift tells, or no fit looks for, and which manoeuvre would identify it.
 const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, damping of the drive shafts, tyres, hysteresis of the valves and the shapes of all maps. \
-     The intervals contain what a hysteresis within the error bounds may do; a smaller `valve_hysteresis_pa` there, where it is known, narrows them";
+     The intervals contain the effect of any hysteresis within the error bounds; a smaller `valve_hysteresis_pa`, where it is known, narrows them";
 
 impl GearboxFit {
     /// The table: each quantity of which a fitted shift can tell something.
@@ -94,10 +94,10 @@ impl GearboxFit {
         let mut lines = vec![
             format!(
                 "torque scale: not identified by these logs, +- {scale:.1} %. Speeds fix the ratios of all torques and inertias and not their common \
-                 factor; it comes from what was known before of {} together, and is in every interval",
+                 factor; it follows from the prior of {} together, and is in every interval",
                 self.anchors()
             ),
-            format!("besides that factor, friction x valve gain is known within +- {}", seen.join(", ")),
+            format!("apart from that factor, friction x valve gain is known within +- {}", seen.join(", ")),
             self.said_of_gain(),
         ];
         lines.extend(correlated::statement(&self.stated, |at| {
@@ -113,7 +113,8 @@ impl GearboxFit {
             Some(said_of_offset(&format!("the pressure of {}", self.quantities.elements[at]), &change))
         }));
         lines.extend(self.given_is_possible().then(|| {
-            "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
+            "every value of the given vehicle file is within its interval: these logs do not contradict the file"
+                .to_owned()
         }));
         lines.extend(self.said_of_kept());
         lines.extend(self.warnings());
@@ -156,7 +157,7 @@ impl GearboxFit {
         let beside = |quantity| 100.0 * SIDES * self.sd_beside_scale(quantity);
         match self.balances.reason(Balance::Car) {
             None => lines.push(format!(
-                "mass and road load from {:.0} s in gear with the engine pulling: besides the common factor of all torques, the mass is known within +- \
+                "mass and road load from {:.0} s in gear with the accelerator pressed: apart from the common factor of all torques, the mass is known within +- \
                  {:.1} %. {MEAN_GRADE}",
                 self.driving_s[0],
                 beside(Quantity::Mass)
@@ -167,8 +168,7 @@ impl GearboxFit {
         }
         match self.balances.reason(Balance::Engine) {
             None => lines.push(format!(
-                "the reported engine torque is used in {:.0} s in gear: its scale is known before within +- {:.1} % and counts for the common factor \
-                 of all torques",
+                "the reported engine torque is used in {:.0} s in gear: its prior scale is within +- {:.1} %, which bounds the common factor of all torques",
                 self.driving_s[1],
                 100.0 * SIDES * self.sd_before(Quantity::ReportedScale)
             )),
@@ -200,8 +200,7 @@ impl GearboxFit {
         if !others.is_empty() {
             let between = if text.is_empty() { "" } else { "; " };
             text += &format!(
-                "{between}friction and valve gain are not identified separately for {others}: their product stands in the file as friction, and the kiss \
-                 point is that of the valve's maps. A measured pressure of an element would identify them"
+                "{between}friction and valve gain are not identified separately for {others}: the file has their product as friction, and the kiss point is that of the valve's maps. A measured pressure of an element would identify them"
             );
         }
         text
@@ -219,7 +218,8 @@ impl GearboxFit {
         let is_off = engine.is_some_and(|late_s| late_s.is_off_by(MIN_DELAY_S));
         if is_off || self.channels.late_s() != [0.0; 2] {
             lines.push(
-                "the fit has counted with these delays of output and engine speed in the shifts; `estimate` needs them in the channel map".to_owned(),
+                "the fit used these delays of output and engine speed; `estimate` needs them in the channel map"
+                    .to_owned(),
             );
         }
         lines
@@ -258,8 +258,7 @@ impl GearboxFit {
         let kept: Vec<String> = self.drawn_off.iter().map(name).collect();
         (!kept.is_empty()).then(|| {
             format!(
-                "M11 of {} stays as in the given file: these logs do not identify it, and the value that they lead to is outside of what was known before. Where the \
-                 turbine changes its speed slowly it is what small errors of large torques leave, as of a hysteresis. A smaller \
+                "M11 of {} stays as in the given file: these logs do not identify it, and the fitted value is outside the 95 % interval of its prior. Where the turbine changes its speed slowly, the inertia torque is as small as the errors of the clutch torques, such as a hysteresis. A smaller \
                  `valve_hysteresis_pa` in the error bounds, where it is known, or quicker shifts would identify it",
                 kept.join(", ")
             )
@@ -270,29 +269,27 @@ impl GearboxFit {
         let mut lines = Vec::new();
         lines.extend(self.commands_late_s().map(|late_s| {
             format!(
-                "warning: {}. The values above are those with commands at the right times",
+                "warning: {}. The values above are those with corrected times of the commands",
                 said_of_commands(late_s)
             )
         }));
         if !self.contradicted.is_empty() {
             let names = self.contradicted.iter().filter_map(|place| self.quantities.elements.get(*place));
             lines.push(format!(
-                "warning: the measured pressure of {} is not that of its commands with any valve of the error bounds: it is not used. Unit, sign or offset \
-                 of the channel may be wrong, or it is of another element",
+                "warning: the measured pressure of {} contradicts its command for every valve within the error bounds: it is not used. Unit, sign or offset of the channel may be wrong, or the sensor is at another element",
                 names.map(String::as_str).collect::<Vec<_>>().join(", ")
             ));
         }
         if self.torque_misfit > MISFIT {
             lines.push(format!(
-                "warning: the shifts need torques that the model cannot give: their errors are {:.1} times what drag and the converter's \
-                 maps explain. The vehicle file is not of this car, its maps have another shape, or a signal is not that of the channel map; \
+                "warning: the shifts contradict the model: the errors of the torques are {:.1} times those that drag and the converter's maps explain. The vehicle file is not of this car, its maps have another shape, or a signal is not that of the channel map; \
                  the intervals are too small",
                 self.torque_misfit
             ));
         }
         if !self.at_limit.is_empty() {
             lines.push(format!(
-                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not that \
+                "warning: at the limit of the prior (4 standard deviations): {}. The vehicle file is not of this car, or a signal is not that \
                  of the channel map; do not use the fitted file before the reason is known",
                 self.at_limit.join(", ")
             ));
@@ -311,7 +308,7 @@ impl GearboxFit {
             .map(|(name, _)| name.as_str())
             .collect();
         if !without.is_empty() {
-            lines.push(format!("no fitted shift has {}: they stay as they are", without.join(", ")));
+            lines.push(format!("no fitted shift uses {}: their values are not changed", without.join(", ")));
         }
         let names = |is: &dyn Fn(usize) -> bool| {
             let named =
@@ -339,8 +336,7 @@ impl GearboxFit {
         });
         if !one_way.is_empty() {
             lines.push(format!(
-                "to know more: to separate inertia and friction, shifts with the accelerator pressed and released between {}: so far there are only \
-                 those of one of both",
+                "to know more: to separate inertia and friction, shifts with the accelerator pressed and released between {}: these logs have only one of the two",
                 one_way.join(", ")
             ));
         }

@@ -69,7 +69,7 @@ fn scale_and_delay_of_the_wheel_speed_and_the_stiffness_lie_in_their_intervals()
         format!("wheel_speed is {:+.1} +- ", 1e3 * found.late_s.value),
         format!("output_speed is {:+.1} +- ", 1e3 * output.late_s.value),
         format!("engine_speed is {:+.1} +- ", 1e3 * engine.value),
-        "the fit has counted with these delays of output and engine speed".to_owned(),
+        "the fit used these delays of output and engine speed".to_owned(),
         "the speeds show only the product".to_owned(),
         "stiffness of the drive shafts: x ".to_owned(),
     ] {
