@@ -1,4 +1,4 @@
-"""Searches the built site for each word of the glossary, each key, column, option and message: `python3 .ci/search.py target/site`. Fails where the page is not found."""
+"""Searches the built site for the questions of a newcomer, and for each word of the glossary, each key, column, option and message: `python3 .ci/search.py target/site`. Fails where the page is not found."""
 
 import html
 import json
@@ -8,6 +8,30 @@ from pathlib import Path
 
 SITE = Path(sys.argv[1])
 PAGES = SITE.parent / "site-pages" / "reference"
+
+
+# Questions of a newcomer, in the words that one would type, and the page that answers each.
+QUESTIONS = [
+    ("install", "how-to/install.html"),
+    ("record log channels", "how-to/record-a-log.html"),
+    ("accuracy after fit", "explanation/results.html"),
+    ("filter or valve maps", "how-to/choose-an-observer.html"),
+    ("M11", "how-to/describe-a-gearbox.html"),
+    ("plates kiss point spring", "how-to/describe-a-gearbox.html"),
+    ("python pip install", "how-to/use-from-python.html"),
+    ("matlab", "how-to/use-from-matlab.html"),
+    ("simulink", "how-to/use-from-matlab.html"),
+    ("good bad report", "how-to/read-ranges-and-certificates.html"),
+    ("fit keeps given file", "how-to/when-a-fit-keeps-the-file.html"),
+    ("not identifiable", "explanation/fit.html"),
+    ("sample rate hz", "how-to/record-a-log.html"),
+    ("freewheels", "reference/gearbox-file.html"),
+    ("sprags", "reference/gearbox-file.html"),
+    ("no wheel speed", "explanation/limits.html"),
+    ("ecu", "how-to/put-on-a-controller.html"),
+    ("tcu", "how-to/put-on-a-controller.html"),
+    ("cite", "index.html"),
+]
 
 
 def terms(text, separator):
@@ -25,6 +49,7 @@ def first_cells(page):
 
 def asked():
     """What is searched for, and the page that has to be found."""
+    yield from QUESTIONS
     for cell in first_cells("glossary"):
         yield from ((word.strip("` *"), "") for word in cell.split(", ") if word != "word")
     for page in ("keys", "columns"):
