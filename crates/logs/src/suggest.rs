@@ -54,6 +54,10 @@ fn fit(entry: &Words, channel: &Channel) -> Option<Fit> {
         return None;
     }
     let unit = Unit::parse(&channel.unit).filter(|_| !channel.unit.trim().is_empty());
+    // A short name is the speed of a car only by its unit: `v` may be a voltage.
+    if entry.role == Role::VehicleSpeed && vague && !exact && unit.is_none() {
+        return None;
+    }
     // A percentage by its name, where the log does not say the unit.
     let is_fraction = unit.is_none() && met(&["percent", "pct", "prozent"], &words);
     let unit_fits = match (entry.role.quantity(), unit) {

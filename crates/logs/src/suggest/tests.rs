@@ -15,6 +15,28 @@ fn suggested(channels: &[Channel]) -> Vec<(String, String)> {
 }
 
 #[test]
+fn a_short_name_with_a_unit_of_velocity_is_the_speed_of_the_car() {
+    for (name, unit) in [
+        ("v_kmh", "km/h"),
+        ("speed_kmh", "km/h"),
+        ("speed_mph", "mph"),
+        ("speed", "km/h"),
+        ("v", "m/s"),
+        ("GPS_Speed", "km/h"),
+        ("vehspd", ""),
+    ] {
+        let found = suggested(&[channel("N_Eng", "rpm"), channel(name, unit)]);
+        assert!(found.contains(&("vehicle_speed".to_owned(), name.to_owned())), "{name}: {found:?}");
+    }
+    // Of another unit, or of none, it may be anything, and a name that says more comes first.
+    for (name, unit) in [("v", "V"), ("v", ""), ("speed", ""), ("speed", "rpm")] {
+        assert!(!suggested(&[channel(name, unit)]).iter().any(|(role, _)| role == "vehicle_speed"), "{name} {unit}");
+    }
+    let both = suggested(&[channel("speed_kmh", "km/h"), channel("VehicleSpeed", "km/h")]);
+    assert_eq!(both, [("vehicle_speed".to_owned(), "VehicleSpeed".to_owned())]);
+}
+
+#[test]
 fn usual_names_in_two_languages_are_found() {
     let logs: [&[(&str, &str, &str)]; 8] = [
         &[
