@@ -168,8 +168,8 @@ fn health(estimated: &EstimatedShift) -> String {
 fn remark(shift: &ShiftEstimate) -> &'static str {
     match (&shift.estimated, shift.of_vehicle) {
         (Some(_), _) => "",
-        (None, true) => "The observer did not see this shift: the command of the valve does not belong to it.",
-        (None, false) => "Not the shift of the vehicle file: no pressure is estimated.",
+        (None, true) => "The observer did not detect this shift: the valve command does not match it.",
+        (None, false) => "This is not the shift of the vehicle file: no pressure is estimated.",
     }
 }
 

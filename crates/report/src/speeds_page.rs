@@ -152,7 +152,7 @@ impl SpeedsPage<'_> {
         }
         let spans: Vec<String> = self.no_slip().iter().map(|span| self.no_slip_text(*span)).collect();
         if !spans.is_empty() {
-            said.push(format!("No slip of the converter, {}.", spans.join("; ")));
+            said.push(format!("No slip of the converter, {}.", first_of(&spans, "; ")));
         }
         let asked = self.shifts.iter().zip(torques).filter_map(|(shift, torque)| {
             let torque = torque.as_ref()?;
@@ -176,15 +176,15 @@ impl SpeedsPage<'_> {
     fn cannot(&self) -> Vec<String> {
         let [minimum, maximum] = TURBINE_SIDE_INERTIA_KG_M2;
         let converter = format!(
-            "Not the torque ratio of the converter: nothing measures the turbine's torque. It is taken as anything from 1 to a line from 2.2 at stall to 1 at speed ratio 0.9; the inertia of the turbine's side as {minimum:.2} to {maximum:.2} kg m². Both are in the ranges."
+            "Torque ratio of the converter: the turbine torque is not measured. The ranges contain every torque ratio from 1 up to a line from 2.2 at stall to 1 at speed ratio 0.9, and every turbine-side inertia from {minimum:.2} to {maximum:.2} kg m²."
         );
         let mut said: Vec<&str> = Vec::new();
         if !self.has_command {
             said.push("No pressure: the log has no valve current, duty cycle or pressure command. With one of them and a vehicle file, the command estimate gives it with its range.");
         }
-        said.push("No torque of a clutch itself: ratios alone do not give the fraction of the turbine torque that a clutch holds. U is that torque at the turbine; friction work does not need it.");
+        said.push("Torque of a single clutch: ratios alone do not give the fraction of the turbine torque that a clutch holds. U is the torque of both at the turbine; the friction work does not depend on it.");
         said.push(
-            "Not how offgoing and oncoming clutch divide U while both carry: that needs the torque on the output side.",
+            "Division of U between offgoing and oncoming clutch while both carry torque: it needs the output torque.",
         );
         if self.converter.is_ok() {
             said.push(&converter);

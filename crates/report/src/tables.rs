@@ -11,7 +11,12 @@ use trace::units::mpa;
 /// A number with these decimals; with an exponent where it is that of a diverged observer, a dash where there is none.
 pub fn number(value: f64, decimals: usize) -> String {
     match value.abs() {
-        size if size < 1e6 => format!("{value:.decimals$}"),
+        size if size < 1e6 => {
+            let text = format!("{value:.decimals$}");
+            // Zero has no sign.
+            let is_zero = !text.contains(|c: char| c.is_ascii_digit() && c != '0');
+            text.strip_prefix('-').filter(|_| is_zero).map_or(text.clone(), str::to_owned)
+        }
         size if size.is_nan() => "–".to_owned(),
         f64::INFINITY => "∞".to_owned(),
         _ => format!("{value:.1e}"),
@@ -26,7 +31,7 @@ pub fn health_meaning(health: Health) -> &'static str {
         Health::ChannelLost => "a channel without usable readings: the estimate is less certain",
         Health::HeldClutchSlips => "a slip of a clutch that should hold: the estimate is less certain",
         Health::Flare => {
-            "a flare: both clutches slip and the turbine runs away; the oncoming clutch carries too little"
+            "a flare: both clutches slip and the turbine speed rises; the oncoming clutch carries too little torque"
         }
         Health::OutsideRange => {
             "an estimate outside its range: the observer has a large error, or the car is outside its error budget"
@@ -42,7 +47,9 @@ pub fn health_meaning(health: Health) -> &'static str {
         }
         Health::CommandRejected => "an unusable valve command: the last usable command is used",
         Health::PressureLimited => "a pressure outside 0 to `pressure_max_pa`: the estimate is that limit",
-        Health::TooSlow => "the gearbox output turns too slowly to be read: the estimate is from the valve model alone",
+        Health::TooSlow => {
+            "the gearbox output is too slow for its speed sensor: the estimate is from the valve model alone"
+        }
         Health::OneWayOverruns => {
             "the one-way clutch of the gear overruns: the car coasts, and the engine does not drive it"
         }
@@ -192,6 +199,7 @@ mod tests {
     #[test]
     fn a_number_of_any_size_is_short() {
         assert_eq!([0.01234, -5.0, f64::NAN].map(|value| number(value, 3)), ["0.012", "-5.000", "–"]);
+        assert_eq!([-0.0004, -0.0006, 0.0].map(|value| number(value, 3)), ["0.000", "-0.001", "0.000"]);
         assert_eq!([1e9, -1e95, f64::INFINITY].map(|value| number(value, 3)), ["1.0e9", "-1.0e95", "∞"]);
     }
 

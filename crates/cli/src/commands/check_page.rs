@@ -83,7 +83,7 @@ fn defaults(taken: &[DefaultTaken]) -> Option<Part> {
         heading: Some(format!("{} defaults", taken.len())),
         content: Content::Table(["key", "value"].map(str::to_owned).to_vec(), rows.collect()),
         caption:
-            "Values that are not in the file. The command without --page says which of them matter most to an estimate."
+            "Values that are not in the file. The command without --page lists those that matter most to an estimate."
                 .to_owned(),
     })
 }

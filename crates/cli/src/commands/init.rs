@@ -164,7 +164,7 @@ fn refuse_existing(path: &Path, text: &str) -> Result<(), Failure> {
 fn say_what_is_next(options: &Init) {
     let file = shell_quoted(&options.output);
     output::note(&format!(
-        "vehicle file: {}\nnext: `wetclutch check {file}` says which of its values matter most; `wetclutch fit LOG --vehicle {file} -o fitted.toml`, \
+        "vehicle file: {}\nnext: `wetclutch check {file}` lists the values that matter most; `wetclutch fit LOG --vehicle {file} -o fitted.toml`, \
          or `wetclutch estimate LOG --vehicle {file}`",
         options.output.shown()
     ));

@@ -241,7 +241,7 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     }
     if hidden(true) > 0 {
         sentences.push(format!(
-            "Of {} garage shifts nothing is estimated: the filter has tables of shifts from one clutch to another only.",
+            "{} garage shifts are not estimated: the filter has equations only for shifts from one clutch to another.",
             hidden(true)
         ));
     }

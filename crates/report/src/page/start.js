@@ -84,7 +84,7 @@ const HELP = [
   [", .", "move the view to the left and to the right"],
   ["n p", "next and previous shift"],
   ["drag", "zoom to a span of time; with Shift, or with one finger, move the view"],
-  ["wheel, pinch", "zoom; the wheel after a click into the figure, Esc gives it back to the page"],
+  ["wheel, pinch", "zoom; the wheel works after a click into the figure, until Esc"],
   ["double click", "show the whole"],
 ];
 const help = make("dialog", { "aria-label": "Keys" },
