@@ -105,6 +105,20 @@ def hints_by_variant(code, text):
     return {variant: "; or ".join(dict.fromkeys(hints)) for variant, hints in found.items()}
 
 
+def call_of(code, place):
+    """Where the call of `wrong` or `meaning` begins that has this place among its arguments."""
+    depth = 0
+    for at in range(place - 1, max(place - 600, 0), -1):
+        depth += (code[at] == ")") - (code[at] == "(")
+        if depth < 0:
+            if re.search(r"\b(wrong|meaning)$", code[max(at - 8, 0) : at]):
+                return at
+            depth = 0
+        if code[at] in ";}":
+            return None
+    return None
+
+
 def messages(path, text):
     """Message, hint and variant of an error, of each literal that is a message. A hint of its own stands in the same function."""
     makes = MAKES if path.relative_to(ROOT).parts[1] not in REASONS else re.compile(MAKES.pattern.replace(r"\bErr\(|", ""))
@@ -124,6 +138,11 @@ def messages(path, text):
             elif found and found[-1][3] == begin and not found[-1][1]:
                 found[-1][1] = literal
             continue
+        call = call_of(code, place)
+        if call and found and found[-1][4] == call:
+            # The second text of a call is the hint.
+            found[-1][1] = found[-1][1] or literal
+            continue
         message, has_hint, hint = literal.partition("\\nhint: ")
         if not has_hint and not literal.startswith("warning") and not makes.search(statement):
             continue
@@ -132,9 +151,9 @@ def messages(path, text):
         if is_prose(message):
             # One that was used before is of another message.
             is_free = waiting and not re.search(r"\bhint\b", code[waiting[0] : place])
-            found.append([message, hint or of_variants.get(variant) or (waiting[1] if is_free else ""), variant, begin])
+            found.append([message, hint or of_variants.get(variant) or (waiting[1] if is_free else ""), variant, begin, call])
             waiting = None
-    return [(message, hint, variant) for message, hint, variant, _ in found]
+    return [(message, hint, variant) for message, hint, variant, *_ in found]
 
 
 def plain(literal):

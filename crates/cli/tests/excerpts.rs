@@ -31,6 +31,7 @@ error: map.toml:3: `channel.engine_speed.delay_s` is 99.5, expected 0 to 10
   |
 3 | delay_s = 99.5
   |           ^^^^
+hint: it is in s: 20 ms is 0.02
 ";
     assert_eq!(said, expected);
 }
@@ -50,6 +51,7 @@ error: map.toml:3: `channel.engine_speed.delay_s` is 99, expected 0 to 10
   |
 3 | delay_s = 99
   |           ^^
+hint: it is in s: 20 ms is 0.02
 ";
     assert_eq!(checked("map.toml", text, &[]), expected);
 }

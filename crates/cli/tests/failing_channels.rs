@@ -230,10 +230,7 @@ fn a_speed_that_ends_before_the_first_shift_leaves_the_open_loop() {
                     let work = column(&shifts, "oncoming_friction_work_j");
                     assert_eq!(work.last().map(String::as_str), Some(""), "{speed}: {shifts}");
                 }
-                assert!(
-                    note.contains("came no more, or was refused, in "),
-                    "{speed} from {from_s} s `{value}`: {note}"
-                );
+                assert!(note.contains("is missing or refused in "), "{speed} from {from_s} s `{value}`: {note}");
                 assert!(
                     !note.contains("units of both speeds") && !note.contains("lock-up"),
                     "{speed} `{value}`: {note}"

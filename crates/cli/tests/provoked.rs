@@ -88,7 +88,7 @@ fn options_for_other_files_are_named() {
     provokes(&["export", &car, "--check-elf", program, "-o", &out], "is not in the program");
     provokes(&["fit", "-", "--vehicle", VEHICLE, "-o", &folder.path("f.toml")], "a fit reads a log twice");
     let library = ["export", &car, "--shift", "1-2", "--fmu", program, "-o", &out];
-    provokes(&library, "not a shared library of a model: it has not the functions of FMI 2.0 and 3.0");
+    provokes(&library, "not a shared library of a model: it lacks the functions of FMI 2.0 and 3.0");
     provokes(&["design", &car, "--observer", "sliding"], "`--observer sliding` has no certificate");
     let of_pipe = ["estimate", "-", "--vehicle", &car, "--learnt", "-"];
     provokes(&of_pipe, "--learnt -: what was learnt is read from a file and written to it");
@@ -327,6 +327,8 @@ fn cars_that_are_not_as_their_file_says_are_warned_of() {
     let faults = std::fs::read_to_string(format!("{ROOT}drives/faults.toml")).unwrap();
     simulated(&faults);
     warned("drive/faults_measured.csv", "warning: one of C, D slips in gear 5, 7 since ");
+    simulated(&faults.replace("element = \"C\"\nfriction_factor = 0.1", "element = \"D\"\nfriction_factor = 0.05"));
+    warned("drive/faults_measured.csv", "in all: no single element explains it\nhint: check the line pressure");
     simulated(&faults.replace(
         "element = \"C\"\nfriction_factor = 0.1\nfrom_s = 60",
         "element = \"E\"\nfriction_factor = 0.03\nfrom_s = 20",

@@ -105,7 +105,8 @@ impl<'a> Check<'a> {
     /// A name that becomes part of tables, file names and pages. Spreadsheets take what begins with one of `=+-@` for a
     /// formula.
     pub(crate) fn name(&self, key: &str, name: &str, offset: usize) -> Result<String, ConfigError> {
-        let wrong = |what: &str| Err(self.meaning(key, offset, format!("a name must not {what}"), None));
+        let hint = || Some("use letters, digits, spaces and underscores, such as \"town 1\"".to_owned());
+        let wrong = |what: &str| Err(self.meaning(key, offset, format!("a name must not {what}"), hint()));
         match name {
             "" => wrong("be empty"),
             _ if name.len() > LONGEST_NAME => wrong(&format!("be longer than {LONGEST_NAME} bytes")),
@@ -121,7 +122,8 @@ impl<'a> Check<'a> {
     pub(crate) fn title(&self, key: &str, title: &Spanned<String>) -> Result<String, ConfigError> {
         if title.get_ref().chars().any(char::is_control) {
             let message = "a title must not contain a line break, tab or other control character".to_owned();
-            return Err(self.meaning(key, title.span().start, message, None));
+            let hint = Some("write the title in one line".to_owned());
+            return Err(self.meaning(key, title.span().start, message, hint));
         }
         Ok(title.get_ref().clone())
     }
@@ -137,7 +139,12 @@ impl<'a> Check<'a> {
         if number.fract() == 0.0 {
             return Ok(number);
         }
-        Err(self.meaning(&key, value.span().start, format!("is {number}, expected an integer"), None))
+        Err(self.meaning(
+            &key,
+            value.span().start,
+            format!("is {number}, expected an integer"),
+            Some("write it without a fraction, such as 4".to_owned()),
+        ))
     }
 
     /// Minimum and maximum, if both lie in the range.
@@ -149,7 +156,12 @@ impl<'a> Check<'a> {
     ) -> Result<[f64; 2], ConfigError> {
         match *self.numbers(&key, values, range)? {
             [minimum, maximum] if minimum <= maximum => Ok([minimum, maximum]),
-            _ => Err(self.meaning(&key, values.span().start, "expected [minimum, maximum]".to_owned(), None)),
+            _ => Err(self.meaning(
+                &key,
+                values.span().start,
+                "expected [minimum, maximum]".to_owned(),
+                Some("two numbers, the smaller one first, such as [0.85, 1.15]".to_owned()),
+            )),
         }
     }
 
@@ -181,11 +193,12 @@ impl<'a> Check<'a> {
         check_axis(points, maximum).map_err(|error| wrong(error.to_string()))?;
         match points.windows(2).position(|pair| pair[1] - pair[0] < apart) {
             None => Ok(points),
-            Some(at) => Err(wrong(format!(
-                "breakpoint {} is less than {} above the breakpoint before it",
-                at + 2,
-                significant(apart)
-            ))),
+            Some(at) => {
+                let message =
+                    format!("breakpoint {} is less than {} above the breakpoint before it", at + 2, significant(apart));
+                let hint = Some("breakpoints rise: remove one of two that are equal, or sort them".to_owned());
+                Err(self.meaning(&key, values.span().start, message, hint))
+            }
         }
     }
 
@@ -225,7 +238,7 @@ impl<'a> Check<'a> {
                 key,
                 name.span().start,
                 format!("two entries have the name \"{}\"", name.get_ref()),
-                None,
+                Some("give one of them another name".to_owned()),
             )),
         }
     }
@@ -259,6 +272,11 @@ impl<'a> Check<'a> {
     ) -> ConfigError {
         let (path, line) = self.layers.place(offset);
         let one_line = |text: String| printable(&text).into_owned();
+        // A message of elsewhere may bring its hint.
+        let (message, hint) = match message.split_once("\nhint: ") {
+            Some((what, of_message)) if hint.is_none() => (what.to_owned(), Some(of_message.to_owned())),
+            _ => (message, hint),
+        };
         let (key, message) = (one_line(key.to_string()), one_line(message));
         ConfigError::Meaning { path, line, key, message, hint: hint.map(one_line) }
     }

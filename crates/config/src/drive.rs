@@ -190,7 +190,12 @@ enum FromTo {
 
 fn check_segments(check: &Check<'_>, raw: &Spanned<Vec<RawSegment>>) -> Result<Vec<DriveSegment>, ConfigError> {
     if raw.get_ref().is_empty() {
-        return Err(check.meaning("segment", raw.span().start, "the drive has no segment".to_owned(), None));
+        return Err(check.meaning(
+            "segment",
+            raw.span().start,
+            "the drive has no segment".to_owned(),
+            Some("add a table [[segment]] with duration_s and throttle".to_owned()),
+        ));
     }
     raw.get_ref().iter().map(|segment| check_segment(check, segment)).collect()
 }
@@ -238,7 +243,8 @@ fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
             let time_s = check.number("shift.time_s", &shift.time_s, 0.0..=1e9)?;
             if listed.last().is_some_and(|&(before, _)| time_s <= before) {
                 let message = format!("is {time_s}, not after the shift before it");
-                return Err(check.meaning("shift.time_s", shift.time_s.span().start, message, None));
+                let hint = Some("list the shifts in the order of their times".to_owned());
+                return Err(check.meaning("shift.time_s", shift.time_s.span().start, message, hint));
             }
             listed.push((time_s, shift.gear.get_ref().clone()));
         }
@@ -261,7 +267,10 @@ fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
     if crossed {
         let message = "is not below `up_input_rad_s` everywhere".to_owned();
         let at = schedule.down_input_rad_s.span().start;
-        return Err(check.meaning("schedule.down_input_rad_s", at, message, None));
+        let hint = Some(
+            "at each throttle the downshift comes at a lower speed of the gearbox input than the upshift".to_owned(),
+        );
+        return Err(check.meaning("schedule.down_input_rad_s", at, message, hint));
     }
     let time_in_gear_s = match &schedule.time_in_gear_s {
         Some(time) => check.number("schedule.time_in_gear_s", time, 0.0..=100.0)?,

@@ -42,15 +42,23 @@ pub(crate) fn of_source(source: &Source, grade_rad: f64) -> Result<SpeedTrace, C
             continue;
         };
         let (Ok(time_s), Ok(speed)) = (time.parse::<f64>(), speed.parse::<f64>()) else {
-            return wrong(begin, format!("\"{text}\" is not two numbers"), "");
+            return wrong(
+                begin,
+                format!("\"{text}\" is not two numbers"),
+                "write time and speed with decimal points, such as 12.5,48.2",
+            );
         };
         let speed_m_s = unit * speed;
         if !(0.0..=FASTEST_M_S).contains(&speed_m_s) {
-            return wrong(begin, format!("the speed is {speed_m_s:.1} m/s, expected 0 to {FASTEST_M_S}"), "");
+            return wrong(
+                begin,
+                format!("the speed is {speed_m_s:.1} m/s, expected 0 to {FASTEST_M_S}"),
+                "check the unit in the first line: speed_km_h, speed_m_s or speed_mph",
+            );
         }
         let follows = points.last().map_or(time_s == 0.0, |(before, _)| time_s > *before && time_s < 1e9);
         if !follows {
-            return wrong(begin, format!("the time is {time_s} s"), "times begin at 0 and rise");
+            return wrong(begin, format!("the time is {time_s} s"), "times begin at 0 and rise, in s");
         }
         points.push((time_s, speed_m_s));
     }
@@ -93,7 +101,7 @@ mod tests {
             ("time_s,speed_km_h\n0,0\n1,-3\n", "the speed is -0.8 m/s, expected 0 to "),
             ("time_s,speed_m_s\n0,0\n1,120\n", "the speed is 120.0 m/s"),
             ("time_s,speed_km_h\n0,0\n1,1\n1,2\n", "t.csv:4"),
-            ("time_s,speed_km_h\n5,0\n6,2\n", "times begin at 0 and rise"),
+            ("time_s,speed_km_h\n5,0\n6,2\n", "times begin at 0 and rise, in s"),
             ("time_s,speed_km_h\n0,0\ninf,2\n", "the time is inf s"),
         ] {
             let error = trace(text).unwrap_err();

@@ -198,7 +198,10 @@ impl Study {
         let factors = raw.factor.get_ref().iter().map(|raw| factor(&check, raw)).collect::<Result<Vec<_>, _>>()?;
         let at = raw.factor.span().start;
         if factors.is_empty() {
-            return Err(check.meaning("factor", at, "a study needs at least one factor".to_owned(), None));
+            let hint = Some(
+                "add a table [[factor]], such as key = \"car.vehicle.mass_kg\", range = [1400.0, 1800.0]".to_owned(),
+            );
+            return Err(check.meaning("factor", at, "a study needs at least one factor".to_owned(), hint));
         }
         let of_observer = |name: &str| experiment.observers.iter().any(|o| name.starts_with(&(o.column() + ".")));
         let own =
@@ -246,12 +249,13 @@ impl Study {
             for value in factor.values.trials() {
                 self.with(&[(factor, value)]).map_err(|error| {
                     let place = raw.factor.get_ref()[i].key.span().start;
-                    check.meaning(
-                        &factor.key,
-                        place,
-                        format!("the value {value} of the factor is refused: {}", error.what()),
-                        None,
-                    )
+                    let what = error.what();
+                    let (what, of_error) =
+                        what.split_once("\nhint: ").map_or((what.as_str(), None), |(what, hint)| (what, Some(hint)));
+                    let message = format!("the value {value} of the factor is refused: {what}");
+                    let hint = "every value of a factor must be within the range of its key; a factor with \
+                                `change = \"scale\"` multiplies the value of the file";
+                    check.meaning(&factor.key, place, message, Some(of_error.unwrap_or(hint).to_owned()))
                 })?;
             }
         }
@@ -378,11 +382,19 @@ fn runs(check: &Check<'_>, raw: &RawStudy, factors: &[Factor]) -> Result<u64, Co
         });
     }
     let Some(runs) = &raw.runs else {
-        return Err(meaning(0, format!("the plan {} needs a number of runs", raw.plan.name()), None));
+        return Err(meaning(
+            0,
+            format!("the plan {} needs a number of runs", raw.plan.name()),
+            Some("add `runs`, such as runs = 500".to_owned()),
+        ));
     };
     let (place, runs) = (runs.span().start, *runs.get_ref());
     if runs == 0 || runs > MAX_RUNS {
-        return Err(meaning(place, format!("{runs} is not between 1 and {MAX_RUNS}"), None));
+        return Err(meaning(
+            place,
+            format!("{runs} is not between 1 and {MAX_RUNS}"),
+            Some("some hundred runs show a distribution, such as runs = 500".to_owned()),
+        ));
     }
     let group = factors.len() as u64 + 2;
     if raw.plan == Plan::Saltelli && !runs.is_multiple_of(group) {
@@ -390,7 +402,7 @@ fn runs(check: &Check<'_>, raw: &RawStudy, factors: &[Factor]) -> Result<u64, Co
         return Err(meaning(
             place,
             message,
-            Some(format!("{} or {}", runs / group * group, (runs / group + 1) * group)),
+            Some(format!("use {} or {} runs", runs / group * group, (runs / group + 1) * group)),
         ));
     }
     Ok(runs)
@@ -413,14 +425,18 @@ fn factor(check: &Check<'_>, raw: &RawFactor) -> Result<Factor, ConfigError> {
         }
     };
     let Some(last) = path.last() else {
-        return Err(meaning("the key is a whole file, expected the key of a number", None));
+        return Err(meaning(
+            "the key is a whole file, expected the key of a number",
+            Some("such as car.vehicle.mass_kg"),
+        ));
     };
     let values = values::values(check, key, place, raw)?;
     let (name, place) = raw.name.as_ref().map_or((last, place), |name| (name.get_ref(), name.span().start));
     let name = check.name("factor.name", name, place)?;
     if name.contains(',') {
         let message = "the name of a factor is also the name of its column, and must not contain a comma".to_owned();
-        return Err(check.meaning("factor.name", place, message, None));
+        let hint = Some("use an underscore instead".to_owned());
+        return Err(check.meaning("factor.name", place, message, hint));
     }
     Ok(Factor { name, key: key.clone(), target, path, change: raw.change, values })
 }

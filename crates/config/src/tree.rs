@@ -146,7 +146,7 @@ impl Node {
                 let at = match table.iter().position(|(key, _)| *key.name == **step) {
                     Some(at) => at,
                     None if rest.is_empty() && change != Change::Set => {
-                        return Err("the file has no value to change; use `change = \"set\"`".to_owned());
+                        return Err("the file has no value to change\nhint: use `change = \"set\"`, or write the value into the file".to_owned());
                     }
                     None => {
                         let missing = if rest.is_empty() { Value::Float(value) } else { Value::Table(Vec::new()) };
@@ -163,7 +163,9 @@ impl Node {
                 let at = found.ok_or_else(|| format!("the list has no item `{step}`; items count from 0"))?;
                 list[at].change(rest, change, value)
             }
-            _ => Err(format!("there is no `{step}`: the key before it is a single value")),
+            _ => Err(format!(
+                "there is no `{step}`: the key before it is a single value\nhint: end the key before `{step}`"
+            )),
         }
     }
 }
@@ -190,7 +192,7 @@ impl Value {
                 *old = match (change, value) {
                     (Change::Set, 0.0) => false,
                     (Change::Set, 1.0) => true,
-                    _ => return Err("a switch is 0 (off) or 1 (on)".to_owned()),
+                    _ => return Err("a switch is 0 (off) or 1 (on)\nhint: use `change = \"set\"` with values = [0, 1]".to_owned()),
                 }
             }
             Self::Integer(old) => *self = Self::Float(new(*old as f64)),
@@ -198,8 +200,8 @@ impl Value {
             Self::List(list) if change != Change::Set => {
                 return list.iter_mut().try_for_each(|item| item.value.apply(change, value));
             }
-            Self::List(_) => return Err("a list cannot be set to a number; use `change = \"scale\"`".to_owned()),
-            Self::Text(_) | Self::Time | Self::Table(_) => return Err("the value is not a number".to_owned()),
+            Self::List(_) => return Err("a list cannot be set to a number\nhint: use `change = \"scale\"`, or name one item by its number, counted from 0".to_owned()),
+            Self::Text(_) | Self::Time | Self::Table(_) => return Err("the value is not a number\nhint: a factor changes numbers and switches only".to_owned()),
         }
         Ok(())
     }

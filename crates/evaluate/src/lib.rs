@@ -61,7 +61,9 @@ pub enum EvaluateError {
     #[error("the car cannot be simulated: {0}")]
     Train(#[from] TrainError),
     /// There are more clutches than the filter has room for.
-    #[error("the gearbox has {0} clutches and brakes, and the filter has room for {MAX_ELEMENTS}")]
+    #[error(
+        "the gearbox has {0} clutches and brakes, and the filter has room for {MAX_ELEMENTS}\nhint: leave out those that no gear engages"
+    )]
     TooManyElements(usize),
     /// A shift is none from one clutch with plates and valve to another.
     #[error("the filter has no tables for {0}\nhint: `wetclutch check` lists the shifts from one clutch to another")]

@@ -114,8 +114,8 @@ impl FillFit {
     pub(crate) fn misfit(&self, clutch: &str) -> Option<String> {
         self.is_misfit.then(|| {
             format!(
-                "warning: the measured pressure of {clutch} before both clutches slip is not that of a fill by its commands: it is frozen, late, of \
-                 another clutch or in another unit, or passages and oil are not those of the file. Its fill volume is not identified"
+                "warning: the measured pressure of {clutch} before both clutches slip is not that of a fill by its commands: its fill volume is not \
+                 identified\nhint: the channel may be frozen, late, of another clutch or in another unit, or passages and oil differ from the file"
             )
         })
     }

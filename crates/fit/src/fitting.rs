@@ -276,7 +276,7 @@ fn grave(misfits: &[Misfit]) -> Vec<Map> {
 }
 
 fn singular() -> FitError {
-    FitError::Work("the information of the shifts is not finite".to_owned())
+    FitError::Work("the information of the shifts is not finite\nhint: check units and signs of the channels, and the values of the vehicle file".to_owned())
 }
 
 /// Unknowns of some parameters by those of others.

@@ -150,20 +150,20 @@ impl Fit {
     fn misfits(&self) -> Vec<String> {
         let wrong = |(channel, _, gain): &(Channel, f64, f64)| *channel == Channel::Turbine && *gain > MISFIT_GAIN;
         let warn = |_: &(Channel, f64, f64)| {
-            "warning: the model does not follow the turbine speed: its errors do not decay. Converter or valve differ from the vehicle file in a way that the fit does not change; the intervals are too small"
+            "warning: the model does not follow the turbine speed: its errors do not decay. The intervals are too small\nhint: the converter or a valve may differ from the vehicle file in a way that the fit does not change; check their maps"
                 .to_owned()
         };
         let limited = (!self.at_limit.is_empty()).then(|| {
             format!(
-                "warning: at the limit of the prior (4 standard deviations): {}. The vehicle file is not of this car, or a signal is not that \
-                 of the channel map; do not use the fitted file before the reason is known",
+                "warning: at the limit of the prior (4 standard deviations): {}\nhint: check that the vehicle file is of this car, and the \
+                 signals of the channel map; do not use the fitted values before the reason is known",
                 self.at_limit.join(", ")
             )
         });
         let finer = (!self.misfits.is_empty()).then(|| {
             let names: Vec<&str> = self.misfits.iter().map(|map| map.name()).collect();
             format!(
-                "warning: the shifts contradict the fitted model (Hotelling's T2 over the shifts, level {LEVEL}): the shape of {} differs from any that the fit can give it, or the car has an effect that no map of the vehicle file describes. The intervals contain the effect on the values",
+                "warning: the shifts contradict the fitted model (Hotelling's T2 over the shifts, level {LEVEL}): the shape of {} differs from any that the fit can give it, or the car has an effect that no map of the vehicle file describes. The intervals contain the effect on the values\nhint: check this map of the vehicle file",
                 names.join(", ")
             )
         });
@@ -313,8 +313,7 @@ fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, measure: Meas
 
 /// Why intervals may be too small.
 pub(crate) fn cautions(is_converged: bool, shifts: usize) -> impl Iterator<Item = String> {
-    let used_up =
-        "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold";
+    let used_up = "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold\nhint: start from a vehicle file that is nearer to the car, or give more shifts";
     let one = "one shift only: nothing shows how much shifts differ, so the intervals may be too small";
     [(!is_converged, used_up), (shifts == 1, one)]
         .into_iter()

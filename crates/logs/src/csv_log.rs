@@ -296,7 +296,10 @@ impl Stream for Rows<'_> {
         for _ in 0..self.log.batch {
             if !read_row(&self.log.path, &mut self.records, self.log.dialect.preamble)? {
                 if self.rows == 0 {
-                    return Err(LogError::file(&self.log.path, "there are no rows"));
+                    return Err(LogError::file(
+                        &self.log.path,
+                        "there are no rows\nhint: the file has names of columns only; record again",
+                    ));
                 }
                 if 2 * self.without_time > self.rows {
                     return Err(self.without_times());

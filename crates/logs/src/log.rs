@@ -364,7 +364,7 @@ fn beginning(path: &Path, mut reader: Box<dyn Read>) -> Result<(Vec<u8>, Box<dyn
         head.drain(..BYTE_ORDER_MARK.len());
     }
     if head.is_empty() {
-        return Err(LogError::file(path, "the file is empty"));
+        return Err(LogError::file(path, "the file is empty\nhint: copy it again from the recorder"));
     }
     if head.len() > LONGEST_ROW && !head.iter().any(|byte| matches!(byte, b'\n' | b'\r' | 0)) {
         return Err(csv_log::too_long(path, 1));

@@ -251,7 +251,13 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
     let names = match (raw.name, raw.names) {
         (Some(name), None) => vec![name],
         (None, Some(names)) if !names.is_empty() => names,
-        _ => return Err(format!("{} or {} must name the channel", key("name"), key("names"))),
+        _ => {
+            return Err(format!(
+                "{} or {} must name the channel\nhint: name = \"N_Eng\", or names = [...] with combine = \"mean\" or \"sum\"",
+                key("name"),
+                key("names")
+            ));
+        }
     };
     if names.len() > 1 && raw.combine.is_none() {
         return Err(format!(
@@ -265,21 +271,32 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
         return Err(format!("{} is 0", key("scale")));
     }
     if !(0.0..=10.0).contains(&raw.delay_s) {
-        return Err(format!("{} is {}, expected 0 to 10", key("delay_s"), raw.delay_s));
+        return Err(format!(
+            "{} is {}, expected 0 to 10\nhint: it is in s: 20 ms is 0.02",
+            key("delay_s"),
+            raw.delay_s
+        ));
     }
     if !(-10.0..=10.0).contains(&raw.late_s) {
-        return Err(format!("{} is {}, expected -10 to 10", key("late_s"), raw.late_s));
+        return Err(format!(
+            "{} is {}, expected -10 to 10\nhint: it is in s: 100 ms is 0.1",
+            key("late_s"),
+            raw.late_s
+        ));
     }
     if raw.sent_on_change && !(role.is_command() || role == Role::OncomingPressureCommand) {
         return Err(format!(
-            "{} is for the commands of valves: another signal between two samples is not known",
+            "{} is for the commands of valves: another signal between two samples is not known\nhint: leave it out",
             key("sent_on_change")
         ));
     }
     if let Some([minimum, maximum]) = raw.valid_range
         && (minimum >= maximum || minimum.is_nan() || maximum.is_nan())
     {
-        return Err(format!("{} is [{minimum}, {maximum}], expected a smaller value first", key("valid_range")));
+        return Err(format!(
+            "{} is [{minimum}, {maximum}], expected a smaller value first\nhint: [minimum, maximum] in the unit of the channel",
+            key("valid_range")
+        ));
     }
     Ok(Mapped {
         role,
@@ -301,7 +318,10 @@ fn gearbox(raw: RawGearbox) -> Result<Gearbox, String> {
     check_ratios(&raw.ratios).map_err(|message| format!("`gearbox.ratios`: {message}"))?;
     for (name, value) in [("output_rad_per_m", raw.output_rad_per_m), ("wheel_radius_m", raw.wheel_radius_m)] {
         if value.is_some_and(|value| !(0.01..=1000.0).contains(&value)) {
-            return Err(format!("`gearbox.{name}` is {}, expected 0.01 to 1000", value.unwrap_or_default()));
+            return Err(format!(
+                "`gearbox.{name}` is {}, expected 0.01 to 1000\nhint: `output_rad_per_m` is final ratio over wheel radius, such as 12.8; `wheel_radius_m` is in m, such as 0.31",
+                value.unwrap_or_default()
+            ));
         }
     }
     Ok(Gearbox { ratios: raw.ratios, output_rad_per_m: raw.output_rad_per_m, wheel_radius_m: raw.wheel_radius_m })
@@ -313,12 +333,15 @@ fn gearbox(raw: RawGearbox) -> Result<Gearbox, String> {
 /// What is wrong with them.
 pub fn check_ratios(ratios: &[f64]) -> Result<(), String> {
     if let Some(wrong) = ratios.iter().find(|ratio| !(0.1..=30.0).contains(*ratio)) {
-        return Err(format!("a ratio is {wrong}, expected 0.1 to 30"));
+        return Err(format!(
+            "a ratio is {wrong}, expected 0.1 to 30\nhint: turbine speed over output speed, of the forward gears only"
+        ));
     }
     match ratios.windows(2).find(|pair| pair[0] < 1.02 * pair[1]) {
-        Some(pair) => {
-            Err(format!("{} is followed by {}, expected falling ratios, lowest gear first", pair[0], pair[1]))
-        }
+        Some(pair) => Err(format!(
+            "{} is followed by {}, expected falling ratios, lowest gear first\nhint: 1st gear has the largest ratio, such as [4.70, 3.13, 2.10]",
+            pair[0], pair[1]
+        )),
         None => Ok(()),
     }
 }
@@ -455,7 +478,7 @@ mod tests {
         assert!(check_ratios(&[4.7, 3.1, 1.0]).is_ok() && check_ratios(&[]).is_ok());
         assert_eq!(
             check_ratios(&[3.1, 4.7]).unwrap_err(),
-            "3.1 is followed by 4.7, expected falling ratios, lowest gear first"
+            "3.1 is followed by 4.7, expected falling ratios, lowest gear first\nhint: 1st gear has the largest ratio, such as [4.70, 3.13, 2.10]"
         );
         assert!(check_ratios(&[f64::NAN]).is_err() && check_ratios(&[4.0, -1.0]).is_err());
     }

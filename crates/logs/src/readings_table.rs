@@ -63,7 +63,9 @@ impl ReadingsTable {
     ) -> Result<(Self, Vec<Channel>), LogError> {
         let beginning = text(&head);
         let names = beginning.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-        let places = Places::of(names).ok_or_else(|| LogError::file(path, "there is no row of names"))?;
+        let places = Places::of(names).ok_or_else(|| {
+            LogError::file(path, "there is no row of names\nhint: such a table begins with SECONDS;PID;VALUE;UNITS")
+        })?;
         let (mut channels, mut by_name) = (Vec::new(), HashMap::new());
         // The last line of the head may be cut.
         let whole = beginning.lines().count().saturating_sub(usize::from(!beginning.ends_with('\n')));
@@ -136,7 +138,10 @@ impl Stream for Readings<'_> {
             if !read_row(&self.log.path, &mut self.records, 0)? {
                 if 2 * self.unread > self.rows || self.rows == 0 {
                     let first = self.first_unread.as_deref().unwrap_or("there are no rows");
-                    let message = format!("{} of {} rows are no readings, {first}", self.unread, self.rows);
+                    let message = format!(
+                        "{} of {} rows are no readings, {first}\nhint: a row has time, name, value and unit",
+                        self.unread, self.rows
+                    );
                     return Err(LogError::file(&self.log.path, message));
                 }
                 return Ok(false);

@@ -173,7 +173,10 @@ fn what_holds_nothing_is_named() {
         |name: &str, bytes: &[u8]| read(&folder.write(name, bytes), &OpenOptions::default()).err().unwrap().to_string();
     assert!(message("zeros", &[0; 4096]).contains("this is no format that is known"));
     for mark in [&[][..], &[0xef, 0xbb, 0xbf], &[0xff, 0xfe]] {
-        assert!(message("empty", mark).ends_with("the file is empty"), "{mark:?}");
+        assert!(
+            message("empty", mark).ends_with("the file is empty\nhint: copy it again from the recorder"),
+            "{mark:?}"
+        );
     }
     assert!(message("names", b"time_s,a\n").ends_with("there are no rows"));
     for (bytes, said) in [

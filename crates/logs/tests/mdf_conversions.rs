@@ -177,7 +177,9 @@ fn the_unit_of_a_time_counts_wherever_the_file_says_it() {
         assert_eq!(found_s, 19.0);
         assert_eq!(
             notes,
-            [format!("[time] of the channel map names `other` and has no effect: the times of this log are `{name}`")]
+            [format!(
+                "[time] of the channel map names `other` and has no effect: the times of this log are `{name}`\nhint: leave `name` out, or give one of these"
+            )]
         );
     }
 }

@@ -31,7 +31,7 @@ pub(crate) const HOLDS_ANY: Limits = (-UNLIMITED_N_M, UNLIMITED_N_M);
 pub enum TrainError {
     /// More degrees of freedom, elements, or elements without slip than there is room for.
     #[error(
-        "the train has more than {MAX_FREEDOMS} degrees of freedom, {MAX_ELEMENTS} elements or {MAX_CONTACTS} elements without slip"
+        "the train has more than {MAX_FREEDOMS} degrees of freedom, {MAX_ELEMENTS} elements or {MAX_CONTACTS} elements without slip\nhint: leave out shafts and elements that no gear needs"
     )]
     TooLarge,
     /// More elements with plates than a simulated car has room for.
@@ -45,7 +45,9 @@ pub enum TrainError {
         room: usize,
     },
     /// A torque, speed or inertia is not a number, or the inertia is not positive.
-    #[error("a torque, a speed or an inertia is not a finite number")]
+    #[error(
+        "a torque, a speed or an inertia is not a finite number\nhint: check the inertias of the shafts; each must be above zero"
+    )]
     NotFinite,
     /// The gearbox is known by its ratios only.
     #[error(
@@ -53,7 +55,9 @@ pub enum TrainError {
     )]
     NoDiagram,
     /// A clutch or brake is known by its name only.
-    #[error("a clutch or brake of the gearbox has no `pack`")]
+    #[error(
+        "a clutch or brake of the gearbox has no `pack`\nhint: give plates and piston of each as `pack` in the gearbox file"
+    )]
     NoPack,
 }
 

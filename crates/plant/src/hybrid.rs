@@ -24,13 +24,17 @@ const MAX_CHANGES: usize = 8;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// The step size fell below its floor or a state became infinite.
-    #[error("the simulation diverged at {time_s:.4} s; check inertias, stiffnesses and time constants")]
+    #[error(
+        "the simulation diverged at {time_s:.4} s\nhint: check inertias, stiffnesses and time constants of the vehicle file"
+    )]
     Diverged {
         /// When.
         time_s: f64,
     },
     /// The clutches found no consistent mode.
-    #[error("the clutches change endlessly between sticking and slipping at {time_s:.4} s")]
+    #[error(
+        "the clutches change endlessly between sticking and slipping at {time_s:.4} s\nhint: check inertias and friction of the clutches"
+    )]
     Chatter {
         /// When.
         time_s: f64,

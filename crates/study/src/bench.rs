@@ -245,7 +245,7 @@ pub fn open_loop(experiment: &ExperimentFile) -> Result<usize, ConfigError> {
         hint: Some("see experiments/bench.toml".to_owned()),
     };
     if experiment.scenarios.is_empty() {
-        return Err(missing("scenario", 0, "there is no [[scenario]]"));
+        return Err(missing("scenario", 0, "there is no [[scenario]]\nhint: experiments/bench.toml shows some"));
     }
     let first_scenario = experiment.source.text.find("[[scenario]]").unwrap_or_default();
     let open_loop = experiment.observers.iter().position(|entry| entry.kind == ObserverKind::OpenLoop);

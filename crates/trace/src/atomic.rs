@@ -271,9 +271,10 @@ fn name_of_partial(file: &OsStr) -> Option<&[u8]> {
 fn locked(path: &Path) -> io::Result<File> {
     loop {
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|error| match error.kind() {
-            ErrorKind::AlreadyExists => {
-                io::Error::new(ErrorKind::AlreadyExists, "another program is writing this file")
-            }
+            ErrorKind::AlreadyExists => io::Error::new(
+                ErrorKind::AlreadyExists,
+                "another program is writing this file\nhint: wait until it ends, or choose another name",
+            ),
             _ => error,
         })?;
         match file.try_lock() {
@@ -473,7 +474,12 @@ mod tests {
         let path = folder.0.join("out.csv");
         let first = WholeFile::create(&path).unwrap();
         let second = WholeFile::create(&path).unwrap_err();
-        assert!(second.to_string().contains("another program is writing this file"), "{second}");
+        assert!(
+            second
+                .to_string()
+                .contains("another program is writing this file\nhint: wait until it ends, or choose another name"),
+            "{second}"
+        );
         first.finish().unwrap();
         assert_eq!(folder.names(), ["out.csv"]);
     }

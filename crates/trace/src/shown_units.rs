@@ -101,7 +101,7 @@ impl FromStr for ShownUnits {
             })?;
             if let Some(other) = units.iter().find(|other| other.quantity == unit.quantity && **other != unit) {
                 return Err(format!(
-                    "`{}` and `{}` measure the same quantity, expected one of them",
+                    "`{}` and `{}` measure the same quantity, expected one of them\nhint: give one unit for each quantity, such as rpm,bar",
                     other.name, unit.name
                 ));
             }

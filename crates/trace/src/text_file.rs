@@ -29,7 +29,9 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 /// See [`read_small`]; the file is neither UTF-8 nor UTF-16 (`InvalidData`).
 pub fn read_text_of(path: &Path, largest_bytes: u64) -> io::Result<String> {
     let bytes = read_small(path, largest_bytes)?;
-    unicode_of(&bytes).ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "the file is not text in UTF-8 or UTF-16"))
+    unicode_of(&bytes).ok_or_else(|| {
+        io::Error::new(ErrorKind::InvalidData, "the file is not text in UTF-8 or UTF-16\nhint: save it as UTF-8")
+    })
 }
 
 /// Reads a regular file of at most this size.
@@ -107,7 +109,7 @@ mod tests {
         let error = read_text(&path).unwrap_err();
         assert_eq!(
             (error.kind(), &*error.to_string()),
-            (ErrorKind::InvalidData, "the file is not text in UTF-8 or UTF-16")
+            (ErrorKind::InvalidData, "the file is not text in UTF-8 or UTF-16\nhint: save it as UTF-8")
         );
         assert_eq!(read_small(&path, 2).unwrap(), [b'a', 0xff]);
         assert_eq!(read_text(&folder.0.join("none")).unwrap_err().kind(), ErrorKind::NotFound);

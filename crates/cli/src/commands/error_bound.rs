@@ -40,10 +40,13 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     let found = find(&study, options.threads.count(), || bar.inc(1))?;
     bar.finish_and_clear();
     if found.phases.iter().any(|phase| phase.runs == 0) {
-        return Err(Failure::Work("no run has a complete shift: there is no model error to compute".to_owned()));
+        return Err(Failure::Work("no run has a complete shift: there is no model error to compute\nhint: let the experiment record longer, or narrow the factors of the study".to_owned()));
     }
     if found.phases.iter().any(|phase| phase.rigid.largest.is_infinite()) {
-        return Err(Failure::Work("the model error has no bound: an acceleration is not finite".to_owned()));
+        return Err(Failure::Work(
+            "the model error has no bound: an acceleration is not finite\nhint: narrow the factors of the study"
+                .to_owned(),
+        ));
     }
     if let Some(path) = &options.output {
         write_text(path, &found.toml(&study))?;

@@ -56,7 +56,9 @@ fn experiment_path(study: &Study) -> Result<String, Failure> {
     let whole = std::fs::canonicalize(path).map_err(|error| Failure::Input(format!("{}: {error}", path.shown())))?;
     whole.into_os_string().into_string().map_err(|whole| {
         let path = Path::new(&whole).shown();
-        Failure::Input(format!("{path}: the path is not UTF-8, so that a study file cannot contain it"))
+        Failure::Input(format!(
+            "{path}: the path is not UTF-8, so that a study file cannot contain it\nhint: rename the folder"
+        ))
     })
 }
 
@@ -67,7 +69,7 @@ fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCas
     let found = search(campaign, target, starts, options.iterations, options.threads.count(), || bar.inc(1))?;
     bar.finish_and_clear();
     let Some(found) = found else {
-        return Err(Failure::Work("no run of the study has a complete shift to start from".to_owned()));
+        return Err(Failure::Work("no run of the study has a complete shift to start from\nhint: let the experiment record longer, or narrow the factors of the study".to_owned()));
     };
     let places = places(options, target.phase);
     let [study, figure] = &places;

@@ -130,6 +130,9 @@ fn matrix<const N: usize>(
             let row = |row| check.array(key, row, -1e6..=1e6);
             Ok([row(shaft)?, row(pressure)?])
         }
-        _ => Err(check.meaning(key, at, format!("has {} rows, expected 2", rows.len()), None)),
+        _ => {
+            let hint = Some("a gain has a row for the shaft torque and one for the pressure".to_owned());
+            Err(check.meaning(key, at, format!("has {} rows, expected 2", rows.len()), hint))
+        }
     }
 }

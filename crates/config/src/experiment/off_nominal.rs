@@ -75,7 +75,7 @@ fn tip_out(check: &Check<'_>, times: &Numbers, throttle_points: usize) -> Result
     }
     if throttle_points + TIP_POINTS > MAX_POINTS {
         let message = format!("adds {TIP_POINTS} points to the {throttle_points} of the throttle");
-        return wrong(message, &format!("a profile has at most {MAX_POINTS} points"));
+        return wrong(message, &format!("a profile has at most {MAX_POINTS} points: give the throttle fewer points"));
     }
     Ok([from_s, until_s])
 }

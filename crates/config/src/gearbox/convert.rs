@@ -313,7 +313,7 @@ fn shift_mass(check: &Check<'_>, raw: &Spanned<RawShiftMass>) -> Result<ShiftMas
     let number = |key: &str, value, range| check.number(format_args!("shift_mass.{key}"), value, range);
     let gears: &[String; 2] = mass.gears.as_slice().try_into().map_err(|_| {
         let message = format!("has {} names, expected the two gears of a shift", mass.gears.len());
-        check.meaning("shift_mass.gears", start(raw), message, None)
+        check.meaning("shift_mass.gears", start(raw), message, Some("such as gears = [\"1\", \"2\"]".to_owned()))
     })?;
     Ok(ShiftMass {
         gears: gears.clone(),

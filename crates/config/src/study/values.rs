@@ -97,7 +97,12 @@ pub(super) fn values(check: &Check<'_>, key: &str, place: usize, raw: &RawFactor
     let levels = match &raw.levels {
         None => LEVELS,
         Some(levels) if (2..=1000).contains(levels.get_ref()) => *levels.get_ref() as usize,
-        Some(_) => return Err(meaning("`levels` must be 2 to 1000", None)),
+        Some(_) => {
+            return Err(meaning(
+                "`levels` must be 2 to 1000",
+                Some("the number of values that the range is divided into, such as 3"),
+            ));
+        }
     };
     let all = f64::MIN..=f64::MAX;
     let pair = |name: &str, numbers: &Numbers| -> Result<(f64, f64), ConfigError> {
@@ -107,7 +112,7 @@ pub(super) fn values(check: &Check<'_>, key: &str, place: usize, raw: &RawFactor
                 key,
                 numbers.span().start,
                 format!("`{name}` must be two numbers in increasing order"),
-                None,
+                Some("such as [0.8, 1.2]".to_owned()),
             )),
         }
     };
@@ -120,12 +125,22 @@ pub(super) fn values(check: &Check<'_>, key: &str, place: usize, raw: &RawFactor
         }
         (None, None, Some(range), None) => match pair("log_range", range)? {
             (low, high) if low > 0.0 => Values::LogUniform(low, high, levels),
-            _ => return Err(meaning("`log_range` must be above 0", None)),
+            _ => {
+                return Err(meaning(
+                    "`log_range` must be above 0",
+                    Some("use `range` for values that may be zero or negative"),
+                ));
+            }
         },
         (None, None, None, Some(normal)) => {
             let mean = check.number("normal.mean", &normal.mean, all)?;
             match check.number("normal.deviation", &normal.deviation, 0.0..=f64::MAX)? {
-                0.0 => return Err(meaning("`normal.deviation` must be above 0", None)),
+                0.0 => {
+                    return Err(meaning(
+                        "`normal.deviation` must be above 0",
+                        Some("it is the standard deviation; leave the factor out if the value does not vary"),
+                    ));
+                }
                 deviation => Values::Normal(mean, deviation, levels),
             }
         }

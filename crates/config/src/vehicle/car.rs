@@ -291,7 +291,8 @@ fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) 
     let off_rad_s = number("off_input_rad_s", &raw.off_input_rad_s, 10.0..=1e3)?;
     if off_rad_s >= on_rad_s {
         let message = format!("is {off_rad_s}, not below `on_input_rad_s`, {on_rad_s}");
-        return Err(check.meaning("lock_up.off_input_rad_s", raw.off_input_rad_s.span().start, message, None));
+        let hint = Some("the lock-up clutch opens at a lower speed than that at which it closes".to_owned());
+        return Err(check.meaning("lock_up.off_input_rad_s", raw.off_input_rad_s.span().start, message, hint));
     }
     Ok(LockUp {
         capacity_n_m: number("capacity_n_m", &raw.capacity_n_m, 1.0..=1e4)?,
@@ -459,7 +460,11 @@ impl CommonClutch<'_> {
             let sliding = clutch.friction.at(0.0);
             if clutch.static_friction < sliding {
                 let message = format!("is {}, less than the friction at zero slip, {sliding}", clutch.static_friction);
-                return Err(check.meaning(key("static_friction"), value.span().start, message, None));
+                let hint = Some(
+                    "static friction is the largest friction of a clutch without slip: leave it out, or raise it"
+                        .to_owned(),
+                );
+                return Err(check.meaning(key("static_friction"), value.span().start, message, hint));
             }
         }
         Ok(clutch)
@@ -491,7 +496,8 @@ impl CommonClutch<'_> {
             clutch.kiss_pressure()
         );
         let at = self.raw.hydraulics.line_pressure_pa.span().start;
-        Err(self.check.meaning("hydraulics.line_pressure_pa", at, message, None))
+        let hint = Some("the clutch can never carry torque: check the unit of the line pressure, `return_spring_n` and `piston_area_m2`".to_owned());
+        Err(self.check.meaning("hydraulics.line_pressure_pa", at, message, hint))
     }
 }
 
@@ -537,7 +543,8 @@ fn reaches(
                 "its line pressure is {} Pa, less than `hydraulics.line_pressure_pa`, {line_pressure_pa} Pa",
                 law.line_pressure_pa
             );
-            Err(check.meaning(table, raw.span().start, message, None))
+            let hint = Some("give both the same line pressure".to_owned());
+            Err(check.meaning(table, raw.span().start, message, hint))
         }
         ClutchValve::PulseWidth { .. } => Ok(()),
     }

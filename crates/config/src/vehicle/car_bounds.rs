@@ -111,7 +111,8 @@ fn command(
     };
     if let (name, Some(given)) = foreign {
         let message = format!("the valve of this element has no such command; its bound is `{key}`");
-        return Err(check.meaning(format_args!("{table}.{name}"), given.span().start, message, None));
+        let hint = Some(format!("replace `{name}` by `{key}`"));
+        return Err(check.meaning(format_args!("{table}.{name}"), given.span().start, message, hint));
     }
     value.as_ref().map(|value| check.number(format_args!("{table}.{key}"), value, range)).transpose()
 }

@@ -86,7 +86,8 @@ fn interval(
     let message = format!(
         "{minimum} to {maximum} does not contain {value}: the car of this file would be outside its own error budget"
     );
-    Err(check.meaning(key_of(key), given.span().start, message, None))
+    let hint = Some(format!("[{}, {}] contains it", minimum.min(value), maximum.max(value)));
+    Err(check.meaning(key_of(key), given.span().start, message, hint))
 }
 
 /// Preload and kiss pressure.

@@ -63,7 +63,7 @@ fn reduced(
     if freedoms != Some(2) {
         let freedoms = freedoms.map_or_else(|| "no".to_owned(), |freedoms| freedoms.to_string());
         return Err(format!(
-            "the planetary sets and the held clutches leave {freedoms} degrees of freedom, but a shift needs exactly 2"
+            "the planetary sets and the held clutches leave {freedoms} degrees of freedom, but a shift needs exactly 2\nhint: degrees of freedom are shafts less planetary sets less held clutches"
         ));
     }
     let held_count = held.len();
@@ -88,7 +88,8 @@ impl<'c> Shafts<'c> {
             let name = check.name("gear_train.shaft.name", shaft.name.get_ref(), shaft.name.span().start)?;
             if name == HOUSING {
                 let message = format!("\"{HOUSING}\" is the gearbox housing, which does not rotate");
-                return Err(check.meaning("gear_train.shaft.name", shaft.name.span().start, message, None));
+                let hint = Some("remove this shaft; sets and clutches may name the housing without it".to_owned());
+                return Err(check.meaning("gear_train.shaft.name", shaft.name.span().start, message, hint));
             }
             Ok(name)
         };

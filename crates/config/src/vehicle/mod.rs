@@ -293,7 +293,8 @@ fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, Conf
         if row.get_ref().len() != throttle.len() {
             let message =
                 format!("the row has {} torques, but `throttle` has {} positions", row.get_ref().len(), throttle.len());
-            return Err(check.meaning(format!("{key}[{i}]"), row.span().start, message, None));
+            let hint = Some("a row has one torque for each throttle position".to_owned());
+            return Err(check.meaning(format!("{key}[{i}]"), row.span().start, message, hint));
         }
     }
     let values: Vec<&[f64]> = rows.iter().map(|row| row.get_ref().as_slice()).collect();
@@ -309,7 +310,8 @@ fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, Conf
             TableError::LengthMismatch(speeds, rows) => format!("{rows} rows of torque for {speeds} speeds"),
             other => other.to_string(),
         };
-        check.meaning(key, raw.torque_n_m.span().start, message, None)
+        let hint = Some("the map has one row for each speed".to_owned());
+        check.meaning(key, raw.torque_n_m.span().start, message, hint)
     })
 }
 
@@ -420,7 +422,8 @@ fn error_matrix(check: &Check<'_>, phase: &str, rows: &Spanned<Vec<Numbers>>) ->
     let outputs = if phase == "inertia_phase" { 3 } else { 2 };
     let mut matrix = [[0.0; 3]; 3];
     let wrong = |place: usize| {
-        check.meaning(&key, place, format!("expected {outputs} rows of up to 3 numbers, one row for each output"), None)
+        let hint = Some("`wetclutch error-bound` writes this matrix".to_owned());
+        check.meaning(&key, place, format!("expected {outputs} rows of up to 3 numbers, one row for each output"), hint)
     };
     if rows.get_ref().len() != outputs {
         return Err(wrong(rows.span().start));

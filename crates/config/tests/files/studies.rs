@@ -45,18 +45,21 @@ fn a_study_switches_the_stroke_with_0_and_1() {
             1,
         ),
     );
-    let study = |values: &str| {
+    let study_of = |key: &str, values: &str| {
         let text = format!(
             "name = \"s\"\ntitle = \"S\"\nexperiment = \"e.toml\"\nplan = \"full-factorial\"\n\
-             [[factor]]\nkey = \"experiment.off_nominal.piston_stroke\"\nvalues = {values}\n"
+             [[factor]]\nkey = \"{key}\"\nvalues = {values}\n"
         );
         config::Study::read(&folder.with("s.toml", &text))
     };
+    let study = |values: &str| study_of("experiment.off_nominal.piston_stroke", values);
     let both = study("[0, 1]").unwrap();
     let stroke = |value: f64| both.varied(&[value]).unwrap().experiment.off_nominal.piston_stroke;
     assert_eq!((stroke(0.0), stroke(1.0)), (Some(false), Some(true)));
     let error = study("[0, 0.5]").unwrap_err().to_string();
-    assert!(error.contains("a switch is 0 (off) or 1 (on)"), "{error}");
+    assert!(error.contains("a switch is 0 (off) or 1 (on)\nhint: use `change"), "{error}");
+    let error = study_of("vehicle.converter.torque_ratio", "[1.0, 2.0]").unwrap_err().to_string();
+    assert!(error.contains("a list cannot be set to a number\nhint: use `change = \"scale\"`"), "{error}");
 }
 
 /// One study for all four experiments: the shift controller's values go into each, those of the sensors into E2 and E4.

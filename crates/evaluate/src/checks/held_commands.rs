@@ -125,14 +125,14 @@ pub fn warnings_of(commands: &[(&str, &CommandTimes)]) -> Vec<String> {
     let held = (!held.is_empty()).then(|| {
         format!(
             "warning: commands that change more rarely than the rows come: {held}. If the log repeats a slow message, a command was sent up to that \
-             long before the row that shows it, and the guaranteed ranges do not hold. Leave repeated cells empty, or record the commands more often"
+             long before the row that shows it, and the guaranteed ranges do not hold\nhint: leave repeated cells empty, or record the commands more often"
         )
     });
     let rare = named(CommandTimes::too_rarely_read_s);
     let rare = (!rare.is_empty()).then(|| {
         format!(
-            "warning: commands that are recorded more rarely than every {APART_S} s: {rare}. What a command does between two of its readings, as the \
-             pulse that fills a clutch, is not known, and the guaranteed ranges do not hold. Record the commands at the rate at which they are sent"
+            "warning: commands that are recorded more rarely than every {APART_S} s: {rare}. A change between two readings, such as the \
+             pulse that fills a clutch, is not known, and the guaranteed ranges do not hold\nhint: record the commands at the rate at which they are sent"
         )
     });
     held.into_iter().chain(rare).collect()

@@ -43,7 +43,7 @@ impl Check for Holes {
     fn warnings(&self) -> Vec<String> {
         let warning = (self.count > 0).then(|| {
             format!(
-                "warning: {} shifts have a hole of more than {HOLE_S} s in the recording: they end with it and count as not completed",
+                "warning: {} shifts have a hole of more than {HOLE_S} s in the recording: they end with it and count as not completed\nhint: check recorder and bus for lost data; the other shifts are not affected",
                 self.count
             )
         });

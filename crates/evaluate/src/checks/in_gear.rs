@@ -124,8 +124,8 @@ impl Check for InGear {
     fn warnings(&self) -> Vec<String> {
         let warning = (self.ended > 0).then(|| {
             format!(
-                "warning: engine, turbine or output speed came no more, or was refused, in {} rows in a gear with the car moving: pressures and torques \
-                 there are those of the valve models alone (open loop)",
+                "warning: engine, turbine or output speed is missing or refused in {} rows in a gear with the car moving: pressures and torques \
+                 there are those of the valve models alone (open loop)\nhint: the columns `_reading` of the estimate name the channel; check its sensor, rate and unit",
                 self.ended
             )
         });

@@ -27,7 +27,7 @@ impl Check for OpenLoop {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let said = "warning: there is no engine speed, which gives the turbine torque: pressures and torques are those of the valve models alone (open loop)";
+        let said = "warning: there is no engine speed, which gives the turbine torque: pressures and torques are those of the valve models alone (open loop)\nhint: map `engine_speed`, or record it";
         self.is_open_loop().then(|| said.to_owned()).into_iter().collect()
     }
 }

@@ -47,8 +47,8 @@ impl Check for OtherShifts {
         let warning = (self.count > 0).then(|| {
             format!(
                 "warning: {} of the shifts take longer than {LONGEST_S:.0} s, or the turbine is {OTHER_SHIFT_RAD_S:.0} rad/s and more below the speeds of both gears (number {}{more}): \
-                 either `gear` and `target_gear` are missing, late or wrong there, and the values of these shifts in the table are wrong, or neither clutch held \
-                 the turbine; the table gives no friction work of them",
+                 the values of these shifts in the table may be wrong, and it gives no friction work of them\nhint: check `gear` and `target_gear` there: they may \
+                 be missing, late or wrong; else neither clutch held the turbine",
                 self.count,
                 self.first.join(", ")
             )

@@ -43,7 +43,7 @@ impl<'c> Scales<'c> {
         (off.abs() > bound && wrong.is_none_or(|wrong| !wrong.is_output)).then(|| {
             format!(
                 "warning: output_speed over wheel_speed is {:.3} in the middle, {:+.1} % from the final ratio {final_ratio:.3}: the filter learns the \
-                 scale of wheel_speed within {:.1} % and refuses what is further off. Correct the scale of wheel_speed or `driveline.final_ratio`, or \
+                 scale of wheel_speed within {:.1} % and refuses a speed that is further off\nhint: correct the scale of wheel_speed or `driveline.final_ratio`, or \
                  give its bound as `error_bounds.wheel_scale_share`",
                 self.output_over_wheel(),
                 100.0 * off,

@@ -214,13 +214,13 @@ impl<'c> SlippingElements<'c> {
         let names = suspects.iter().map(|element| self.name(*element)).collect::<Vec<_>>().join(", ");
         Some(match suspects.len() {
             0 => format!(
-                "warning: clutches or brakes slip {when}: no single element explains it. Check the line pressure and the oil, and the torques of the vehicle file"
+                "warning: clutches or brakes slip {when}: no single element explains it\nhint: check the line pressure and the oil, and the torques of the vehicle file"
             ),
             1 => format!(
-                "warning: {names} slips {when}: it is engaged there and has held no more torque since. Check its plates, its pressure, also of the line, and its valve"
+                "warning: {names} slips {when}: it is engaged there and has held no more torque since\nhint: check its plates, its valve, its pressure and the line pressure"
             ),
             _ => format!(
-                "warning: one of {names} slips {when}: they are engaged there and have held no more torque since. Check their plates, pressures and valves"
+                "warning: one of {names} slips {when}: they are engaged there and have held no more torque since\nhint: the gears of this log do not separate them; check their plates, valves and pressures"
             ),
         })
     }
@@ -259,7 +259,7 @@ impl<'c> SlippingElements<'c> {
             format!("{} does not hold in spite of its command, and {} holds without one", names(off), names(on))
         };
         Some(format!(
-            "warning: the speeds are {which}, since {first_s:.1} s: {cause}. Or `gear` is not that of the car, or the gearbox file has other gears"
+            "warning: the speeds are {which}, since {first_s:.1} s: {cause}\nhint: check these valves and their connectors; also possible: `gear` is not that of the car, or the gearbox file has other gears"
         ))
     }
 }

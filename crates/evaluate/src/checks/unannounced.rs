@@ -36,8 +36,8 @@ impl Check for UnannouncedShifts {
     fn warnings(&self) -> Vec<String> {
         let warning = (self.count > 0).then(|| {
             format!(
-                "warning: gear changes without a change of target_gear before (so often: {}): these shifts are not estimated. target_gear has to \
-                 change when a shift is requested, gear when it is done",
+                "warning: gear changes {} times without a change of target_gear before: these shifts are not estimated\nhint: target_gear must \
+                 change when a shift is requested, gear when it is complete; check both channels",
                 self.count
             )
         });

@@ -46,13 +46,17 @@ impl<'b> Library<'b> {
         // On macOS names begin with an underscore.
         let has = |name: &str| exported.iter().any(|of| of.name().ends_with(name.as_bytes()));
         if !(has("fmi2DoStep") && has("fmi3DoStep")) {
-            return Err(ExportError::Library("it has not the functions of FMI 2.0 and 3.0".to_owned()));
+            return Err(ExportError::Library("it lacks the functions of FMI 2.0 and 3.0\nhint: give the shared library that embedded/fmu or embedded/car_fmu builds".to_owned()));
         }
         if !has(name) {
-            return Err(ExportError::Library(format!("it is not {name}, but that of another model")));
+            return Err(ExportError::Library(format!(
+                "it is not {name}, but that of another model\nhint: --fmu takes the library of embedded/fmu, --car-fmu that of embedded/car_fmu"
+            )));
         }
         let platform = Platform::of(file.format(), file.architecture());
-        let unnamed = || ExportError::Library(format!("it is for {:?}", file.architecture()));
+        let unnamed = || {
+            ExportError::Library(format!("it is for {:?}\nhint: build it for x86-64 or AArch64", file.architecture()))
+        };
         Ok(Self { name, bytes, platform: platform.ok_or_else(unnamed)? })
     }
 

@@ -138,7 +138,9 @@ fn fit_with(
     let models: Vec<ShiftModel> =
         shifts.iter().filter_map(|log| ShiftModel::new(car, tables, &quantities, log)).collect();
     if models.is_empty() {
-        return Err(FitError::input("there is no shift to fit"));
+        return Err(FitError::input(
+            "there is no shift to fit\nhint: record shifts from one clutch to another between forward gears; `estimate` lists the shifts of a log",
+        ));
     }
     let problem = Problem::new(&quantities)?;
     let driven = DrivenCar::with_gearbox(car, tables, &|from, to| quantities.pair(from, to));

@@ -276,21 +276,21 @@ impl GearboxFit {
         if !self.contradicted.is_empty() {
             let names = self.contradicted.iter().filter_map(|place| self.quantities.elements.get(*place));
             lines.push(format!(
-                "warning: the measured pressure of {} contradicts its command for every valve within the error bounds: it is not used. Unit, sign or offset of the channel may be wrong, or the sensor is at another element",
+                "warning: the measured pressure of {} contradicts its command for every valve within the error bounds: it is not used\nhint: check unit, sign, offset and element of the channel",
                 names.map(String::as_str).collect::<Vec<_>>().join(", ")
             ));
         }
         if self.torque_misfit > MISFIT {
             lines.push(format!(
-                "warning: the shifts contradict the model: the errors of the torques are {:.1} times those that drag and the converter's maps explain. The vehicle file is not of this car, its maps have another shape, or a signal is not that of the channel map; \
-                 the intervals are too small",
+                "warning: the shifts contradict the model: the errors of the torques are {:.1} times those that drag and the converter's maps explain, and the \
+                 intervals are too small\nhint: check that the vehicle file is of this car, the shape of its maps, and the signals of the channel map",
                 self.torque_misfit
             ));
         }
         if !self.at_limit.is_empty() {
             lines.push(format!(
-                "warning: at the limit of the prior (4 standard deviations): {}. The vehicle file is not of this car, or a signal is not that \
-                 of the channel map; do not use the fitted file before the reason is known",
+                "warning: at the limit of the prior (4 standard deviations): {}\nhint: check that the vehicle file is of this car, and the \
+                 signals of the channel map; do not use the fitted values before the reason is known",
                 self.at_limit.join(", ")
             ));
         }

@@ -102,7 +102,11 @@ impl Blf {
             || !(48..=4096).contains(&length)
             || blf.bytes(length as usize - 8)?.len() + 8 < length as usize
         {
-            return Err(LogError::damaged(path, "byte 4", "the head of the file is cut or has a wrong length"));
+            return Err(LogError::damaged(
+                path,
+                "byte 4",
+                "the head of the file is cut or has a wrong length\nhint: copy the file again from the recorder",
+            ));
         }
         Ok(blf)
     }
@@ -116,7 +120,8 @@ impl Blf {
     }
 
     fn damaged(&self, offset: u64, message: impl Into<String>) -> LogError {
-        LogError::damaged(&self.path, format!("byte {offset}"), message)
+        let hint = "the file is cut or damaged: copy it again from the recorder";
+        LogError::damaged(&self.path, format!("byte {offset}"), format!("{}\nhint: {hint}", message.into()))
     }
 
     /// Reads the next object of the file into the memory; false at the end.
@@ -239,7 +244,10 @@ impl Frames for Blf {
                     return Err(self.damaged(self.offset, "the last object is cut"));
                 }
                 return match self.frames {
-                    0 => Err(LogError::file(&self.path, "there are no data frames")),
+                    0 => Err(LogError::file(
+                        &self.path,
+                        "there are no data frames\nhint: check that the bus was active and the recorder connected",
+                    )),
                     _ => Ok(None),
                 };
             }

@@ -265,14 +265,18 @@ impl Frames for Lines {
             Some(first) if self.unread > self.frames => Err(LogError::file(
                 &self.path,
                 format!(
-                    "{} lines are no frames and {} are, the first that is none is {first}",
+                    "{} lines are no frames and {} are, the first that is none is {first}\nhint: record the trace with candump -L, or as ASC, BLF or PCAN trace",
                     self.unread, self.frames
                 ),
             )),
-            _ if self.frames == 0 && self.is_cut => {
-                Err(LogError::file(&self.path, "the only data frame stands in a last line without an end"))
-            }
-            _ if self.frames == 0 => Err(LogError::file(&self.path, "there are no data frames")),
+            _ if self.frames == 0 && self.is_cut => Err(LogError::file(
+                &self.path,
+                "the only data frame is in a last line without an end\nhint: the recording was cut; record again",
+            )),
+            _ if self.frames == 0 => Err(LogError::file(
+                &self.path,
+                "there are no data frames\nhint: check that the bus was active and the recorder connected",
+            )),
             _ => Ok(None),
         }
     }

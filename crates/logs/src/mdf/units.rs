@@ -89,7 +89,7 @@ impl TimeUnits {
         names.dedup();
         if let Some((name, _)) = wanted.filter(|(name, _)| !names.contains(&format!("`{}`", error::shown(name)))) {
             notes.push(format!(
-                "[time] of the channel map names `{}` and has no effect: the times of this log are {}",
+                "[time] of the channel map names `{}` and has no effect: the times of this log are {}\nhint: leave `name` out, or give one of these",
                 error::shown(name),
                 error::some(&names)
             ));

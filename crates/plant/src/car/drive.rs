@@ -103,7 +103,9 @@ pub fn simulate_car_drive_while(
         let driver = road.at(now_s, &run);
         let [engine_rad_s, ..] = model.speeds(run.state());
         if engine_rad_s < STALLED_RAD_S {
-            let message = format!("the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): the load is too large");
+            let message = format!(
+                "the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): the load is too large\nhint: reduce grade, brake or mass, open the throttle more, or begin in a lower gear"
+            );
             return Err(CarError::Request(message));
         }
         let map_rad_s = model.car.engine.torque_n_m.rows().last().copied().unwrap_or(f64::INFINITY);
@@ -137,7 +139,9 @@ impl<'d> Road<'d> {
     fn new(drive: &'d Drive) -> Result<Self, CarError> {
         let is_short = drive.segments.iter().any(|segment| segment.duration_s.max(0.0) < 1e-3);
         if drive.trace.is_none() && (drive.segments.is_empty() || is_short) {
-            return Err(CarError::Request("a drive needs segments of 1 ms or more".to_owned()));
+            return Err(CarError::Request(
+                "a drive needs segments of 1 ms or more\nhint: give each [[segment]] a longer `duration_s`".to_owned(),
+            ));
         }
         Ok(Self { drive, segment: 0, begun_s: 0.0, follower: drive.trace.as_ref().map(Follower::new) })
     }
@@ -210,7 +214,9 @@ impl<'d> Shifting<'d> {
         };
         let gears: Vec<(usize, f64)> =
             car.gearbox.forward_gears().into_iter().map(|gear| (gear, car.gearbox.gears[gear].ratio)).collect();
-        let no_gear = || CarError::Request("the gearbox has no forward gear".to_owned());
+        let no_gear = || {
+            CarError::Request("the gearbox has no forward gear\nhint: a forward gear has a positive ratio".to_owned())
+        };
         let lowest = gears.first().map(|&(gear, _)| gear).ok_or_else(no_gear)?;
         let start = drive.start_gear.as_deref().map_or(Ok(Wanted::Gear(lowest)), named)?;
         let (gear, starts_in_neutral) = match start {

@@ -30,13 +30,17 @@ pub enum CarError {
     #[error(transparent)]
     Train(#[from] TrainError),
     /// The step size fell below its floor or a state became infinite.
-    #[error("the simulation diverged at {time_s:.4} s; check inertias, stiffnesses and time constants")]
+    #[error(
+        "the simulation diverged at {time_s:.4} s\nhint: check inertias, stiffnesses and time constants of vehicle and gearbox file"
+    )]
     Diverged {
         /// When.
         time_s: f64,
     },
     /// The elements found no consistent contact.
-    #[error("the elements change endlessly between sticking and slipping at {time_s:.4} s")]
+    #[error(
+        "the elements change endlessly between sticking and slipping at {time_s:.4} s\nhint: if neutral is requested here, request it with accelerator and brake released; else check inertias and friction of the elements"
+    )]
     Chatter {
         /// When.
         time_s: f64,

@@ -55,7 +55,9 @@ impl<'m> CarRun<'m> {
         (driver, sample_time_s): (Driver, f64),
     ) -> Result<Self, CarError> {
         if sample_time_s.is_nan() || sample_time_s < 1e-4 {
-            return Err(CarError::Request(format!("the sample time is {sample_time_s} s, expected 1e-4 s or more")));
+            return Err(CarError::Request(format!(
+                "the sample time is {sample_time_s} s, expected 1e-4 s or more\nhint: 0.01 is usual"
+            )));
         }
         if !is_same_box(&model.car, nominal) {
             let message = "the controller's car has another gearbox than the simulated one".to_owned();

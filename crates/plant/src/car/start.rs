@@ -38,17 +38,19 @@ impl CarModel {
         let car = &self.car;
         let wrong = |message: String| Err(CarError::Request(message));
         let (Some(of_gear), Some(train)) = (car.gearbox.gears.get(gear), car.gearbox.train.as_ref()) else {
-            return wrong(format!("the gearbox has no gear number {gear}"));
+            return wrong(format!("the gearbox has no gear number {gear}\nhint: gears count from 0"));
         };
         if !vehicle_m_s.is_finite() || !throttle.is_finite() {
-            return wrong(format!("a car cannot start at {vehicle_m_s} m/s with throttle {throttle}"));
+            return wrong(format!(
+                "a car cannot start at {vehicle_m_s} m/s with throttle {throttle}\nhint: both must be finite numbers"
+            ));
         }
         let wheel_rad_s = vehicle_m_s / car.road.wheel_radius_m;
         let output = wheel_rad_s * car.driveline.final_ratio;
         let turbine = of_gear.ratio * output;
         if turbine.abs() > SPEEDS_RAD_S.1 {
             return wrong(format!(
-                "in gear {} at {vehicle_m_s} m/s the gearbox input would turn at {turbine:.0} rad/s, expected at most {} rad/s",
+                "in gear {} at {vehicle_m_s} m/s the gearbox input would turn at {turbine:.0} rad/s, expected at most {} rad/s\nhint: start slower, or in a higher gear",
                 of_gear.name, SPEEDS_RAD_S.1
             ));
         }

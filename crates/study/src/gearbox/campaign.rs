@@ -266,22 +266,27 @@ impl CarCampaign {
         let mut next = || cells.next().ok_or_else(|| "the row has too few cells".to_owned());
         let (found, seed, status) = (next()?, next()?, next()?);
         if found.parse() != Ok(run) {
-            return Err(format!("expected run {run}, found `{found}`"));
+            return Err(format!(
+                "expected run {run}, found `{found}`\nhint: the file is of another study or version, or was edited"
+            ));
         }
         if seed.parse() != Ok(mixed(self.study.seed, run)) {
-            return Err(format!("the seed of run {run} is another one"));
+            return Err(format!("the seed of run {run} is another one\nhint: the file is of another study or version"));
         }
         let number = |cell: &str| {
             if cell.is_empty() { Ok(f64::NAN) } else { cell.parse().map_err(|_| format!("`{cell}` is no number")) }
         };
         let numbers = cells.map(number).collect::<Result<Vec<f64>, _>>()?;
         if numbers.len() != self.groups.len() * WIDTH {
-            return Err("the row has another number of cells".to_owned());
+            return Err(
+                "the row has another number of cells\nhint: the file is of another study or version, or was edited"
+                    .to_owned(),
+            );
         }
         let failure = match status {
             "ok" => None,
             "failed" => Some(FAILED_BEFORE.to_owned()),
-            other => return Err(format!("there is no status `{other}`")),
+            other => return Err(format!("there is no status `{other}`\nhint: the file was edited")),
         };
         Ok(CarRow { run, seed: mixed(self.study.seed, run), failure, numbers })
     }

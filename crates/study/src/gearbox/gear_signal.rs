@@ -223,13 +223,13 @@ impl Gears {
         }
         if self.neutral > 0 {
             notes.push(format!(
-                "gear is neutral in shifts of a car that moves (so often: {}): it counts as the gear before until it is another gear",
+                "gear is neutral in a shift of a moving car ({} times): it counts as the gear before until it is another gear",
                 self.neutral
             ));
         }
         if self.late > 0 {
             notes.push(format!(
-                "gear is late (so often: {}): target_gear went on to another gear while gear was still the one before, and turbine and output speed \
+                "gear is late ({} times): target_gear changed to another gear while gear was still the one before, and turbine and output speed \
                  fitted the first target: the shift to it counts as completed there\nhint: use a gear that changes when a shift is done, as the \
                  controller of the gearbox has it",
                 self.late
@@ -304,7 +304,7 @@ mod tests {
         let shift = [["2", "2", "2"], ["2", "3", "2"], ["N", "3", "2"], ["N", "3", "3"], ["3", "3", "3"]];
         let (shown, notes) = driven(&shift, 100.0);
         assert_eq!(shown, [["2", "2"], ["2", "3"], ["2", "3"], ["2", "3"], ["3", "3"]]);
-        assert!(notes.unwrap()[0].starts_with("gear is neutral in shifts of a car that moves (so often: 1)"));
+        assert!(notes.unwrap()[0].starts_with("gear is neutral in a shift of a moving car (1 times)"));
         // Neutral that is asked for is neutral, and so is what follows; a car that stands has garage shifts.
         let neutral = [["3", "3", "3"], ["3", "N", "3"], ["N", "N", "3"], ["N", "3", "3"], ["3", "3", "3"]];
         assert_eq!(driven(&neutral, 100.0).0, [["3", "3"], ["3", "N"], ["N", "N"], ["N", "3"], ["3", "3"]]);

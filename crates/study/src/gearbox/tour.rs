@@ -90,7 +90,7 @@ impl TourDriver<'_> {
         let [engine_rad_s, ..] = self.model.speeds(self.run.state());
         if engine_rad_s <= 0.0 {
             return Err(
-                CarError::Request(format!("the engine stalls at {before_s:.2} s: the load is too large")).into()
+                CarError::Request(format!("the engine stalls at {before_s:.2} s: the load is too large\nhint: check engine torque, mass and ratios of the vehicle file")).into()
             );
         }
         let throttle_now = self.throttle.max(idle_throttle(engine_rad_s));

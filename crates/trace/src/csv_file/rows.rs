@@ -129,7 +129,7 @@ impl CsvRows {
         let time_s = self.time_s();
         match before.filter(|before| time_s <= *before) {
             None => Ok(true),
-            Some(before) => Err(self.wrong(format!("the time {time_s} s is not after the time before it, {before} s"))),
+            Some(before) => Err(self.wrong(format!("the time {time_s} s is not after the time before it, {before} s\nhint: sort the rows by time, and remove repeated ones"))),
         }
     }
 
@@ -147,7 +147,7 @@ impl CsvRows {
         }
         if self.source.len() != self.columns.len() {
             let (cells, names) = (self.source.len(), self.columns.len());
-            return Err(self.wrong(format!("the row has {cells} cells, but the first line names {names} columns")));
+            return Err(self.wrong(format!("the row has {cells} cells, but the first line names {names} columns\nhint: write an empty cell where there is no value")));
         }
         let time_s = self.number(self.time_at)?;
         if !time_s.is_finite() {

@@ -293,7 +293,7 @@ fn a_local_time_is_read_by_a_map() {
 fn a_broken_file_says_where_it_is_broken() {
     assert_eq!(
         error("back", "time_s,a\n0,1\n0.2,1\n0.1,1\n"),
-        "FILE:4: the time 0.1 s is not after the time before it, 0.2 s"
+        "FILE:4: the time 0.1 s is not after the time before it, 0.2 s\nhint: sort the rows by time, and remove repeated ones"
     );
     assert_eq!(error("blank", "time_s,a\n0,1\n,1\n"), "FILE:3: the time is missing");
     assert_eq!(error("windows", "time_s,a\r\n0,1\r\n\r\n,1\r\n"), "FILE:4: the time is missing");
@@ -301,9 +301,12 @@ fn a_broken_file_says_where_it_is_broken() {
     assert_eq!(error("untimed", "t,a\n0,1\n"), "FILE: there is no column `time_s`\nhint: the columns are t, a");
     assert_eq!(
         error("ragged", "time_s,a\n0,1\n1\n"),
-        "FILE:3: the row has 1 cells, but the first line names 2 columns"
+        "FILE:3: the row has 1 cells, but the first line names 2 columns\nhint: write an empty cell where there is no value"
     );
-    assert_eq!(error("comma", "time_s,a\n0,1,\n"), "FILE:2: the row has 3 cells, but the first line names 2 columns");
+    assert_eq!(
+        error("comma", "time_s,a\n0,1,\n"),
+        "FILE:2: the row has 3 cells, but the first line names 2 columns\nhint: write an empty cell where there is no value"
+    );
     assert_eq!(error("empty", ""), "FILE: the file is empty");
     assert_eq!(error("endless", "time_s,a\n0,1\n1e400,1\n"), "FILE:3: the time is 1e400");
     assert_eq!(error("nan", "time_s,a\nNaN,1\n"), "FILE:2: the time is NaN");

@@ -166,6 +166,8 @@ pub(crate) fn said_of_origin(origin_s: f64) -> Option<String> {
 /// Says that a log which is followed has ended by itself, where it is a file that may grow.
 pub(crate) fn say_end_of_followed(options: &EstimateOptions, path: &Path, say: Notes<'_>) {
     if options.follow.as_ref().is_some_and(|stop| !stop.load(Ordering::Relaxed)) && path.is_file() {
-        say("warning: the log became shorter or was replaced by another file: the estimate ends there");
+        say(
+            "warning: the log became shorter or was replaced by another file: the estimate ends there\nhint: begin again with the new file",
+        );
     }
 }

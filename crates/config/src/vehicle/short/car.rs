@@ -176,7 +176,7 @@ const HEAD: &str = "\
 # A car with all gears of its gearbox, for `wetclutch simulate`, `estimate` and `fit`. Units are SI; each key ends with its unit.
 #
 # What is not here is a default: that of a 2.0 L mid-size car, scaled to the numbers below. A line that begins with `# ` and a key is
-# such a default: take the `# ` away and put in what you know. `wetclutch check` lists all defaults, and says which values matter most
+# such a default: take the `# ` away and put in what you know. `wetclutch check` lists all defaults, and shows the values that matter most
 # for the estimate.
 ";
 

@@ -114,7 +114,14 @@ impl Facts {
                 check.meaning(&key, 0, "is missing".to_owned(), Some(hint))
             };
             let (at, value) = located(table.get_ref(), path).ok_or_else(missing)?;
-            let value = number_of(value).ok_or_else(|| check.meaning(&key, at, "is not a number".to_owned(), None))?;
+            let value = number_of(value).ok_or_else(|| {
+                check.meaning(
+                    &key,
+                    at,
+                    "is not a number".to_owned(),
+                    Some("write a number without quotes, such as 1650.0".to_owned()),
+                )
+            })?;
             check.number(&key, &Spanned::new(at..at, value), range)
         };
         let (ratio_before, ratio_after) = ratios(&check, located(table.get_ref(), &["gear_train", "ratios"]))?;
@@ -174,7 +181,10 @@ fn ratios(check: &Check<'_>, value: Option<(usize, &DeValue<'_>)>) -> Result<(f6
             let hint = "the ratio is turbine over output speed, such as 4.17 in 1st gear and 2.34 in 2nd".to_owned();
             Err(check.meaning(key, at, message, Some(hint)))
         }
-        _ => Err(check.meaning(key, at, "expected [before, after]".to_owned(), None)),
+        _ => {
+            let hint = Some("the ratios of the gears before and after the upshift, such as [4.17, 2.34]".to_owned());
+            Err(check.meaning(key, at, "expected [before, after]".to_owned(), hint))
+        }
     }
 }
 
@@ -183,7 +193,8 @@ pub(in super::super) fn refuse_facts(check: &Check<'_>, raw: &RawVehicleFile) ->
     match &raw.engine.max_torque_n_m {
         Some(value) if raw.gear_train.ratios.is_none() => {
             let message = "scales the defaults of a file with `gear_train.ratios`, which this file is not".to_owned();
-            Err(check.meaning("engine.max_torque_n_m", value.span().start, message, None))
+            let hint = Some("remove it, or give `gear_train.ratios` instead of the gear train".to_owned());
+            Err(check.meaning("engine.max_torque_n_m", value.span().start, message, hint))
         }
         _ => Ok(()),
     }

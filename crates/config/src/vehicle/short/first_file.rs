@@ -38,7 +38,7 @@ const HEAD: &str = "\
 # A car and one of its upshifts, for `wetclutch estimate` and `wetclutch fit`. Units are SI; each key ends with its unit.
 #
 # What is not here is a default: that of a 2.0 L mid-size car, scaled to the numbers below. A line that begins with `# ` and a key is
-# such a default: take the `# ` away and put in what you know. `wetclutch check` lists all defaults, and says which of them matter most
+# such a default: take the `# ` away and put in what you know. `wetclutch check` lists all defaults, and shows those that matter most
 # for the estimate; `wetclutch init --complete` writes them all into the file.
 ";
 

@@ -129,7 +129,7 @@ impl CarShiftController {
     /// There is no such gear.
     pub fn new(car: &Car, calibration: CarCalibration, gear: usize) -> Result<Self, CarError> {
         if gear >= car.gearbox.gears.len() {
-            return Err(CarError::Request(format!("the gearbox has no gear number {gear}")));
+            return Err(CarError::Request(format!("the gearbox has no gear number {gear}\nhint: gears count from 0")));
         }
         let output = Track::new(calibration.output_filter_s);
         Ok(Self {
@@ -196,12 +196,15 @@ impl CarShiftController {
     /// The gear cannot be reached.
     pub fn request(&mut self, to: usize, time_s: f64) -> Result<(), CarError> {
         let Some(ratio) = self.car.gearbox.gears.get(to).map(|gear| gear.ratio) else {
-            return Err(CarError::Request(format!("the gearbox has no gear number {to}")));
+            return Err(CarError::Request(format!("the gearbox has no gear number {to}\nhint: gears count from 0")));
         };
         let Some(active) = &self.active else {
             let turns = ratio * self.car.gearbox.gears[self.gear].ratio < 0.0;
             if turns && self.output.speed_rad_s().abs() > AT_REST_RAD_S {
-                let message = format!("gear {} can be engaged only at rest", self.name(to));
+                let message = format!(
+                    "gear {} can be engaged only at rest\nhint: brake to a standstill before the direction changes",
+                    self.name(to)
+                );
                 return Err(CarError::Request(message));
             }
             if self.is_neutral || turns {
