@@ -63,6 +63,7 @@ fn every_command_that_writes_a_page_opens_it() {
         "reproduce",
         "sensitivity",
         "study",
+        "worst-case",
     ] {
         assert!(help(command).contains("--open"), "{command}");
     }

@@ -558,6 +558,14 @@ fn the_worst_case_is_a_study_that_can_be_run() {
     ]);
     let found = printed.split("RMS error ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
     let case = study.path("out/worst_inertia_phase.toml");
+    let page = String::from_utf8(bytes(study.path("out/worst_case.html"))).unwrap();
+    assert!(printed.contains(&format!("page: {}", study.path("out/worst_case.html"))), "{printed}");
+    assert_eq!(page.matches("<div class=\"figure\">").count(), 2);
+    let searched = page.find("runs of the search").unwrap();
+    assert!(searched < page.find("Inertia phase: parameters").unwrap());
+    for words in ["Inertia phase: worst case", "\"worst of the study\"", " --run 0</pre>"] {
+        assert!(page.contains(words), "{words}");
+    }
     done(&["study", &case, "--run", "0", "-o", &study.path("again")]);
     let table = String::from_utf8(bytes(Path::new(&study.path("again")).join("run_0_row.csv").as_path())).unwrap();
     let (names, row) = table.trim_end().split_once('\n').unwrap();

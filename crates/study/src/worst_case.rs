@@ -1,6 +1,6 @@
 //! Searches a study's factors for the run with the largest error of an observer.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
@@ -39,12 +39,13 @@ pub struct WorstCase {
     pub evaluations: u64,
     /// Starts of the search.
     pub starts: usize,
+    /// Of each start: the largest score so far after each of its runs, Pa.
+    pub progress: Vec<Vec<f64>>,
 }
 
 struct Search<'a> {
     campaign: &'a Campaign,
     target: Target,
-    evaluations: AtomicU64,
 }
 
 impl Search<'_> {
@@ -61,15 +62,26 @@ impl Search<'_> {
     }
 }
 
-impl CostFunction for &Search<'_> {
+/// A search from one start.
+struct FromStart<'a> {
+    search: &'a Search<'a>,
+    /// The largest score so far after each run, Pa.
+    progress: Mutex<Vec<f64>>,
+}
+
+impl CostFunction for &FromStart<'_> {
     type Param = Vec<f64>;
     type Output = f64;
 
     fn cost(&self, places: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        self.evaluations.fetch_add(1, Ordering::Relaxed);
-        let row = self.campaign.row_at(0, &self.values(places))?;
+        let search = self.search;
+        let row = search.campaign.row_at(0, &search.values(places))?;
+        let score = search.score(&row);
+        let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = progress.last().copied().unwrap_or(0.0);
+        progress.push(before.max(score));
         let outside: f64 = places.iter().map(|place| (place - place.clamp(0.0, 1.0)).abs()).sum();
-        Ok(OUTSIDE_PA * outside - self.score(&row))
+        Ok(OUTSIDE_PA * outside - score)
     }
 }
 
@@ -86,7 +98,7 @@ pub fn worst_case(
     threads: usize,
     mut progress: impl FnMut(),
 ) -> Result<Option<WorstCase>, StudyError> {
-    let search = Search { campaign, target, evaluations: AtomicU64::new(0) };
+    let search = Search { campaign, target };
     let mut worst: Vec<Row> = Vec::new();
     execute::<StudyError>(campaign, 0..campaign.study.runs, threads, |row| {
         let at = worst.iter().position(|other| search.score(row) > search.score(other)).unwrap_or(worst.len());
@@ -98,7 +110,7 @@ pub fn worst_case(
         Ok(())
     })?;
     let Some(study_worst) = worst.first().cloned() else { return Ok(None) };
-    let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut found: Vec<Found> = Vec::new();
     crate::campaign::in_order(
         0..worst.len() as u64,
         threads,
@@ -109,16 +121,26 @@ pub fn worst_case(
             Ok(())
         },
     )?;
-    let evaluations = search.evaluations.load(Ordering::Relaxed);
-    let best = found.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((_, places)) = best else { return Ok(None) };
-    let row = campaign.row_at(0, &search.values(&places))?;
+    let evaluations = found.iter().map(|found| found.progress.len() as u64).sum();
+    let Some(best) = found.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else { return Ok(None) };
+    let row = campaign.row_at(0, &search.values(&best.places))?;
     debug_assert_eq!(row.seed, run_seed(&campaign.study, 0));
-    Ok(Some(WorstCase { study_worst, row, evaluations, starts: worst.len() }))
+    let progress = found.into_iter().map(|found| found.progress).collect();
+    Ok(Some(WorstCase { study_worst, row, evaluations, starts: worst.len(), progress }))
 }
 
-/// The largest score found from one start, and where.
-fn from(search: &Search<'_>, start: &Row, iterations: u64) -> Result<(f64, Vec<f64>), StudyError> {
+/// What was found from one start.
+struct Found {
+    /// The largest score, Pa, with what leaving the ranges costs.
+    score: f64,
+    /// Where.
+    places: Vec<f64>,
+    /// The largest score so far after each run, Pa.
+    progress: Vec<f64>,
+}
+
+/// The search from one start.
+fn from(search: &Search<'_>, start: &Row, iterations: u64) -> Result<Found, StudyError> {
     let factors = &search.campaign.study.factors;
     let origin: Vec<f64> =
         factors.iter().zip(&start.numbers).map(|(factor, &value)| place_of(&factor.values, value)).collect();
@@ -135,10 +157,16 @@ fn from(search: &Search<'_>, start: &Row, iterations: u64) -> Result<(f64, Vec<f
     };
     let solver = NelderMead::new(simplex).with_sd_tolerance(FLAT_PA).map_err(failed)?;
     // A diverged estimate ends the search: argmin's target is a cost of minus infinity, and nothing is worse.
-    let result = Executor::new(search, solver).configure(|state| state.max_iters(iterations)).run().map_err(failed)?;
+    let from_start = FromStart { search, progress: Mutex::new(Vec::new()) };
+    let result =
+        Executor::new(&from_start, solver).configure(|state| state.max_iters(iterations)).run().map_err(failed)?;
     let state = result.state();
     let places = state.get_best_param().cloned().unwrap_or(origin);
-    Ok((-state.get_best_cost(), places))
+    let (score, progress) = (
+        -state.get_best_cost(),
+        std::mem::take(&mut *from_start.progress.lock().unwrap_or_else(PoisonError::into_inner)),
+    );
+    Ok(Found { score, places, progress })
 }
 
 impl WorstCase {

@@ -227,6 +227,11 @@ fn the_search_finds_a_case_at_least_as_bad_as_the_worst_run() {
     let found = worst_case(&campaign, target, 2, 40, 2, || ()).unwrap().unwrap();
     let score = |row: &study::Row| row.numbers[campaign.layout.score(1, 1, Metric::PressureRms)];
     assert!(score(&found.row) > score(&found.study_worst) && found.evaluations > 40);
+    // The largest score so far does not fall, and is that of the worst case in the end.
+    assert_eq!(found.progress.len(), 2);
+    assert!(found.progress.iter().flat_map(|of| of.windows(2)).all(|pair| pair[0] <= pair[1]));
+    let last = found.progress.iter().filter_map(|of| of.last()).copied().fold(0.0, f64::max);
+    assert!(last >= score(&found.row), "{last} {}", score(&found.row));
     let inside = |(factor, value): (&config::Factor, &f64)| {
         let [low, high] = factor.values.ends();
         (low..=high).contains(value)

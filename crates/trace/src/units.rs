@@ -160,6 +160,56 @@ const UNITS: &[(&str, &[&str], Quantity, f64, f64)] = &[
     ("degF", &["degF", "°F", "deg_F"], Quantity::Temperature, 5.0 / 9.0, -160.0 / 9.0),
 ];
 
+/// Endings of keys in SI with their units; one that ends with another stands before it.
+const OF_KEYS: &[(&str, &str)] = &[
+    ("_n_m_s_rad", "N m s/rad"),
+    ("_m3_s_pa", "m^3/(s Pa)"),
+    ("_pa_s_rad", "Pa s/rad"),
+    ("_n_m_rad", "N m/rad"),
+    ("_kg_m2", "kg m^2"),
+    ("_kg_m3", "kg/m^3"),
+    ("_n_m_s2", "N m s^2"),
+    ("_n_m_s", "N m s"),
+    ("_n_m", "N m"),
+    ("_rad_s2", "rad/s^2"),
+    ("_rad_s", "rad/s"),
+    ("_m_s1_75", "m/s^1.75"),
+    ("_m_s3", "m/s^3"),
+    ("_m_s2", "m/s^2"),
+    ("_m_s", "m/s"),
+    ("_m3_pa", "m^3/Pa"),
+    ("_m3_s", "m^3/s"),
+    ("_sqrt_pa_s", "sqrt(Pa)/s"),
+    ("_pa_a", "Pa/A"),
+    ("_pa_s", "Pa/s"),
+    ("_per_s", "1/s"),
+    ("_percent", "%"),
+    ("_degc", "degC"),
+    ("_rad", "rad"),
+    ("_m3", "m^3"),
+    ("_m2", "m^2"),
+    ("_kg", "kg"),
+    ("_pa", "Pa"),
+    ("_n", "N"),
+    ("_a", "A"),
+    ("_j", "J"),
+    ("_w", "W"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// The SI unit of a key of a file, such as `mass_kg`; places of a list stand behind it, as in `torque_n_m.0.3`.
+pub fn of_key(key: &str) -> Option<&'static str> {
+    let is_place = |part: &&str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+    let name = key.rsplit('.').find(|part| !is_place(part))?;
+    OF_KEYS.iter().find(|(ending, _)| name.ends_with(ending)).map(|&(_, unit)| unit)
+}
+
+/// How the name of a key of this unit ends, such as `_kg`.
+pub fn key_ending(unit: &str) -> Option<&'static str> {
+    OF_KEYS.iter().find(|(_, of)| *of == unit).map(|&(ending, _)| ending)
+}
+
 /// Pascal in megapascal.
 pub fn mpa(pascal: f64) -> f64 {
     pascal * 1e-6
@@ -178,6 +228,24 @@ pub fn km_h(m_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_have_the_units_of_their_endings() {
+        for (key, unit) in [
+            ("vehicle.mass_kg", Some("kg")),
+            ("engine.torque.torque_n_m.0.3", Some("N m")),
+            ("clutch.A.damping_n_m_s_rad", Some("N m s/rad")),
+            ("turbine.inertia_kg_m2", Some("kg m^2")),
+            ("clutch.C", None),
+            ("throttle.position.2", None),
+        ] {
+            assert_eq!(of_key(key), unit, "{key}");
+        }
+        // An ending that ends with another one is found before it.
+        for (at, (ending, _)) in OF_KEYS.iter().enumerate() {
+            assert!(OF_KEYS[..at].iter().all(|(before, _)| !ending.ends_with(before)), "{ending}");
+        }
+    }
 
     #[test]
     fn units_are_read_as_files_write_them() {

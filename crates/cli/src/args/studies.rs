@@ -207,7 +207,7 @@ pub(crate) struct WorstCaseOptions {
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 200)]
     #[arg(value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(crate) iterations: u64,
-    /// Folder for the worst case (a study file) and its figure
+    /// Folder for the page, and for each worst case a study file and a figure
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-worst-case")]
     pub(crate) output: PathBuf,
     #[command(flatten)]

@@ -33,6 +33,7 @@ mod simulate_drive;
 mod study;
 mod suggested;
 mod worst_case;
+mod worst_case_page;
 mod written;
 
 use car::read_car;

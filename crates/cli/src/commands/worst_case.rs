@@ -8,17 +8,22 @@ use report::shift_figure::observers_of;
 use report::tables::phase_name;
 use serde_json::{Value, json};
 use study::campaign::{Metric, PHASES};
-use study::{Campaign, Row, Target, WorstCase, worst_case as search};
+use study::{Campaign, Row, Target, worst_case as search};
 use trace::ShownPath as _;
 use trace::quantity;
 use trace::units::mpa;
 
+use super::worst_case_page::{Shown, sentence, sheet};
 use crate::args::{PhaseChoice, WorstCaseOptions};
+use crate::browser;
 use crate::commands::written::{head, replaces_only};
-use crate::commands::{not_an_input, progress, writable, write_text};
+use crate::commands::{not_an_input, progress, replaceable, write_text};
 use crate::failure::Failure;
 use crate::output;
 use wetclutch::shell_quoted;
+
+/// The name of the page.
+const PAGE: &str = "worst_case.html";
 
 pub(crate) fn worst_case(options: &WorstCaseOptions) -> Result<(), Failure> {
     let study = Study::read(&options.study)?;
@@ -35,7 +40,7 @@ pub(crate) fn worst_case(options: &WorstCaseOptions) -> Result<(), Failure> {
         PhaseChoice::Inertia => vec![1],
         PhaseChoice::Both => vec![0, 1],
     };
-    writable(&options.output, &[])?;
+    replaceable(&options.output, &[PAGE])?;
     let inputs = [&options.study, &study.experiment.source.path, &study.vehicle.source.path];
     for &phase in &phases {
         let [study, figure] = places(options, phase);
@@ -46,8 +51,17 @@ pub(crate) fn worst_case(options: &WorstCaseOptions) -> Result<(), Failure> {
     let campaign = Campaign::new(study)?;
     let target = |phase| Target { observer, phase, metric: Metric::PressureRms };
     let found = phases.into_iter().map(|phase| one(&campaign, &experiment, target(phase), options));
-    let found: Vec<Value> = found.collect::<Result<_, _>>()?;
-    if options.json { output::json(&json!({ "worst_cases": found })) } else { Ok(()) }
+    let found: Vec<Shown> = found.collect::<Result<_, _>>()?;
+    let page = options.output.join(PAGE);
+    write_text(&page, &sheet(&campaign, &found).html()?)?;
+    if options.json {
+        let cases: Vec<Value> = found.iter().map(|shown| json_of(&campaign, shown, options)).collect();
+        output::json(&json!({ "worst_cases": cases, "page": page.shown().to_string() }))?;
+    } else {
+        output::line(&format!("page: {}", page.shown()))?;
+    }
+    browser::open_if(options.open.is_wanted, &page);
+    Ok(())
 }
 
 /// The absolute path of the study's experiment, for a study file in any folder.
@@ -62,8 +76,8 @@ fn experiment_path(study: &Study) -> Result<String, Failure> {
     })
 }
 
-/// Searches the worst case of a phase, and writes and prints it; the result as JSON.
-fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCaseOptions) -> Result<Value, Failure> {
+/// Searches the worst case of a phase, and writes and prints it.
+fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCaseOptions) -> Result<Shown, Failure> {
     let bar = progress(campaign.study.runs + u64::from(options.starts), 0);
     let starts = usize::from(options.starts);
     let found = search(campaign, target, starts, options.iterations, options.threads.count(), || bar.inc(1))?;
@@ -71,20 +85,22 @@ fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCas
     let Some(found) = found else {
         return Err(Failure::Work("no run of the study has a complete shift to start from\nhint: let the experiment record longer, or narrow the factors of the study".to_owned()));
     };
-    let places = places(options, target.phase);
-    let [study, figure] = &places;
+    let [study, figure] = &places(options, target.phase);
     write_text(study, &found.study_file(campaign, experiment))?;
     let run = Campaign::new(Study::read(study)?)?.run_in_full(0)?;
     write_text(figure, &observers_of(&run.observers, &run.trace, run.quality.as_ref()).svg())?;
+    let command = format!("wetclutch study {} --run 0", shell_quoted(study));
+    let shown = Shown { target, found, run, command };
     if !options.json {
-        print(campaign, target, &found)?;
-        print_places(study, figure)?;
+        print(campaign, &shown)?;
+        output::line(&format!("figure: {}", figure.shown()))?;
+        output::line(&format!("to repeat: {}\n", shown.command))?;
     }
-    Ok(json_of(campaign, target, &found, &places))
+    Ok(shown)
 }
 
 /// The worst case in SI.
-fn json_of(campaign: &Campaign, target: Target, found: &WorstCase, places: &[PathBuf; 2]) -> Value {
+fn json_of(campaign: &Campaign, Shown { target, found, .. }: &Shown, options: &WorstCaseOptions) -> Value {
     let score = |row: &Row| row.numbers[campaign.layout.score(target.observer, target.phase, target.metric)];
     let factors: BTreeMap<_, _> = campaign.layout.factors.iter().zip(&found.row.numbers).collect();
     json!({
@@ -94,23 +110,15 @@ fn json_of(campaign: &Campaign, target: Target, found: &WorstCase, places: &[Pat
         "study_rms_pa": score(&found.study_worst),
         "more_runs": found.evaluations,
         "factors": factors,
-        "files": places.iter().map(|path| path.shown().to_string()).collect::<Vec<_>>(),
+        "files": places(options, target.phase).iter().map(|path| path.shown().to_string()).collect::<Vec<_>>(),
     })
 }
 
-fn print(campaign: &Campaign, target: Target, found: &WorstCase) -> Result<(), Failure> {
-    let (name, phase) = (&campaign.layout.observers[target.observer], PHASES[target.phase]);
-    output::line(&format!(
-        "{name}, {}: RMS error {}; {} in the worst of the {} runs of the study ({} more runs from {} starts)",
-        phase_name(phase),
-        score(campaign, target, &found.row),
-        score(campaign, target, &found.study_worst),
-        campaign.study.runs,
-        found.evaluations,
-        found.starts,
-    ))?;
+fn print(campaign: &Campaign, shown: &Shown) -> Result<(), Failure> {
+    let Shown { target, found, .. } = shown;
+    output::line(&sentence(campaign, shown))?;
     for (other, name) in campaign.layout.observers.iter().enumerate().filter(|(other, _)| *other != target.observer) {
-        let there = score(campaign, Target { observer: other, ..target }, &found.row);
+        let there = score(campaign, Target { observer: other, ..*target }, &found.row);
         output::line(&format!("  {name} in this run: {there}"))?;
     }
     for (factor, value) in campaign.layout.factors.iter().zip(&found.row.numbers) {
@@ -126,15 +134,9 @@ fn places(options: &WorstCaseOptions, phase: usize) -> [PathBuf; 2] {
 }
 
 /// The score of a run, with its unit.
-fn score(campaign: &Campaign, target: Target, row: &Row) -> String {
+pub(super) fn score(campaign: &Campaign, target: Target, row: &Row) -> String {
     match mpa(row.numbers[campaign.layout.score(target.observer, target.phase, target.metric)]) {
         f64::INFINITY => "infinite (it diverged)".to_owned(),
         score => quantity(score, "MPa", 4),
     }
-}
-
-fn print_places(study: &Path, figure: &Path) -> Result<(), Failure> {
-    output::line(&format!("figure: {}", figure.shown()))?;
-    output::line(&format!("to repeat: wetclutch study {} --run 0\n", shell_quoted(study)))?;
-    Ok(())
 }
