@@ -87,6 +87,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::ErrorBound(options) => commands::error_bound(&options),
         Command::Sensitivity(options) => commands::sensitivity(&options),
         Command::WorstCase(options) => commands::worst_case(&options),
+        Command::Compare(options) => commands::compare(&options),
         Command::Check(options) => commands::check(&options),
         Command::Export(options) => commands::export(&options),
         Command::Completions(options) => commands::completions(&options),

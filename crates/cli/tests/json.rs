@@ -34,6 +34,7 @@ fn cases(folder: &Folder) -> Vec<Vec<String>> {
         alone(&["inspect", &log]),
         with_folder(&["convert", &log], "converted.csv"),
         with_folder(&["estimate", &log, "--vehicle", VEHICLE], "estimate.csv"),
+        alone(&["compare", &path("estimate.csv"), &path("sim")]),
         with_folder(&["fit", &log, "--vehicle", VEHICLE], "fitted.toml"),
         with_folder(&[&["init", "--gearbox", "8hp"], &own[..]].concat(), "own.toml"),
         with_folder(&["reproduce", "--settings", "1"], "reproduction"),

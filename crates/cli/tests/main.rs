@@ -9,6 +9,7 @@ mod arrows;
 mod attacks;
 mod car_check;
 mod commands;
+mod compare;
 mod convert;
 mod day_of_logs;
 mod design_car;

@@ -53,6 +53,7 @@ fn every_command_that_writes_a_page_opens_it() {
     for command in [
         "bench",
         "check",
+        "compare",
         "demo",
         "design",
         "error-bound",

@@ -164,7 +164,7 @@ fn a_package_finds_version_completions_and_manual_pages() {
     assert!(printed(&wetclutch(&["--version"])).starts_with(concat!("wetclutch ", env!("CARGO_PKG_VERSION"))));
     for (shell, part) in [("bash", "_wetclutch()"), ("zsh", "#compdef wetclutch"), ("fish", "complete -c wetclutch")] {
         let text = printed(&wetclutch(&["completions", shell]));
-        assert!(text.contains(part) && text.contains("estimate"), "{shell}");
+        assert!(text.contains(part) && ["estimate", "compare"].iter().all(|command| text.contains(command)), "{shell}");
     }
     printed(&wetclutch(&["man", &folder.path("man")]));
     let page = folder.read("man/wetclutch-estimate.1");

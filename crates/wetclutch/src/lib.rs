@@ -8,6 +8,7 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod checks;
+pub mod compare;
 pub mod contents;
 mod error;
 pub mod estimate;

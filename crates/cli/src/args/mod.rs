@@ -34,6 +34,7 @@ Examples:
   wetclutch inspect drive.mf4                                 channels, units, rates and gaps of a log
   wetclutch estimate log.csv --vehicle my_car.toml            pressure from measured signals
   wetclutch fit log.csv --vehicle my_car.toml -o fitted.toml  a vehicle file that fits the car
+  wetclutch compare my_car.toml fitted.toml                   what differs between two files, or two runs
 
 All files use SI units, which are part of keys and column names. Column names of measured files may also
 end in _rpm, _bar, _mpa, _ma, _ms, _km_h; these columns are converted when they are read.
@@ -291,6 +292,19 @@ pub(crate) enum Command {
     /// model's.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
+    /// Compare two runs, or two files of cars
+    ///
+    /// A run is what `estimate`, `demo` or `simulate` has written: its folder, its table of shifts (OUT_shifts.csv), or its signals (CSV,
+    /// Parquet or MDF 4). Shifts are matched by time and gears; where the times do not agree, by gears and kind in the order in which they come.
+    /// Prints how scores, errors, ranges and estimates of these shifts differ, the largest difference first. The page also has the curves of the
+    /// shifts over each other.
+    ///
+    /// Of two vehicle files, or two gearbox files: the keys whose values differ, defaults included, the largest relative difference first.
+    ///
+    ///   wetclutch compare before_shifts.csv after_shifts.csv -o compared.html --open
+    ///   wetclutch compare my_car.toml fitted.toml
+    #[command(verbatim_doc_comment)]
+    Compare(Compare),
     /// Check vehicle, gearbox, experiment, drive and study files
     ///
     /// Checks vehicle, gearbox, experiment, drive and study files, and the files that they name, and prints a summary. Also checks
@@ -390,6 +404,24 @@ pub(crate) struct Simulate {
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
     /// Print files and drive as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Compare {
+    /// Run, vehicle file or gearbox file
+    #[arg(value_name = "A")]
+    pub(crate) a: PathBuf,
+    /// The one that it is compared with
+    #[arg(value_name = "B")]
+    pub(crate) b: PathBuf,
+    /// Page of the comparison, with figures
+    #[arg(short, long, value_name = "PAGE.html")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) open: OpenOutput,
+    /// Print the differences as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -7,6 +7,8 @@ mod check;
 mod check_defaults;
 mod check_json;
 mod check_page;
+mod compare;
+mod compare_page;
 mod convert;
 mod demo;
 mod demo_drive;
@@ -40,6 +42,7 @@ use car::read_car;
 
 pub(crate) use bench::bench;
 pub(crate) use check::check;
+pub(crate) use compare::compare;
 pub(crate) use convert::convert;
 pub(crate) use demo::demo;
 pub(crate) use design::design;
