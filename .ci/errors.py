@@ -47,9 +47,6 @@ NOT_PROVOKED = {
         "the fit left the range in which the model",
     ],
     "what no input has brought about so far, and no rule excludes": [
-        "does not follow from neutral by one clutch",
-        "has no clutch that could slip",
-        "the train has more than … degrees of freedom",
         "the shift has no acceleration before its request",
         "does not end within … s",
     ],

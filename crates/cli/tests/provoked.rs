@@ -119,6 +119,63 @@ fn weak_car(folder: &Folder) -> String {
     folder.write("weak.toml", text)
 }
 
+/// The gearbox file of two gears with these engaged elements, and these shafts, each with one brake or two.
+fn braked_gearbox(engaged: [&str; 2], brakes: &[(&str, usize)]) -> String {
+    const PACK: &str = "pack = { friction_faces = 4, mean_radius_m = 0.14, piston_area_m2 = 0.012, return_spring_n = 600, friction_coefficient = 0.13 }";
+    let mut text = "name = \"braked\"\nlevel = \"stick-diagram\"\ninput = \"turbine\"\noutput = \"carrier\"\nline_pressure_pa = 1e6\n\
+        planetary_set = [{ sun = \"turbine\", carrier = \"carrier\", ring = \"ring\", sun_teeth = 40, ring_teeth = 60 }]\n"
+        .to_owned();
+    for (name, engaged) in ["1", "2"].iter().zip(engaged) {
+        text += &format!("[[gear]]\nname = \"{name}\"\nengaged = [{engaged}]\n");
+    }
+    for shaft in ["turbine", "ring", "carrier"].iter().chain(brakes.iter().map(|(shaft, _)| shaft)) {
+        text += &format!("[[shaft]]\nname = \"{shaft}\"\ninertia_kg_m2 = 0.02\n");
+    }
+    let mut element = |name: &str, kind: &str, input: &str, output: &str| {
+        text += &format!(
+            "[[element]]\nname = \"{name}\"\nkind = \"{kind}\"\ninput = \"{input}\"\noutput = \"{output}\"\n{PACK}\n"
+        );
+    };
+    element("A", "brake", "housing", "ring");
+    element("B", "clutch", "turbine", "ring");
+    for (shaft, count) in brakes {
+        (0..*count).for_each(|at| element(&format!("{shaft}{at}"), "brake", "housing", shaft));
+    }
+    text
+}
+
+#[test]
+fn gearboxes_that_cannot_be_driven_are_named_with_what_to_do() {
+    let folder = Folder::new("undriven-gearboxes");
+    let shafts: Vec<String> = (0..6).map(|at| format!("x{at}")).collect();
+    let brakes: Vec<(&str, usize)> = shafts.iter().map(|shaft| (shaft.as_str(), 1)).collect();
+    let engaged = |first: &str| {
+        format!("\"{first}\", ") + &shafts.iter().map(|s| format!("\"{s}0\"")).collect::<Vec<_>>().join(", ")
+    };
+    let large = braked_gearbox([&engaged("A"), &engaged("B")], &brakes);
+    // Both elements change between the gears.
+    let double = braked_gearbox(["\"A\", \"x0\"", "\"B\", \"x1\""], &[("x", 2)]);
+    let drive = |car: &str, more: &str| {
+        let text = format!("name = \"d\"\nvehicle = \"{car}\"\n{more}[[segment]]\nduration_s = 4\nthrottle = 0.1\n");
+        folder.write("d.toml", text)
+    };
+    for (gearbox, launch, words) in [
+        (large, "converter", "the train has more than 8 degrees of freedom"),
+        (double, "clutch", "gear 1 has no clutch that could slip"),
+    ] {
+        folder.write("gearbox.toml", gearbox);
+        folder.write("car.toml", format!("name = \"c\"\ngearbox = \"gearbox.toml\"\nlaunch = \"{launch}\"\n"));
+        let text = stderr(&wetclutch(&["simulate", &drive("car.toml", ""), "-o", &folder.path("out")]));
+        assert!(text.contains(words) && text.contains("\nhint: "), "{text}");
+    }
+    let more = "[start]\ngear = \"N\"\n[[shift]]\ntime_s = 2\ngear = \"3\"\n";
+    let text = stderr(&wetclutch(&["simulate", &drive(&car(), more), "-o", &folder.path("out")]));
+    assert!(
+        text.contains("gear 3 does not follow from neutral by one clutch\nhint: these gears do: R, 1, 2, "),
+        "{text}"
+    );
+}
+
 #[test]
 fn drives_that_no_car_can_make_are_named_and_leave_nothing() {
     let folder = Folder::new("impossible-drives");

@@ -57,6 +57,18 @@ fn check_names_all_errors_of_the_vehicle_that_a_drive_names() {
 }
 
 #[test]
+fn a_range_of_a_channel_map_is_apart_from_its_hint() {
+    let folder = Folder::new("range-of-map");
+    let map = folder.write("map.toml", "[channel.engine_speed]\nname = \"N\"\ndelay_s = 99\n");
+    let checked: serde_json::Value = serde_json::from_str(&stdout(&wetclutch(&["check", "--json", &map]))).unwrap();
+    let error = &checked["files"][0]["errors"][0];
+    assert_eq!(
+        (error["expected"].as_str(), error["hint"].as_str()),
+        (Some("0 to 10"), Some("it is in s: 20 ms is 0.02"))
+    );
+}
+
+#[test]
 fn a_misspelt_key_of_a_channel_map_is_named_alone() {
     let folder = Folder::new("map-errors");
     let map = folder.write("map.toml", "[channel.engine_speed]\nnaem = \"N\"\n");

@@ -74,6 +74,8 @@ fn read_map(source: &Source) -> Result<(), ConfigError> {
     let range = || -> Option<ConfigError> {
         let (key, rest) = message.strip_prefix('`')?.split_once("` is ")?;
         let (value, allowed) = rest.split_once(", expected ")?;
+        let (allowed, hint) =
+            allowed.split_once("\nhint: ").map_or((allowed, None), |(allowed, hint)| (allowed, Some(hint.to_owned())));
         let value = value.parse().ok().filter(|_| allowed.contains(" to "))?;
         Some(ConfigError::Range {
             path: path.clone(),
@@ -81,7 +83,7 @@ fn read_map(source: &Source) -> Result<(), ConfigError> {
             key: key.to_owned(),
             value,
             allowed: allowed.to_owned(),
-            hint: None,
+            hint,
         })
     };
     Err(range().unwrap_or_else(|| ConfigError::Syntax { path: path.clone(), line, message: message.to_owned() }))

@@ -66,7 +66,13 @@ impl CarModel {
             Some(speeds) => speeds.row_iter().map(|row| row[0] * input + row[1] * output).collect(),
             None if idles => {
                 let why = car.why_not_driven();
-                return wrong(why.unwrap_or_else(|| format!("gear {} has no clutch that could slip", of_gear.name)));
+                return wrong(why.unwrap_or_else(|| {
+                    format!(
+                        "gear {} has no clutch that could slip\nhint: without a converter a car starts on a clutch that a shift by one clutch \
+                         releases; `wetclutch check` of the gearbox file lists the shifts",
+                        of_gear.name
+                    )
+                }));
             }
             None => of_gear.shaft_speeds.iter().map(|speed| speed.unwrap_or(0.0) * turbine).collect(),
         };

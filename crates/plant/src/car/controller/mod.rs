@@ -268,7 +268,12 @@ impl CarShiftController {
     fn engage(&mut self, to: usize, time_s: f64) -> Result<(), CarError> {
         let shift = self.partner(to).and_then(|partner| Some((partner, self.leg(partner, to, time_s)?)));
         let Some((partner, shift)) = shift else {
-            let message = format!("gear {} does not follow from neutral by one clutch", self.name(to));
+            let follows = (0..self.car.gearbox.gears.len()).filter(|gear| self.partner(*gear).is_some());
+            let message = format!(
+                "gear {} does not follow from neutral by one clutch\nhint: these gears do: {}",
+                self.name(to),
+                follows.map(|gear| self.name(gear)).collect::<Vec<_>>().join(", ")
+            );
             return Err(CarError::Request(message));
         };
         let neutral_s = if self.is_neutral { 0.0 } else { self.calibration.neutral_s };
