@@ -52,7 +52,7 @@ pub(crate) const TURBINE_RAD_S2: f64 = 1000.0;
 pub enum OneShiftError {
     /// The name is not that of two gears.
     #[error(
-        "the gearbox has no shift \"{asked}\"\nhint: two gears with a line between them, as \"1-2\"; its gears are {gears}"
+        "the gearbox has no shift \"{asked}\"\nhint: two gears with a hyphen between them, as \"1-2\"; its gears are {gears}"
     )]
     NoShift {
         /// What was asked for.

@@ -298,7 +298,7 @@ fn cells_that_are_no_numbers_are_counted_and_most_of_them_are_an_error() {
         assert!(few.contains(&note), "{few}");
         let maximum = refused(&with_cells(&folder, &text, name, cell, |row| row % 5 > 1));
         let note =
-            format!("log.csv: 1440 of 2400 samples of {name} are text or infinite, and are not used\nhint: look at");
+            format!("log.csv: 1440 of 2400 samples of {name} are text or infinite, and are not used\nhint: check");
         assert!(maximum.contains(&note), "{maximum}");
     }
 }
@@ -312,7 +312,7 @@ fn a_gear_that_the_gearbox_does_not_have_is_counted_and_the_gear_before_stands()
     for name in ["gear", "target_gear"] {
         let few = said(&with_cells(&folder, &text, name, "255", |row| row == 300));
         let note = format!(
-            "warning: 1 of 2400 samples of {name} are no gear of this gearbox (255) and are not used: the gear before stands"
+            "warning: 1 of 2400 samples of {name} are no gear of this gearbox (255) and are not used: the gear before is kept"
         );
         assert!(few.contains(&note) && few.contains("`valid_range` of `channel."), "{few}");
         assert!(folder.read("out.csv") == whole, "{name}");

@@ -42,7 +42,7 @@ fn a_speed_that_stops_is_found_in_a_table_without_a_map() {
     for (name, column) in [("engine", 1), ("turbine", 2), ("output", 3), ("wheel", 4)] {
         assert!(good[0][column].starts_with(name));
         let text = said(&estimate(&frozen(column, 4.0, 7.0), &["-o", &folder.path("out.csv")]));
-        let note = format!("readings of {name}_speed stand still while the car does not, and are not used");
+        let note = format!("readings of {name}_speed do not change while the car moves, and are not used");
         assert!(text.contains(&note), "{name}: {text}");
         // Of 300 equal readings the first is right; the others are withdrawn when it is known that they stand.
         let count: f64 =

@@ -195,7 +195,7 @@ fn faults_of_time_stamps_in_a_table_are_counted_and_read_as_with_a_map() {
 
     // A clock that starts again.
     let [found, notes] = estimate("reset.csv", &format!("{}\n{resets}", lines[0]), &[]);
-    assert!(notes.contains("the clock was reset 1 times: the time goes on one second later"), "{notes}");
+    assert!(notes.contains("the clock was reset 1 times: the time continues one second later"), "{notes}");
     let last = |text: &str| text.lines().last().unwrap().split(',').next().unwrap().parse::<f64>().unwrap();
     // Twenty rows tell the reset.
     assert!((last(&found) - (last(&expected) + 1.0 - 0.21)).abs() < 1e-6, "{} {}", last(&found), last(&expected));
@@ -285,7 +285,7 @@ fn a_channel_that_cannot_be_the_signal_is_an_error() {
         let text = refused(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &out]));
         let name = column.trim_end_matches("_rad_s");
         assert!(text.contains(&format!("{name} is {value:.3} rad/s in all samples, and ")), "{text}");
-        assert!(text.contains("hint: another signal may stand in its column") && !Path::new(&out).exists(), "{text}");
+        assert!(text.contains("hint: its column may have another signal") && !Path::new(&out).exists(), "{text}");
         std::fs::write(&map, wetclutch(&["inspect", &log, "--suggest"]).stdout).unwrap();
         refused(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &out, "--map", &map]));
     }

@@ -80,6 +80,9 @@ fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
         }
     });
     let fitted = folder.read("fitted.toml");
-    assert!(fitted.contains("# fit: x ") && fitted.contains("what the fit leaves open"), "{fitted}");
+    assert!(
+        fitted.contains("# fit: x ") && fitted.contains("the interval of the fit, 4 standard deviations"),
+        "{fitted}"
+    );
     assert!(Path::new(&folder.path("estimate_report.html")).exists());
 }

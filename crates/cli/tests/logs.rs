@@ -55,7 +55,7 @@ fn a_log_that_is_wrong_is_refused_by_line_and_nothing_is_written() {
         (format!("{NAMES}\n0,{row}\n1,{row},\n"), ":3: the row has 6 cells, but the first line names 5 columns"),
         (
             format!("{NAMES}\n0,{row}\n0.1,200,n/a,76,0.1\n0.2,200,n/a,76,0.1\n"),
-            ": 2 of 3 samples of turbine_speed_rad_s are text or infinite, and are not used\nhint: look at this column",
+            ": 2 of 3 samples of turbine_speed_rad_s are text or infinite, and are not used\nhint: check this column",
         ),
         (format!("{}1,2\n", log(20_000)), ":20002: the row has 2 cells"),
         (

@@ -134,7 +134,7 @@ fn what_is_wrong_with_a_short_file_is_said_with_its_line() {
         (
             "ratios = [2.5, 1.0]",
             "ratios = [2.5, 1.0]\ninput = \"turbine\"",
-            "`gear_train.ratios` stands for the whole gear train",
+            "`gear_train.ratios` replaces the whole gear train",
         ),
         (
             "# speed_ratio = [0.0, ",

@@ -46,7 +46,7 @@ fn channels_and_maps_that_do_not_fit_the_command_are_named() {
     provokes(&["inspect", &log, "--shifts"], "--shifts needs the channels of the signals");
     provokes(&["inspect", &log, "--channel", "engine"], "`engine` is not ROLE=NAME");
     let map = folder.write("map.toml", "dbc = \"no.dbc\"\n[channel.engine_speed]\nname = \"N\"\n");
-    provokes(&["inspect", &log, "--map", &map], "`dbc` leads to ");
+    provokes(&["inspect", &log, "--map", &map], "`dbc` names ");
     let semicolons = folder.write("semicolons.csv", std::fs::read_to_string(&log).unwrap().replace(',', ";"));
     provokes(&["estimate", &semicolons, "--vehicle", &car()], "the columns are separated by `;`");
     let duty = "time_s,engine_speed_rad_s,turbine_speed_rad_s,output_speed_rad_s,oncoming_duty_percent\n0,1,1,1,1\n";

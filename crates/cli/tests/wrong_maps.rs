@@ -79,7 +79,7 @@ fn a_time_in_a_smaller_unit_than_its_own_is_refused() {
     };
     for unit in ["ms", "us"] {
         let error = refused(&command(&map(unit)));
-        assert!(error.contains("hint: the time looks like a larger unit than the one given"), "{error}");
+        assert!(error.contains("hint: the times suggest a larger unit than the one given"), "{error}");
         assert!(!std::path::Path::new(&out).exists());
         let plain = said(&wetclutch(&["inspect", &path, "--map", &folder.path("map.toml")]));
         assert!(plain.contains("warning: the middle time between two rows is 1.0e-"), "{plain}");
@@ -104,6 +104,14 @@ fn inspect_compares_the_values_with_the_units_of_the_map() {
             assert!(error.contains(expected) && error.contains("\nhint: "), "{error}");
         }
     }
+}
+
+#[test]
+fn times_in_a_smaller_unit_that_the_log_does_not_name_are_named_with_it() {
+    let folder = Folder::new("slow");
+    let path = folder.write("log.csv", log(300, |time_s| 1e3 * time_s));
+    let text = said(&wetclutch(&["inspect", &path]));
+    assert!(text.contains("more often than once in a second: the times suggest ms\nhint: set its `name`"), "{text}");
 }
 
 #[test]
@@ -140,9 +148,6 @@ fn a_suggested_map_leads_to_its_dbc_from_any_folder() {
     assert!(!stderr(&inspected).contains("dbc"), "{}", stderr(&inspected));
     let map = folder.write("map.toml", "dbc = \"elsewhere.dbc\"\n[channel.engine_speed]\nname = \"N_Eng\"\n");
     let error = refused(&wetclutch(&["inspect", &log, "--map", &map]));
-    assert!(
-        error.contains("map.toml: `dbc` leads to ") && error.contains("counts from the folder of the map"),
-        "{error}"
-    );
+    assert!(error.contains("map.toml: `dbc` names ") && error.contains("counts from the folder of the map"), "{error}");
     said(&wetclutch(&["inspect", &log, "--map", &map, "--dbc", &format!("{DATA}/bus.dbc")]));
 }

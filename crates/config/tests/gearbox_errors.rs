@@ -83,7 +83,7 @@ fn an_element_that_slips_at_the_torque_asked_names_gear_and_torques() {
     let text = EIGHT_SPEED.replacen(from, "stated_ratio = -3.2968, turbine_max_n_m = 600", 1);
     let error = GearboxFile::from_source(Source::built_in("g.toml", &text)).unwrap_err().to_string();
     assert!(
-        error.contains("`element.B.pack`: \"B\" slips in \"R\": it holds 1430 N m, 1585 N m are asked of it"),
+        error.contains("`element.B.pack`: \"B\" slips in \"R\": it holds 1430 N m, 1585 N m are required"),
         "{error}"
     );
     assert!(error.contains("hint: with 1.1 times the friction faces"), "{error}");

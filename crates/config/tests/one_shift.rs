@@ -214,7 +214,7 @@ fn a_shift_without_a_vehicle_is_told_why() {
     let cases = [
         (
             "1-9",
-            "the gearbox has no shift \"1-9\"\nhint: two gears with a line between them, as \"1-2\"; its gears are R, 1, 2, 3, 4, 5, 6, 7, 8",
+            "the gearbox has no shift \"1-9\"\nhint: two gears with a hyphen between them, as \"1-2\"; its gears are R, 1, 2, 3, 4, 5, 6, 7, 8",
         ),
         ("12", "the gearbox has no shift \"12\""),
         ("", "the gearbox has no shift \"\""),

@@ -8,7 +8,7 @@ pub const BAD_POINTER: u32 = 1 << 1;
 pub const IMAGE_MAGIC: u32 = 1 << 2;
 /// The image has the layout of another version.
 pub const IMAGE_VERSION: u32 = 1 << 3;
-/// The image is shorter or longer than it says.
+/// The image has another length than its header states.
 pub const IMAGE_SIZE: u32 = 1 << 4;
 /// The checksum of the image is another: a bit has changed, or a value was tuned and the image not sealed.
 pub const IMAGE_CHECKSUM: u32 = 1 << 5;
@@ -37,7 +37,7 @@ pub const ALL: [(&str, u32, &str); 15] = [
     ("BAD_POINTER", BAD_POINTER, "a pointer is null, or not aligned: memory to 8 bytes, an image to 4"),
     ("IMAGE_MAGIC", IMAGE_MAGIC, "not an image, or one of the other byte order"),
     ("IMAGE_VERSION", IMAGE_VERSION, "the image has the layout of another version"),
-    ("IMAGE_SIZE", IMAGE_SIZE, "the image is shorter or longer than it says"),
+    ("IMAGE_SIZE", IMAGE_SIZE, "the image has another length than its header states"),
     ("IMAGE_CHECKSUM", IMAGE_CHECKSUM, "a bit of the image has changed, or a value was tuned without wetclutch_seal"),
     ("IMAGE_CONTENT", IMAGE_CONTENT, "a value is not a number, or a breakpoint not above the one before it"),
     ("MEMORY_SIZE", MEMORY_SIZE, "the memory is too small"),

@@ -57,7 +57,7 @@ fn words(quantity: CarQuantity, car: &Car, tables: &ShiftTables<f64>) -> (String
         CarQuantity::TorqueFactor(one) => (
             format!("the torque of {} at the same pressure (friction times valve gain)", of(one)),
             if is_all(one) {
-                "; another oil, or the scale of the commands or of the line pressure, looks alike"
+                "; another oil, or the scale of the commands or of the line pressure, has the same effect"
             } else {
                 ""
             },
@@ -65,16 +65,16 @@ fn words(quantity: CarQuantity, car: &Car, tables: &ShiftTables<f64>) -> (String
         CarQuantity::KissPoint(one) => (
             format!("the kiss point of {}", of(one)),
             if is_all(one) {
-                "; an offset of all commands looks alike"
+                "; an offset of all commands has the same effect"
             } else {
-                "; an offset of its command looks alike"
+                "; an offset of its command has the same effect"
             },
         ),
         CarQuantity::Lag(one) => {
-            (format!("the lag of the valve of {}", of(one)), "; commands that come late look alike")
+            (format!("the lag of the valve of {}", of(one)), "; late commands have the same effect")
         }
         CarQuantity::Delay(one) => {
-            (format!("the delay of the valve of {}", of(one)), "; commands that come late look alike")
+            (format!("the delay of the valve of {}", of(one)), "; late commands have the same effect")
         }
         CarQuantity::Inertia(pair) => {
             let [low, high] = [pair, pair + 1].map(|place| car.gear_name(Gear::at(place)));

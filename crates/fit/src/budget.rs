@@ -10,8 +10,7 @@ pub(crate) const BUDGET_SIDES: f64 = 4.0;
 /// Minimum error of a converter's maps, as a fraction \[chosen\].
 pub(crate) const CONVERTER_FRACTION_MIN: f64 = 0.03;
 /// What a line of the error budget says of itself.
-pub(crate) const BUDGET_COMMENT: &str =
-    "what the fit leaves open: 4 standard deviations, and no more than was known before";
+pub(crate) const BUDGET_COMMENT: &str = "the interval of the fit, 4 standard deviations, and no wider than before";
 
 /// The range of a factor on a fitted value. `value` is the fitted value over the given one, `sd` the standard deviation of its logarithm, and
 /// `given` the range that was known around the given value: the fitted one lies elsewhere in it. The 95 % interval stays.

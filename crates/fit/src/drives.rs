@@ -32,7 +32,7 @@ impl<'a> UsedDriving<'a> {
         for log in logs.iter().filter(|log| log.time_s() > 0.0) {
             match usable(car, log).car {
                 Err(reason) => used.left_out.push(reason),
-                Ok(()) if used.logs.contains(&log) => used.left_out.push("the same drive once more".to_owned()),
+                Ok(()) if used.logs.contains(&log) => used.left_out.push("the same drive again".to_owned()),
                 Ok(()) => used.logs.push(log),
             }
         }

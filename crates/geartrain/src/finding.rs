@@ -90,7 +90,7 @@ pub enum Fault {
     Assembly { count: u32, sum: u32 },
     #[error("{count} planets of {planet} teeth touch each other")]
     Crowded { count: u32, planet: u32 },
-    #[error("\"{element}\" slips in \"{gear}\": it holds {capacity_n_m:.0} N m, {wanted_n_m:.0} N m are asked of it")]
+    #[error("\"{element}\" slips in \"{gear}\": it holds {capacity_n_m:.0} N m, {wanted_n_m:.0} N m are required")]
     Capacity { element: String, gear: String, capacity_n_m: f64, wanted_n_m: f64, line_pressure_pa: f64 },
     #[error("the one-way clutch \"{element}\" would have to drive its input side in \"{gear}\"")]
     OneWay { element: String, gear: String },

@@ -167,7 +167,7 @@ fn no_table(head: &str, lines: &[&str]) -> String {
     let quoted = lines.iter().flat_map(|line| cells(line, b',')).find(|cell| has_decimal(cell, b','));
     quoted.map_or(
         "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns, `,` `;` `|` or a tab between them), Parquet, MDF 4, candump, ASC or BLF".to_owned(),
-        |cell| format!("numbers have commas and stand between commas, the first is `{}`\nhint: write them with decimal points, or `;` between the columns", error::shown(&cell)),
+        |cell| format!("numbers have commas, and commas separate the columns; the first is `{}`\nhint: write them with decimal points, or `;` between the columns", error::shown(&cell)),
     )
 }
 

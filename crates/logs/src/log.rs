@@ -121,7 +121,7 @@ impl Log {
                 let database = database.ok_or_else(|| {
                     LogError::file(
                         path,
-                        "a CAN log has frames; a DBC says which signals are in them\nhint: give it with --dbc",
+                        "a CAN log has frames; a DBC defines the signals in them\nhint: give it with --dbc",
                     )
                 })?;
                 let channels = database.channels().to_vec();

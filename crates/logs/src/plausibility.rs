@@ -175,7 +175,7 @@ pub fn too_fast_a_time(step_s: f64, span_s: f64) -> Option<String> {
     (step_s > 0.0 && step_s < ROWS_APART_S.start && span_s < 1.0).then(|| {
         format!(
             "the middle time between two rows is {step_s:.1e} s, and all of them lie within {span_s:.3} s\n\
-             hint: the time looks like a larger unit than the one given; check it (`unit` under [time] in the channel map, or the \
+             hint: the times suggest a larger unit than the one given; check it (`unit` under [time] in the channel map, or the \
              ending of the column's name)"
         )
     })

@@ -157,9 +157,7 @@ impl Stream for Readings<'_> {
         });
         let (readings, names) = (self.late.values().sum::<u64>(), self.late.len());
         let late = (names > 0).then(|| {
-            format!(
-                "{readings} readings of {names} channels that do not stand in the first 64 KiB of the log are left out"
-            )
+            format!("{readings} readings of {names} channels that are not in the first 64 KiB of the log are left out")
         });
         unread.chain(late).collect()
     }

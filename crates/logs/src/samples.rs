@@ -152,10 +152,10 @@ impl Clock {
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.resets > 0 {
-            notes.push(format!("the clock was reset {} times: the time goes on one second later", self.resets));
+            notes.push(format!("the clock was reset {} times: the time continues one second later", self.resets));
         }
         if self.wrong_jumps > 0 {
-            notes.push(format!("{} time stamps are far too late: the time goes on before them", self.wrong_jumps));
+            notes.push(format!("{} time stamps are far too late: the time continues without them", self.wrong_jumps));
         }
         notes
     }

@@ -293,7 +293,7 @@ fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
             let _ = writeln!(text, "# unit of the log: {}", error::shown(&channel.unit));
         }
         _ if role.quantity().is_some() => {
-            let _ = writeln!(text, "unit = {} # the log does not say it: check", quoted(role.unit()));
+            let _ = writeln!(text, "unit = {} # not in the log: check", quoted(role.unit()));
         }
         _ => {}
     }

@@ -34,7 +34,7 @@ fn a_channel_that_comes_late_and_rows_that_are_no_readings_are_said() {
     let head = "SECONDS;PID;VALUE;UNITS\n";
     let rows: String = (0..10_000).map(|i| format!("{}.5;N;{i};rpm\n", i)).collect();
     let (_, _, notes) = engine(&format!("{head}{rows}10001;late;1;rpm\n"), "N");
-    assert_eq!(notes, ["1 readings of 1 channels that do not stand in the first 64 KiB of the log are left out"]);
+    assert_eq!(notes, ["1 readings of 1 channels that are not in the first 64 KiB of the log are left out"]);
     let error =
         |text: &str| read(&folder.write("log.csv", text), &OpenOptions::default()).map(drop).unwrap_err().to_string();
     assert!(

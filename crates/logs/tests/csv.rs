@@ -45,7 +45,10 @@ fn what_looks_like_another_table_is_said() {
     let folder = Folder::new("looks-like");
     let error = |text: &str| values(&folder, text, "N").unwrap_err();
     let quoted = error("\"time_s\",\"N\"\n\"0,01\",\"800,5\"\n\"0,02\",\"801,5\"\n");
-    assert!(quoted.contains("numbers have commas and stand between commas, the first is `0,01`\nhint: "), "{quoted}");
+    assert!(
+        quoted.contains("numbers have commas, and commas separate the columns; the first is `0,01`\nhint: "),
+        "{quoted}"
+    );
     let open = error("time_s,\"N\n[rpm]\",U [V]\n0.00,800.5,1\n0.01,801.5,1\n");
     assert!(open.contains("line 2: a quotation mark among the names or units is not closed in its line"), "{open}");
     let returns = error("time_s,N\r0.00,800.5\r0.01,801.5\r");
@@ -338,7 +341,10 @@ fn parquet_times_of_the_day_go_on_after_midnight() {
     let rows: Vec<_> = (0..80_i64).map(|i| ((86_399_800_000 + 10_000 * i) % 86_400_000_000, Some("3"), "")).collect();
     parquet_of(&path, "time_us", &rows);
     let notes = read(&path, &OpenOptions::default()).unwrap().2;
-    assert!(notes.contains(&"the clock was reset 1 times: the time goes on one second later".to_owned()), "{notes:?}");
+    assert!(
+        notes.contains(&"the clock was reset 1 times: the time continues one second later".to_owned()),
+        "{notes:?}"
+    );
 }
 
 #[test]

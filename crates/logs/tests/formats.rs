@@ -470,14 +470,11 @@ fn what_is_no_log_is_refused_with_what_to_do() {
         (b"time,b\nfurlong,rpm\n3,4\n5,6\n", "hint: "),
         (
             b";$FILEVERSION=2.1\n;$STARTTIME=4\n 1 0.1 DT 0100 Rx 1 00\n",
-            ": a CAN log has frames; a DBC says which signals are in them\nhint: give it with --dbc",
+            ": a CAN log has frames; a DBC defines the signals in them\nhint: give it with --dbc",
         ),
         (b"timestamp,arbitration_id,extended\n1.0,0x100,0\n", ": these are frames of a bus in a form that is not read"),
         (b"MDF     3.30    ", ": this is MDF of version 2 or 3\nhint: "),
-        (
-            b"(1.0) can0 123#00\n",
-            ": a CAN log has frames; a DBC says which signals are in them\nhint: give it with --dbc",
-        ),
+        (b"(1.0) can0 123#00\n", ": a CAN log has frames; a DBC defines the signals in them\nhint: give it with --dbc"),
     ];
     for (bytes, message) in cases {
         let error = read(&folder.write("log", bytes), &OpenOptions::default()).map(|_| ()).unwrap_err().to_string();

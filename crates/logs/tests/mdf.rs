@@ -442,7 +442,7 @@ fn a_file_that_is_cut_within_its_data_is_read_up_to_that_place() {
             let by_channel_of_all = by_channel(&all);
             let mut maximum = 0;
             for end in (own.len()..whole.len()).step_by(7).chain([whole.len() - 1]) {
-                let said = format!("it goes on past the end of the file, byte {end}");
+                let said = format!("it ends beyond the end of the file, byte {end}");
                 let found = match read(&folder.write("cut.mf4", &whole[..end]), &OpenOptions::default()) {
                     Ok((_, found, notes)) => {
                         assert!(notes.iter().any(|note| note.contains(&said)), "{name} {end}: {notes:?}");

@@ -65,7 +65,7 @@ fn damaged_mdf_files() {
     for (bytes, words) in [
         (sized(8), "it unpacks to "),
         (sized(-8), "it unpacks to more than its stated size, "),
-        (with(&deflate, packed, &u64::MAX.to_le_bytes()), "it goes on past the end of the file, byte "),
+        (with(&deflate, packed, &u64::MAX.to_le_bytes()), "it ends beyond the end of the file, byte "),
     ] {
         let found = read(&folder.write("log.mf4", bytes), &OpenOptions::default());
         let text = found.map_or_else(|error| error.to_string(), |(_, _, notes)| notes.join("\n"));

@@ -54,7 +54,7 @@ fn a_reset_of_the_clock_goes_on_one_second_later() {
     assert_eq!((read.len(), count(&summary, Quality::Backward)), (180, 20));
     assert!((read[99].stamp_s - 5.99).abs() < 1e-9 && (read[100].stamp_s - 6.99).abs() < 1e-9);
     assert!((read[179].stamp_s - 7.78).abs() < 1e-9);
-    assert_eq!(notes, ["the clock was reset 1 times: the time goes on one second later"]);
+    assert_eq!(notes, ["the clock was reset 1 times: the time continues one second later"]);
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn a_stamp_that_is_far_too_late_does_not_move_the_clock() {
     }
     let (read, _, notes) = readings(&text, &map(&["turbine_speed=n_rpm"])).unwrap();
     assert!((read.last().unwrap().stamp_s - 1.99).abs() < 1e-9, "{:?}", read.last());
-    assert_eq!(notes, ["1 time stamps are far too late: the time goes on before them"]);
+    assert_eq!(notes, ["1 time stamps are far too late: the time continues without them"]);
 }
 
 #[test]

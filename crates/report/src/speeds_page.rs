@@ -167,7 +167,7 @@ impl SpeedsPage<'_> {
         });
         let asked: Vec<String> = asked.collect();
         if !asked.is_empty() {
-            said.push(format!("The gearbox asked the engine for less torque in {}.", first_of(&asked, ", ")));
+            said.push(format!("The gearbox requested less engine torque in {}.", first_of(&asked, ", ")));
         }
         said
     }

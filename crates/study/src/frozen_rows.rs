@@ -117,7 +117,7 @@ impl FrozenRows {
             }
             if frozen > 0 {
                 notes.push(format!(
-                    "{frozen} of {readings} readings of {name} stand still while the car does not, and are not used"
+                    "{frozen} of {readings} readings of {name} do not change while the car moves, and are not used"
                 ));
             }
             if impossible > 0 {

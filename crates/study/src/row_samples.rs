@@ -64,7 +64,7 @@ impl RowSamples {
             let note =
                 format!("{missing} of {} samples of {name} are text or infinite, and are not used", good + missing);
             if missing > good {
-                let hint = "look at this column with `wetclutch inspect`; leave a lost sample empty";
+                let hint = "check this column with `wetclutch inspect`; leave a lost sample empty";
                 return Err(rows.refused(format!("{note}\nhint: {hint}")));
             }
             notes.push(note);

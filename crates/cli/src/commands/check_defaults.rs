@@ -24,7 +24,7 @@ pub(super) fn describe_defaults(vehicle: &VehicleFile, all: bool) -> Result<(), 
     }
     output::line(&format!("\n{} values are not in the file and are defaults", taken.len()))?;
     let Some(influences) = default_influences(vehicle)? else {
-        output::line("the simulated car makes no whole upshift, so it cannot be said which of them matter")?;
+        output::line("the simulated car completes no upshift, so the influence of these values is not known")?;
         return all_names(&vehicle.defaults_taken, &[], true);
     };
     output::line(
@@ -80,7 +80,7 @@ pub(super) fn describe_car_values(car: &CarFile, sensors: &Sensors, all: bool) -
                 Ok(None) => "the filter has tables for no shift of this gearbox".to_owned(),
                 Err(error) => error.to_string(),
             };
-            output::line(&format!("it cannot be said which of them matter: {why}"))?;
+            output::line(&format!("their influence is not known: {why}"))?;
             return all_names(taken, &[], true);
         }
     };

@@ -83,7 +83,7 @@ fn outputs(options: &Convert) -> Result<Vec<PathBuf>, Failure> {
     if let ([_], false) = (options.logs.as_slice(), options.output.is_dir()) {
         check_ending(options)?;
         if options.format.is_some() {
-            warn_without_effect("--format", "it is for files in a folder; the ending of a file says its format");
+            warn_without_effect("--format", "it is for files in a folder; the ending of a file gives its format");
         }
         return Ok(vec![options.output.clone()]);
     }
@@ -125,7 +125,7 @@ fn check_ending(options: &Convert) -> Result<(), Failure> {
     }
     let asked = options.format.map_or(String::new(), |format| format!(" in --format {}", format.ending()));
     Err(Failure::Input(format!(
-        "{}: this is no name of a table{asked}\nhint: end it in .csv, .parquet or .mf4, or name a folder that is there",
+        "{}: this is no name of a table{asked}\nhint: end it in .csv, .parquet or .mf4, or name an existing folder",
         output.shown()
     )))
 }

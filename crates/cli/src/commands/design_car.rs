@@ -26,7 +26,7 @@ pub(super) fn of_car(options: &Design) -> Result<(), Failure> {
     if options.bounds.is_some() {
         return Err(Failure::Input(
             "--bounds has values for a vehicle file of one shift\n\
-             hint: the bounds of a car with a gearbox stand in its file, under [error_bounds] and [clutch.NAME.error_bounds] (docs/reference/vehicle-file.md)"
+             hint: the bounds of a car with a gearbox are in its file, under [error_bounds] and [clutch.NAME.error_bounds] (docs/reference/vehicle-file.md)"
                 .to_owned(),
         ));
     }

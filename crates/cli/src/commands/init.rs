@@ -28,7 +28,7 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     }
     let log = options.from_log.as_deref().map(|log| FromLog::read(log, options)).transpose()?;
     if log.is_none() && options.mapping.is_given() {
-        warn_without_effect("a channel map", "it says which channels of the log of --from-log are which signals");
+        warn_without_effect("a channel map", "it maps the channels of the log of --from-log");
     }
     if log.is_some() && options.has_all_of_a_log() {
         warn_without_effect("--from-log", "the gearbox and all numbers are given");

@@ -157,7 +157,7 @@ fn check_map(path: &Path, log: &Log, map: &ChannelMap) -> Result<(), Failure> {
 fn wrong_time(step_s: f64, span_s: f64) -> Option<String> {
     let too_slow = likely_time_unit(step_s).map(|unit| {
         format!(
-            "no channel has a sample more often than once in a second: the time looks like {unit}\n\
+            "no channel has a sample more often than once in a second: the times suggest {unit}\n\
              hint: set its `name` and `unit = \"{unit}\"` under [time] in the channel map"
         )
     });

@@ -77,7 +77,7 @@ fn print(result: &Matrix, car: &Car) -> Result<(), Failure> {
     output::line(&format!(
         "above the open loop by more than {}: {} of {} shifts; by phases {} of {}\n\
          outside their guaranteed ranges: {} of {} pressures and torques of both clutches\n\
-         a held element is said to slip: {} of {} rows",
+         a held element is reported to slip: {} of {} rows",
         quantity(1.0, "N m", 0),
         counts.runs_above,
         counts.compared_runs,

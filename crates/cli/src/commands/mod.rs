@@ -213,7 +213,7 @@ fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
         map.open.dbc.clone_from(&options.dbc);
     } else if let (Some(path), Some(dbc)) = (&options.map, map.open.dbc.as_ref().filter(|dbc| !dbc.exists())) {
         return Err(Failure::Input(format!(
-            "{}: `dbc` leads to {}, which does not exist\nhint: a path in a map counts from the folder of the map; --dbc replaces it",
+            "{}: `dbc` names {}, which does not exist\nhint: a path in a map counts from the folder of the map; --dbc replaces it",
             path.shown(),
             dbc.shown()
         )));

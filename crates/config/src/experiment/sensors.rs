@@ -236,7 +236,7 @@ fn current_sensor(
         None => base.and_then(|base| base.sample_time_s),
     };
     if let (Some(offset), None) = (&raw.offset_s, sample_time_s) {
-        let message = "has no clock of its own without a `sample_time_s`".to_owned();
+        let message = "has no separate clock without a `sample_time_s`".to_owned();
         let hint = "add `sample_time_s`, or remove `offset_s`".to_owned();
         return Err(check.meaning(keys.key("offset_s"), offset.span().start, message, Some(hint)));
     }

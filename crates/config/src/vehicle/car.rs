@@ -316,7 +316,7 @@ fn turbine_inertias(check: &Check<'_>, raw: &RawCar, gearbox: &mut Gearbox) -> R
         let mut reduced: Vec<_> = shifts.filter_map(|shift| shift.reduced.as_mut()).collect();
         if reduced.is_empty() {
             let message = "names no shift of the gearbox from one clutch to another".to_owned();
-            let hint = "two gears with a line between them, as \"1-2\"".to_owned();
+            let hint = "two gears with a hyphen between them, as \"1-2\"".to_owned();
             return Err(check.meaning(&key, name.span().start, message, Some(hint)));
         }
         for shift in &mut reduced {

@@ -49,7 +49,7 @@ pub(super) fn check(
     let valve = &raw.valve;
     if let Some(zero) = &valve.get_ref().zero_pressure_a {
         let message = "is for cars with a gearbox file".to_owned();
-        let hint = "the observers of a single shift know valves only whose pressure rises with the current".to_owned();
+        let hint = "the observers of one shift need a valve whose pressure rises with the current".to_owned();
         return Err(check.meaning(key("valve.zero_pressure_a"), zero.span().start, message, Some(hint)));
     }
     let (cylinder, has_stroke) = fill::cylinder(check, &format!("{table}.fill"), raw.fill.as_ref(), &clutch, oil_degc)?;

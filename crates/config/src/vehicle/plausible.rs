@@ -70,7 +70,7 @@ impl VehicleFile {
                 what: "over the pressure of the valve at the end of its maps",
                 value: self.error_bounds.pressure_max_pa / valve.settled_pressure(full),
                 usual: [1.0, 10.0],
-                hint: "no pressure above it is held possible: it is the highest one that the supply gives, in Pa; 1 MPa is 1e6 Pa",
+                hint: "it is the largest pressure of the supply, in Pa, and the limit of all pressures; 1 MPa is 1e6 Pa",
             },
             Judged {
                 key: "design.error_bounds.valve_hysteresis_pa".to_owned(),

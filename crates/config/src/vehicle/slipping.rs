@@ -19,7 +19,7 @@ impl CarFile {
             // Writing to a text cannot fail.
             let _ = write!(
                 said,
-                "{}{} holds {:.0} N m, {:.0} N m are asked of it in gear {}",
+                "{}{} holds {:.0} N m, {:.0} N m are required in gear {}",
                 if at == 0 { "" } else { "; " },
                 self.gearbox.elements[capacity.element].name,
                 capacity.capacity_n_m,

@@ -43,7 +43,7 @@ impl Check for DoubtedPressures<'_> {
         let doubted: Vec<String> = doubted.collect();
         let warning = (!doubted.is_empty()).then(|| {
             format!(
-                "warning: measured pressures lie outside of their guaranteed ranges in many rows of the shifts: {}\nhint: check unit, \
+                "warning: measured pressures are outside their guaranteed ranges in many rows of the shifts: {}\nhint: check unit, \
                  sign, offset, delay and element of these channels, else widen the error bounds of the valve in the vehicle file; `fit` uses these \
                  pressures as they are",
                 doubted.join(", ")

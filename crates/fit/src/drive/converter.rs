@@ -128,7 +128,7 @@ fn drives_no_engine(knots: &[Knot]) -> Result<(), String> {
         None => Ok(()),
         Some(minimum) => Err(format!(
             "engine_torque does not fit the speeds: by it the converter would drive the engine (capacity {:.2}e-3 N m s² at speed ratio {}); \
-             check unit and scale of engine_torque, and whether its friction is taken off once (engine_friction_torque)",
+             check unit and scale of engine_torque, and whether its friction is subtracted once (engine_friction_torque)",
             1e3 * minimum.capacity_n_m_s2,
             minimum.speed_ratio
         )),

@@ -55,8 +55,7 @@ fn follows(car: &DrivenCar, driving: &Driving) -> Result<(), String> {
     }
     let nearest = slopes.iter().map(|(_, slope)| *slope).min_by(|a, b| (a - 1.0).abs().total_cmp(&(b - 1.0).abs()));
     Err(format!(
-        "the reported engine torque does not follow the converter: per N m of it converter and engine take {:.2} N m more. Sign, unit, or whether \
-         the engine's friction is in it, are not as the channel map says",
+        "the reported engine torque does not follow the converter: for each N m of it, converter and engine take {:.2} N m more. Check sign and unit, and whether it contains the engine's friction",
         nearest.unwrap_or(f64::NAN)
     ))
 }

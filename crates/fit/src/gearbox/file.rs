@@ -243,7 +243,9 @@ impl GearboxFit {
             }
             _ => {
                 let more = match quantity {
-                    Quantity::Torque(_) => "; friction and valve gain show as one, and stand here as friction",
+                    Quantity::Torque(_) => {
+                        "; friction and valve gain act as one factor, which is written here as friction"
+                    }
                     Quantity::Rolling => "; a mean grade of the drive acts like it",
                     _ => "",
                 };

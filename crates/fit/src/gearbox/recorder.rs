@@ -239,7 +239,7 @@ impl<'a> Recorder<'a> {
         let rows = self.tables.tables();
         let Some(row) = rows.commanded(gears) else { return };
         let found = log.find_slip(row).and_then(|()| match (&self.car.converter, lock_up) {
-            _ if self.begins_within(&log) => Err("its commands begin too late to say how much oil its pistons had"),
+            _ if self.begins_within(&log) => Err("its commands begin too late to know the oil volume of its pistons"),
             (Some(_), true) => Err("the lock-up clutch of the converter was applied"),
             (Some(_), false) if log.engine.between(log.slip_s).count() < 2 => Err("the engine speed is missing"),
             (None, _) if log.engine_torque.between(log.slip_s).count() < 2 => Err("the engine torque is missing"),

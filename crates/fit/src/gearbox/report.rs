@@ -318,7 +318,7 @@ impl GearboxFit {
         let missing = names(&|at| self.by_pair[at].iter().sum::<usize>() == 0);
         if !missing.is_empty() {
             lines.push(format!(
-                "to know more: drive shifts between gears {}, of which none is fitted",
+                "to know more: drive shifts between gears {}; none of them is fitted",
                 missing.join(", ")
             ));
         }

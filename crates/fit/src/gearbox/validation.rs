@@ -47,7 +47,7 @@ impl HeldOut {
     /// What the scale of the valve errors says of itself in a file.
     pub(super) fn comment(&self) -> String {
         format!(
-            "errors of the torques on {} shifts that were held out, over what the bounds below say of friction and valves",
+            "errors of the torques on {} shifts that were held out, over those that the bounds of friction and valves below allow",
             self.shifts
         )
     }

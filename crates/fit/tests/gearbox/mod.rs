@@ -236,7 +236,7 @@ fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
     }
     for (text, words) in [
         ("[turbine_inertia_kg_m2]\n\"1-9\" = 0.09", "names no shift"),
-        ("[turbine_inertia_kg_m2]\nfast = 0.09", "two gears with a line between them"),
+        ("[turbine_inertia_kg_m2]\nfast = 0.09", "two gears with a hyphen between them"),
         ("[turbine_inertia_kg_m2]\n\"2-3\" = 0.01", "hint: more than"),
         ("[turbine_inertia_kg_m2]\n\"1-2\" = -1", "1-2"),
         ("[clutch.E]\nreturn_spring_n = -5", "clutch.E.return_spring_n"),

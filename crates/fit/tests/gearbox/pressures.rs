@@ -127,7 +127,7 @@ fn a_shift_with_strokes_needs_its_commands_from_before() {
     assert!(names(first.slip_s[0] - 0.5).contains(&first.name));
     let late = of(first.slip_s[0] - 0.05);
     assert!(late.shifts.is_empty(), "{:?}", late.shifts.len());
-    assert!(late.skipped.iter().any(|reason| reason.contains("how much oil its pistons had")), "{:?}", late.skipped);
+    assert!(late.skipped.iter().any(|reason| reason.contains("the oil volume of its pistons")), "{:?}", late.skipped);
     // Commands that are missing for half of a log leave the shifts of the other half.
     let half_s = all[all.len() / 2].command_s[0] - 3.0;
     let left = recorded(half_s, f64::INFINITY).shifts;

@@ -106,7 +106,7 @@ impl Blocks {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let of_file = file.metadata().map_err(|error| error.to_string())?.len();
         let end = at.checked_add(length).filter(|end| *end <= of_file);
-        end.ok_or_else(|| format!("it goes on past the end of the file, byte {of_file}"))?;
+        end.ok_or_else(|| format!("it ends beyond the end of the file, byte {of_file}"))?;
         if length > LARGEST_BLOCK {
             return Err(format!("it has {length} packed bytes, expected at most {LARGEST_BLOCK}"));
         }

@@ -30,7 +30,7 @@ pub(super) fn open(path: &Path, options: OpenOptions) -> Option<(Mf4File, String
     let first = source.mend()?;
     let end = source.file.len();
     let file = Mf4File::from_source_with_options(Arc::new(source), options).ok()?;
-    Some((file, format!("block at byte {first}"), format!("it goes on past the end of the file, byte {end}")))
+    Some((file, format!("block at byte {first}"), format!("it ends beyond the end of the file, byte {end}")))
 }
 
 /// A file of which some numbers are shown as others.

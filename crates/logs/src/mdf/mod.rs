@@ -95,7 +95,7 @@ impl MdfLog {
         let mut log = Self { path, file, blocks, crew: Crew::of(1), names, places, database, time_units, notes, cut };
         let mut channels = log.find_channels();
         if log.file.unfinalized().is_some() {
-            log.notes.push("the file was not finished by its recorder: what stands in it is read".to_owned());
+            log.notes.push("the recorder did not finish the file: the complete part is read".to_owned());
         }
         if log.lacks_dbc() {
             log.notes.push(

@@ -348,7 +348,7 @@ impl ShiftFinder {
         }
         if by_engine {
             notes.push(
-                "no turbine speed is mapped: the engine speed stands for it, which shows a shift only while the converter is locked; inertia phase \
+                "no turbine speed is mapped: the engine speed replaces it, which shows a shift only while the converter is locked; inertia phase \
                  and flare are wrong where it slips"
                     .to_owned(),
             );

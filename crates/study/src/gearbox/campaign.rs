@@ -320,7 +320,7 @@ impl CarCampaign {
 }
 
 /// What a table says of a run that failed before it was resumed.
-const FAILED_BEFORE: &str = "the simulation failed; the run can be made again with a study of its own";
+const FAILED_BEFORE: &str = "the simulation failed; a study with this run alone repeats it";
 
 /// Sums over the cars of a study.
 #[derive(Debug, Clone)]

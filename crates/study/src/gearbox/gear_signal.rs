@@ -58,7 +58,7 @@ impl GearSignal {
             return Err(format!("{met}\nhint: {gears}"));
         }
         Ok(Some(format!(
-            "{met}: the gear before stands\nhint: if these values stand for no gear, leave them out with `valid_range` of `channel.{name}` in a \
+            "{met}: the gear before is kept\nhint: if these values mean no gear, leave them out with `valid_range` of `channel.{name}` in a \
              channel map"
         )))
     }

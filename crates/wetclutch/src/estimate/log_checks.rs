@@ -67,8 +67,7 @@ pub(crate) fn check_span(path: &Path, median_s: f64, span_s: f64) -> Result<(), 
 /// Says that commands, by their names, are sent on change.
 pub(crate) fn sent_on_change(names: &str) -> String {
     format!(
-        "the commands of {names} are sent on change, as their samples show: each stands until the next one (`sent_on_change = true` of a channel \
-         map says so)"
+        "the commands of {names} are sent on change, as their samples show: each is valid until the next one (`sent_on_change = true` in a channel map)"
     )
 }
 

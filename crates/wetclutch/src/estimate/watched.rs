@@ -83,7 +83,7 @@ impl WatchedColumns {
             with_needs.find(|(_, (is_needed, count, _))| *is_needed && *count == 0).filter(|_| self.rows > 0)
         {
             return Err(Error::Input(format!(
-                "{} has no value in any of {} rows\nhint: an estimate of this car needs it; look at the log with `wetclutch inspect`",
+                "{} has no value in any of {} rows\nhint: an estimate of this car needs it; check the log with `wetclutch inspect`",
                 entry.name,
                 grouped(self.rows)
             )));
@@ -97,10 +97,10 @@ impl WatchedColumns {
         };
         let hint = match likely {
             Likely::Unit(unit) => match ENDINGS.iter().find(|(name, _)| *name == unit) {
-                Some((_, ending)) => format!("the end of the column's name says the unit: call it `{name}_{ending}`"),
+                Some((_, ending)) => format!("the end of the column's name gives the unit: call it `{name}_{ending}`"),
                 None => "give the unit and the scale in a channel map, see `wetclutch inspect --suggest`".to_owned(),
             },
-            Likely::OtherChannel => "another signal may stand in its column, or its sensor has failed".to_owned(),
+            Likely::OtherChannel => "its column may have another signal, or its sensor has failed".to_owned(),
             Likely::OtherSign => {
                 "`wetclutch inspect --suggest` writes a channel map, in which the channel gets `scale = -1`".to_owned()
             }

@@ -55,7 +55,7 @@ pub(super) fn check_name(options: &args::Estimate) -> Result<(), Failure> {
 pub(super) fn warn_of_format(options: &args::Estimate) {
     let is_folder = options.output.as_ref().is_some_and(|output| options.logs.len() > 1 || output.is_dir());
     if options.format.is_some() && !is_folder {
-        warn_without_effect("--format", "it is for files in a folder; the ending of a file says its format");
+        warn_without_effect("--format", "it is for files in a folder; the ending of a file gives its format");
     }
 }
 

@@ -103,7 +103,7 @@ impl<R: Runs> Part<'_, R> {
             Failure::Work(message) if error.kind() == io::ErrorKind::StorageFull => {
                 let message = message.split('\n').next().unwrap_or_default();
                 Failure::Work(format!(
-                    "{message}\nhint: make room on the disk; --resume then goes on after the rows that are there"
+                    "{message}\nhint: make room on the disk; --resume then continues after the rows that are complete"
                 ))
             }
             failure => failure,

@@ -66,7 +66,7 @@ pub(super) fn check_lists(source: &Source) -> Result<(), ConfigError> {
     for leaf in &given {
         let in_train = leaf.key.strip_prefix("gear_train.").filter(|key| *key != "ratios");
         if let Some(key) = in_train {
-            let message = format!("`gear_train.ratios` stands for the whole gear train, and `{key}` is a part of one");
+            let message = format!("`gear_train.ratios` replaces the whole gear train, and `{key}` is a part of one");
             let hint = "`wetclutch init --complete` writes a file with a gear train to change".to_owned();
             return Err(check.meaning(&leaf.key, leaf.place.start, message, Some(hint)));
         }

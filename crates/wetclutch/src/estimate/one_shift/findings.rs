@@ -164,7 +164,7 @@ impl Findings {
             };
             if came == 0 && is_needed {
                 return Err(Error::Input(format!(
-                    "{name} has no value in any of {} samples\nhint: look at the log with `wetclutch inspect`",
+                    "{name} has no value in any of {} samples\nhint: check the log with `wetclutch inspect`",
                     grouped(self.rows)
                 )));
             }
@@ -190,7 +190,7 @@ impl Findings {
         if 2 * lost > self.rows && self.rows >= ENOUGH_ROWS {
             return Err(Error::Input(format!(
                 "{} of {} samples have no command of the valve that can be used\nhint: if it is sent on change, set `sent_on_change = true` \
-                 in a channel map; else look at its channel with `wetclutch inspect`. A log of another car, or of one with a whole gearbox, may have \
+                 in a channel map; else check its channel with `wetclutch inspect`. A log of another car, or of one with a whole gearbox, may have \
                  it in its shifts alone, and that needs the vehicle file of that car",
                 grouped(lost),
                 grouped(self.rows)

@@ -323,8 +323,7 @@ impl<'a> Measured<'a> {
             }
         }
         Err(Error::Input(format!(
-            "{name} has no value in any of the first {} samples, and this observer needs it\nhint: use `--observer {hint}`, or look at \
-             the log with `wetclutch inspect`",
+            "{name} has no value in any of the first {} samples, and this observer needs it\nhint: use `--observer {hint}`, or check the log with `wetclutch inspect`",
             grouped(self.looked_at.steps)
         )))
     }

@@ -68,7 +68,7 @@ impl<'a> Shifts<'a> {
 
     /// Refuses a selection that no shift is in.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        self.selection.check("`wetclutch inspect --shifts` says what shows a shift")
+        self.selection.check("`wetclutch inspect --shifts` lists the shifts that it finds")
     }
 }
 
