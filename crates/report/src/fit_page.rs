@@ -50,7 +50,7 @@ fn part(rows: &[ReportRow], bars: &Bars) -> Part {
         content: Content::Intervals(rows.iter().map(interval).collect()),
         caption: "Value: a factor on that of the given file, or what is added to it. Bar: the interval of 95 % after the fit, with the value as a \
                   line, on the interval before it, which is grey; the middle of the grey one is the given file. Green: identifiable; orange: limited by \
-                  what was known before; grey frame: not identifiable."
+                  the interval before the fit; grey frame: not identifiable."
             .to_owned(),
     }
 }

@@ -119,7 +119,7 @@ impl DrivePage<'_> {
 /// What an estimate by ratios alone is, and what is missing for more.
 const RATIOS_ALONE: &str = "Of this gearbox the ratios alone are known: torques are those of all clutches together at the turbine. The \
                             torque of a clutch needs the holding torques of the gears (level = \"shares\" in the gearbox file), its pressure \
-                            plates and piston besides (`pack`).";
+                            also plates and piston (`pack`).";
 
 /// The columns of the table of shifts: title, meaning, and a name that no other column has.
 fn column_words(titles: &[String], columns: &[&Column]) -> Vec<Value> {
@@ -234,7 +234,7 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     }
     if hidden(false) > 0 {
         sentences.push(format!(
-            "Of {} shifts the filter has no tables: nothing is estimated. They are two shifts at once, between gears of the same ratio, or past a gear where \
+            "{} shifts are not estimated: the filter has no equations for them. They are two shifts at once, between gears of the same ratio, or past a gear where \
              the ratios alone are known.",
             hidden(false)
         ));
