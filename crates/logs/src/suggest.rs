@@ -311,7 +311,7 @@ fn sum_of([whole, fraction]: [usize; 2], role: Role, channels: &[Channel]) -> St
 fn of_fraction(table: &str) -> String {
     let lines: String = table.lines().filter(|line| !line.is_empty()).map(|line| format!("# {line}\n")).collect();
     format!(
-        "\n# In per cent of a torque that is not in the log. To use it, remove the signs and write how many N m one per cent is.\n\
+        "\n# In per cent of a torque that is not in the log. To use it, remove the number signs and write how many N m one per cent is.\n\
          {lines}# scale =\n"
     )
 }

@@ -29,10 +29,10 @@ pub(super) fn describe_defaults(vehicle: &VehicleFile, all: bool) -> Result<(), 
     };
     output::line(
         "which matter most: RMS change of pressure and torque of the oncoming clutch, in the torque and inertia phase of a\n\
-         simulated upshift, where one default is off, for the open loop and for the default observer (kalman)\n",
+         simulated upshift when one default is wrong, for the open loop and for the default observer (kalman)\n",
     )?;
     let shown = if all { influences.len() } else { SHOWN.min(influences.len()) };
-    let titles = ["default", "value", "off by", "open kPa", "open N m", "kalman kPa", "kalman N m"];
+    let titles = ["default", "value", "wrong by", "open kPa", "open N m", "kalman kPa", "kalman N m"];
     let rows = influences[..shown].iter().map(row);
     output::table(3, titles.map(str::to_owned).to_vec(), rows.collect())?;
     output::line("")?;
@@ -86,14 +86,13 @@ pub(super) fn describe_car_values(car: &CarFile, sensors: &Sensors, all: bool) -
     };
     output::line(&format!(
         "which values matter most: RMS error of torque and pressure of the clutch that drives the inertia phase, while it\n\
-         slips, over {} simulated shifts between neighbouring gears, where one value of all elements is off, by the default filter and\n\
+         slips, over {} simulated shifts between neighbouring gears, when one value is wrong in all elements, by the default filter and\n\
          by the open loop\n",
         influences.shifts
     ))?;
-    let titles = ["value", "stands in", "off by", "filter N m", "open N m", "filter kPa", "open kPa"]
-        .map(str::to_owned)
-        .to_vec();
-    let as_it_is = car_row(["as it is".to_owned(), String::new(), String::new()], &influences.as_it_is);
+    let titles =
+        ["value", "source", "wrong by", "filter N m", "open N m", "filter kPa", "open kPa"].map(str::to_owned).to_vec();
+    let as_it_is = car_row(["no change".to_owned(), String::new(), String::new()], &influences.as_it_is);
     let rows = influences.values.iter().map(value_row);
     output::table(3, titles, std::iter::once(as_it_is).chain(rows).collect())?;
     output::line("")?;
@@ -132,7 +131,7 @@ fn all_names(taken: &[DefaultTaken], shown: &[&str], all: bool) -> Result<(), Fa
     let others: Vec<_> = taken.iter().filter(|taken| !shown.contains(&taken.key.as_str())).collect();
     if !all {
         let count = others.len();
-        output::line(&format!("{count} other defaults matter less, or to no estimate: --all shows them"))?;
+        output::line(&format!("{count} other defaults have less effect, or none: --all lists them"))?;
         return Ok(());
     }
     output::line("defaults on which no estimate depends, or of which nothing is known:")?;

@@ -132,7 +132,7 @@ fn print_of_car(shifts: &[ShiftSensitivity], car: &Car, path: &Path) -> Result<(
     let bound = |error: ShiftErrorKind| format!("{} {}", error.name(), error.bound(&budget));
     let bounds: Vec<String> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(car)).map(bound).collect();
     let [hidden, all] = hidden_phases(shifts);
-    output::line(&format!("\nbounds, either way: {}\nhidden: {hidden} of {all} phases", bounds.join(", ")))?;
+    output::line(&format!("\nbounds, in both directions: {}\nhidden: {hidden} of {all} phases", bounds.join(", ")))?;
     // A car without converter has no designs.
     if car.converter.is_some() {
         output::line(&format!("{BOUND_AND_STD_DEV}: `wetclutch design {}`.", shell_quoted(path)))?;

@@ -36,7 +36,7 @@ fn ratios(path: &Path, map: &ChannelMap) -> Option<String> {
     let gears: Vec<String> = seen.gears().iter().map(|gear| format!("{:.3}", gear.ratio)).collect();
     (gears.len() >= FEWEST).then(|| {
         format!(
-            "\n# Ratios in which the car was driven. To use them, add the gears that are missing, 1st first, and remove the signs.\n\
+            "\n# Ratios in which the car was driven. To use them, add the gears that are missing, 1st first, and remove the number signs.\n\
              # [gearbox]\n# ratios = [{}]\n",
             gears.join(", ")
         )

@@ -85,8 +85,8 @@ pub(crate) fn slow_log(median_s: f64) -> Option<String> {
 }
 
 /// What the ranges assume of the sensors where no file describes them.
-pub const WITHOUT_SENSORS: &str = "ranges: no sensor file was given (--sensors), so a reading of a speed counts as one of the time of its row, and a command errs \
-     by no more than the error bounds of the vehicle file. The ranges are guaranteed only where that is so; a [sensors] table makes them those of the sensors";
+pub const WITHOUT_SENSORS: &str = "ranges: no sensor file was given (--sensors). Each speed counts as measured at the time of its row, and each command as correct \
+     within the error bounds of the vehicle file. The ranges are guaranteed only if this is true; with a [sensors] table they contain the errors of the sensors";
 
 /// Warns of a DBC that is given for a table with the names of the program.
 pub(crate) fn warn_of_dbc(map: &ChannelMap, say: Notes<'_>) {
