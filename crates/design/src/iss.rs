@@ -68,10 +68,14 @@ pub enum DesignError {
     #[error(transparent)]
     OffsetUnreachable(Box<OffsetMissed>),
     /// The conic solver found no solution.
-    #[error("the conic solver found no solution: {0}")]
+    #[error(
+        "the conic solver found no solution: {0}\nhint: relax the requirements in [design], such as the settling time, or use another method"
+    )]
     Solver(String),
     /// The solution failed the check by eigenvalues.
-    #[error("the gain of the solver does not satisfy the inequalities when they are evaluated without the solver")]
+    #[error(
+        "the gain of the solver does not satisfy the inequalities when they are evaluated without the solver\nhint: use another method, or another settling time"
+    )]
     NotCertified,
     /// One of these errors, in this phase.
     #[error("{}: {error}", .phase.name().replace('_', " "))]

@@ -65,7 +65,7 @@ impl<'a> Kept<'a> {
         let mut said = Vec::new();
         if of_drive.was_forgotten {
             said.push(format!(
-                "warning: shifts of this log contradict what was learnt before them, and it is forgotten; was {file} of another car?"
+                "warning: shifts of this log contradict what was learnt before them, and it is forgotten\nhint: check that {file} is of this car"
             ));
         }
         let [taken, all] = of_drive.shifts;

@@ -21,7 +21,7 @@ use crate::output;
 pub(super) fn one_run(campaign: &Campaign, number: u64, options: &StudyOptions) -> Result<(), Failure> {
     if number >= campaign.study.runs {
         return Err(Failure::Input(format!(
-            "the study has no run {number}; its runs are 0 to {}",
+            "the study has no run {number}\nhint: its runs are 0 to {}",
             campaign.study.runs - 1
         )));
     }
