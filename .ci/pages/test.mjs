@@ -10,7 +10,13 @@ const SHIFT = join(folder, "shift/report.html");
 const DRIVE = join(folder, "drive/report.html");
 const LOG = join(folder, "<img src=x onerror=alert(1)>_report.html");
 const HOUR = join(folder, "hour_report.html");
-const PAGES = [SHIFT, DRIVE, LOG, HOUR, ...["check", "check_maps", "design", "fit", "study/study"].map((name) => join(folder, `${name}.html`))];
+const COMPARED = join(folder, "compare.html");
+const WORST = join(folder, "worst/worst_case.html");
+const OTHERS = [
+  "check", "check_maps", "design", "fit", "study/study", "bounds", "bench/bench", "matrix/bench", "sensitivity/sensitivity", "car_sensitivity/sensitivity",
+  "reproduction/reproduction", "compare_files",
+];
+const PAGES = [SHIFT, DRIVE, LOG, HOUR, COMPARED, WORST, ...OTHERS.map((name) => join(folder, `${name}.html`))];
 
 const { browser, end } = await launch();
 test.after(end);
@@ -230,6 +236,41 @@ test("names of files and vehicles are text", () => on(LOG, async (page) => {
   assert.equal(await page.$("main img"), null);
   assert((await page.$eval("h1", (title) => title.textContent)).includes("<img src=x"));
   assert((await page.$eval("body", (body) => body.textContent)).includes("</script><script>alert(1)</script>"));
+}));
+
+test("titles of studies and names of runs are text", async () => {
+  for (const file of [WORST, COMPARED, join(folder, "study/study.html"), join(folder, "bounds.html"), join(folder, "compare_files.html")]) {
+    await on(file, async (page) => {
+      assert((await page.$eval("main", (main) => main.textContent)).includes("<script>alert(1)"), file);
+      assert.equal(await page.$("main script:not([type='application/json'])"), null);
+    });
+  }
+});
+
+test("a comparison shows differences first, then the curves of both runs, which the cursor reads", () => on(COMPARED, async (page) => {
+  assert.equal(await page.$$eval("div.figure", (figures) => figures.length), 9);
+  const order = await page.$$eval("main > figure, main > .scroll", (all) => all.map(({ tagName }) => tagName));
+  assert.deepEqual(order.slice(0, 4), ["FIGURE", "DIV", "DIV", "FIGURE"]);
+  const [whole] = await views(page);
+  assert.deepEqual(whole.split(" ").map(Number), [1, 28]);
+  const figure = (await page.$$("div.figure"))[1];
+  await figure.scrollIntoView();
+  const box = await (await figure.$(".u-over")).boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await frame(page);
+  const read = await figure.$$eval(".panel", (panels) => panels[0].querySelectorAll("output").length);
+  assert.equal(read, 2);
+  const column = (n) => page.$$eval("table.sortable", (tables, n) => [...tables[1].tBodies[0].rows].map((row) => Number(row.cells[n].textContent)), n);
+  const sort = async () => (await (await page.$$("table.sortable"))[1].$$("th button"))[0].click();
+  await sort();
+  assert.deepEqual(await column(0), Array.from({ length: 28 }, (_, at) => at + 1));
+}));
+
+test("the search for a worst case is drawn before the run that it found", () => on(WORST, async (page) => {
+  const heads = await page.$$eval("main h2", (heads) => heads.map(({ textContent }) => textContent));
+  assert.deepEqual(heads.slice(0, 4), ["Torque phase: search", "Torque phase: worst case", "Torque phase: parameters", "Torque phase: run it again"]);
+  assert.match(await page.$eval("pre", (lines) => lines.textContent), /^wetclutch study .*worst_torque_phase\.toml.* --run 0$/);
+  assert.equal((await views(page, 0)).length, 2);
 }));
 
 for (const file of PAGES) {

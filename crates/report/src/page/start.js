@@ -121,7 +121,6 @@ for (const table of document.querySelectorAll("table.sortable")) {
   sortable(table);
   linked(table);
 }
-for (const scroll of document.querySelectorAll(".scroll")) scroll.tabIndex = 0;
 for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", update);
 update();
 openHash();
