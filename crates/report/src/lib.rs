@@ -3,10 +3,8 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod axis;
-pub mod bench_page;
 pub mod car_sensitivity_page;
 pub mod drive_page;
-pub mod error_bound_page;
 pub mod figure;
 pub mod fit_page;
 pub mod gearbox_figure;
@@ -31,8 +29,6 @@ mod svg_text;
 pub mod tables;
 mod words;
 
-pub use bench_page::bench_page;
-pub use error_bound_page::error_bound_page;
 pub use log_page::LogPage;
 pub use page::{Page, PageError};
 pub use reproduction::Reproduction;

@@ -35,9 +35,7 @@ fn templates() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_template("scores.html", include_str!("../templates/scores.html"))?;
     environment.add_template("report.html", include_str!("../templates/report.html"))?;
     environment.add_template("reproduction.html", include_str!("../templates/reproduction.html"))?;
-    environment.add_template("bench.html", include_str!("../templates/bench.html"))?;
     environment.add_template("drive.html", include_str!("../templates/drive.html"))?;
-    environment.add_template("error_bound.html", include_str!("../templates/error_bound.html"))?;
     environment.add_template("log.html", include_str!("../templates/log.html"))?;
     environment.add_template("matrix.html", include_str!("../templates/matrix.html"))?;
     environment.add_template("car_sensitivity.html", include_str!("../templates/car_sensitivity.html"))?;

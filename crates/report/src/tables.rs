@@ -68,6 +68,12 @@ pub fn coverage(fraction: f64) -> String {
     format!("{:.1} %", (1000.0 * fraction).floor() / 10.0)
 }
 
+/// A text that begins with a capital.
+pub fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
+}
+
 /// Name of a phase for people.
 pub fn phase_name(phase: Phase) -> &'static str {
     match phase {

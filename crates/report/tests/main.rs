@@ -7,12 +7,11 @@ use std::path::Path;
 use car::ObserverKind;
 use config::{ExperimentFile, Study, VehicleFile};
 use observer::Estimate;
+use report::StudyPage;
 use report::figure::{Axis, Panel, Weight};
 use report::shift_figure::{observers_figure, shift_figure};
-use report::{StudyPage, bench_page};
-use study::bench::{BenchCell, BenchRow};
 use study::campaign::{Metric, PHASES, factor_values};
-use study::{Bench, Comparison, Row, Status, Summary, compare};
+use study::{Comparison, Row, Status, Summary, compare};
 
 fn e1() -> Comparison {
     compare(&VehicleFile::built_in().unwrap(), &ExperimentFile::e1().unwrap()).unwrap()
@@ -114,33 +113,4 @@ fn a_study_without_runs_has_a_page() {
     let shown = page.html.split("<main>").nth(1).unwrap().split("</main>").next().unwrap();
     let at = shown.find("NaN");
     assert!(at.is_none(), "{}", &shown[at.unwrap().saturating_sub(200)..]);
-}
-
-#[test]
-fn the_bench_page_has_a_column_for_each_observer_even_without_a_ranking() {
-    let (vehicle, experiment) = (VehicleFile::built_in().unwrap(), ExperimentFile::bench().unwrap());
-    let cell = |name: &str| BenchCell {
-        observer: name.to_owned(),
-        torque_phase_rms_pa: 1e4,
-        inertia_phase_rms_pa: f64::NAN,
-        shift_rms_pa: 1e4,
-        chatter_pa: 0.0,
-        diverged: false,
-        shaft_rms_n_m: None,
-        range_coverage: None,
-        shaft_range_coverage: None,
-        range_width_pa: None,
-        torque_range_width_n_m: None,
-        shaft_range_width_n_m: None,
-    };
-    let row = |name: &str, completed| BenchRow {
-        scenario: name.to_owned(),
-        completed,
-        cells: vec![cell("first"), cell("second")],
-    };
-    let bench =
-        Bench { rows: vec![row("nominal", true), row("stalled", false)], ranking: Vec::new(), consistency: None };
-    let html = bench_page(&bench, &vehicle, &experiment).unwrap();
-    assert!(html.contains("<th>first</th><th>second</th>") && html.contains("<b>0.010</b>"));
-    assert!(html.contains("There is no ranking") && html.contains("shift not completed") && !html.contains("NaN"));
 }

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use config::{ExperimentFile, VehicleFile};
-use report::bench_page;
 use report::tables::{coverage, number};
 use study::Bench;
 use study::bench::{BenchConsistency, BenchRow, open_loop};
 use trace::quantity;
 use trace::{ShownPath as _, units};
 
+use super::bench_page::sheet;
 use crate::args;
 use crate::browser;
 use crate::commands::{progress, replaceable, warn_without_effect, write_text};
@@ -43,7 +43,7 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
     bar.finish_and_clear();
     let page = options.output.as_ref().map(|folder| folder.join("bench.html"));
     if let Some(page) = &page {
-        write_text(page, &bench_page(&result, &vehicle, &experiment)?)?;
+        write_text(page, &sheet(&result, &vehicle, &experiment).html()?)?;
     }
     if options.json { output::json(&result) } else { print(&result, page.as_deref()) }?;
     page.iter().for_each(|page| browser::open_if(options.open.is_wanted, page));

@@ -20,7 +20,6 @@ const B: Stroke = Stroke { colour: "#D55E00", weight: Weight::Equal, dash: Some(
 /// The page.
 pub(super) fn sheet<'a>(found: &'a Comparison, paths: [&Path; 2]) -> Sheet<'a> {
     let [a, b] = paths.map(|path| path.shown().to_string());
-    let lead = format!("A: {a} \u{b7} B: {b}");
     let (sentences, parts, sources) = match found {
         Comparison::Files(files) => (vec![files_sentence(files)], file_parts(files), sources(files)),
         Comparison::Runs(runs) => (run_sentences(runs), run_parts(runs), Vec::new()),
@@ -29,7 +28,8 @@ pub(super) fn sheet<'a>(found: &'a Comparison, paths: [&Path; 2]) -> Sheet<'a> {
         Comparison::Files(_) => "Two files over each other",
         Comparison::Runs(_) => "Two runs over each other",
     };
-    Sheet { name, title: "compare", lead, sentences, parts, sources }
+    let lead = format!("A: {a} \u{b7} B: {b} \u{b7} {}", sentences.join(" "));
+    Sheet { name, title: "compare", lead, sentences: Vec::new(), parts, sources }
 }
 
 fn sources(files: &FileComparison) -> Vec<&Source> {

@@ -9,7 +9,7 @@ use observer::Phase;
 use report::figure::{Axis, Figure, Panel, Series, Stroke};
 use report::palette::FAMILY;
 use report::sheet::{Content, Part, Sheet};
-use report::tables::phase_name;
+use report::tables::{capital, phase_name};
 use trace::units::mpa;
 use wetclutch::gains::SAMPLE_TIME_S;
 
@@ -128,9 +128,4 @@ fn point(vehicle: &Vehicle, phase: Phase, options: &Design, settling_s: f64) -> 
     });
     let decays = certificate.vertices.iter().map(|vertex| (vertex.label.clone(), vertex.decay_per_s));
     Some(Point { settling_s, offset_pa: certificate.offset_pa, gain: entries.collect(), decays: decays.collect() })
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
 }

@@ -3,13 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use config::{Kind, Source, Study};
-use report::error_bound_page;
-use report::error_bound_page::named;
 use report::tables::phase_name;
 use study::campaign::PHASES;
 use study::{ErrorBound, error_bound as find};
 use trace::ShownPath as _;
 
+use super::error_bound_page::{named, sheet};
 use crate::args::ErrorBoundOptions;
 use crate::browser;
 use crate::commands::written::{is_page, replaces_only};
@@ -51,7 +50,7 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     if let Some(path) = &options.output {
         write_text(path, &found.toml(&study))?;
         if let Some(page) = page_beside(path) {
-            write_text(&page, &error_bound_page(&found, &study)?)?;
+            write_text(&page, &sheet(&found, &study).html()?)?;
         }
     }
     if options.json { output::json(&found) } else { print(&found, &study, options) }?;

@@ -2,6 +2,7 @@
 
 mod assumed;
 mod bench;
+mod bench_page;
 mod car;
 mod check;
 mod check_defaults;
@@ -16,6 +17,7 @@ mod design;
 mod design_car;
 mod design_page;
 mod error_bound;
+mod error_bound_page;
 mod estimate;
 mod export;
 mod fit;

@@ -5,7 +5,7 @@ use report::figure::{Axis, Figure, Panel, Series, Stroke};
 use report::palette::FAMILY;
 use report::sheet::{Content, Part, Sheet};
 use report::shift_figure::observers_of;
-use report::tables::{coverage, number, phase_name};
+use report::tables::{capital, coverage, number, phase_name};
 use study::campaign::{Metric, PHASES, Run};
 use study::{Campaign, Target, WorstCase};
 use trace::units::{mpa, of_key};
@@ -179,9 +179,4 @@ fn factors(study: &Study, Shown { found, .. }: &Shown) -> Content {
 /// A number with four significant digits.
 fn short(value: f64) -> String {
     format!("{value:.3e}").parse::<f64>().map_or_else(|_| value.to_string(), |rounded| rounded.to_string())
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
 }
