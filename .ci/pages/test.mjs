@@ -13,7 +13,7 @@ const HOUR = join(folder, "hour_report.html");
 const COMPARED = join(folder, "compare.html");
 const WORST = join(folder, "worst/worst_case.html");
 const OTHERS = [
-  "check", "check_maps", "design", "fit", "study/study", "bounds", "bench/bench", "matrix/bench", "sensitivity/sensitivity", "car_sensitivity/sensitivity",
+  "check", "check_maps", "design", "fit", "study/study", "cars/study", "bounds", "bench/bench", "matrix/bench", "sensitivity/sensitivity", "car_sensitivity/sensitivity",
   "reproduction/reproduction", "compare_files",
 ];
 const PAGES = [SHIFT, DRIVE, LOG, HOUR, COMPARED, WORST, ...OTHERS.map((name) => join(folder, `${name}.html`))];

@@ -1,4 +1,4 @@
-//! `--page` of `check`, `design` and `fit`.
+//! `--page` of `check`, `design` and `fit`, and the page of a study of cars.
 
 use crate::support::{Folder, ROOT, VEHICLE, printed, refused, said, wetclutch};
 
@@ -36,6 +36,23 @@ fn a_design_is_a_page_with_the_bound_over_the_settling_time() {
     }
     let sliding = page(&["design", VEHICLE, "--observer", "sliding"]);
     assert!(!sliding.contains("<div class=\"figure\">") && sliding.contains("<pre"));
+}
+
+#[test]
+fn a_study_of_cars_is_a_page_with_the_errors_of_each_kind() {
+    let folder = Folder::new("car-study-page");
+    let study = format!(
+        "name = \"s\"\ntitle = \"<b>cars\"\nvehicle = '{ROOT}vehicles/four_speed.toml'\nshifts = \"neighbouring\"\nruns = 1\n"
+    );
+    let study = folder.write("study.toml", study);
+    let text = printed(&wetclutch(&["study", &study, "-o", &folder.path("out")]));
+    assert!(text.contains(&format!("page: {}", folder.path("out/study.html"))), "{text}");
+    let html = folder.read("out/study.html");
+    assert!(
+        html.contains("Kinds of shift") && html.contains("power-on upshift") && !html.contains("<b>cars"),
+        "{html}"
+    );
+    assert!(html.contains("1 cars, 12 shifts, 0 cars failed"), "{html}");
 }
 
 #[test]

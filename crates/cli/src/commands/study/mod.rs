@@ -1,6 +1,7 @@
 //! `wetclutch study` and `wetclutch merge`.
 
 mod cars;
+mod cars_page;
 mod manifest;
 mod one_run;
 mod part;
