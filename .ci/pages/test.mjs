@@ -185,6 +185,13 @@ test("the table of shifts is sorted and filtered", () => on(DRIVE, async (page) 
     assert(values.every(Number.isFinite), `${score}: ${values}`);
     assert.deepEqual(values, [...values].sort((a, b) => a - b), score);
   }
+  // What is not known stands last in either order.
+  const ratios = titles.lastIndexOf("torque phase");
+  for (const _ of ["up", "down"]) {
+    await (await page.$$("table.sortable th button"))[ratios].click();
+    const cells = await column(ratios);
+    assert(cells[0] !== "–" && cells.at(-1) === "–", cells.join());
+  }
   const kinds = [...new Set(await column(2))];
   assert(kinds.length > 1);
   const kind = await page.evaluateHandle(() => [...document.querySelectorAll(".filters label")].find((label) => label.textContent.startsWith("kind")).querySelector("select"));

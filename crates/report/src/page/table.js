@@ -10,9 +10,9 @@ function keyOf(row, column) {
 function compare(a, b) {
   const isNumber = [a, b].map((key) => typeof key === "number");
   if (isNumber[0] && isNumber[1]) return a - b;
-  // Numbers stand before words, and words before nothing.
+  // Numbers stand before words; nothing stands last in either order.
   if (isNumber[0] !== isNumber[1]) return isNumber[0] ? -1 : 1;
-  return (a === "") - (b === "") || a.localeCompare(b, "en", { numeric: true });
+  return a.localeCompare(b, "en", { numeric: true });
 }
 
 function sortable(table) {
@@ -25,7 +25,9 @@ function sortable(table) {
       const isUp = title.getAttribute("aria-sort") !== "ascending";
       titles.forEach((other) => other.removeAttribute("aria-sort"));
       title.setAttribute("aria-sort", isUp ? "ascending" : "descending");
-      const rows = [...body.rows].sort((a, b) => (isUp ? 1 : -1) * compare(keyOf(a, column), keyOf(b, column)));
+      const keys = new Map([...body.rows].map((row) => [row, keyOf(row, column)]));
+      const isNothing = (row) => ["", "–"].includes(keys.get(row));
+      const rows = [...body.rows].sort((a, b) => isNothing(a) - isNothing(b) || (isUp ? 1 : -1) * compare(keys.get(a), keys.get(b)));
       body.append(...rows);
     });
   });
