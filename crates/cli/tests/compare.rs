@@ -81,6 +81,9 @@ fn a_run_is_the_same_in_every_format_and_a_simulation_is_a_run() {
     let simulated = folder.write("drive.csv", folder.read("demo/drive.csv"));
     let found = json(&[&simulated, &outputs[0]]);
     assert_eq!((&found["matched_by"], found["shifts"].as_array().unwrap().len()), (&Value::from("time"), 12));
+    let time = |shift: &Value, run: &str| shift["differences"]["complete_s"][run].as_f64().unwrap();
+    let late = found["shifts"].as_array().unwrap().iter().map(|shift| (time(shift, "b") - time(shift, "a")).abs());
+    assert!(late.fold(0.0, f64::max) < 0.035, "{found}");
     let torque = |shift: &Value| {
         let curves = shift["curves"].as_array().unwrap();
         let of = curves.iter().find(|curve| curve["signal"] == "torque of the oncoming clutch");

@@ -82,7 +82,8 @@ pub(super) fn file_rows(files: &FileComparison) -> (Vec<String>, Vec<Vec<String>
 /// A relative difference with its sign.
 fn percent(fraction: f64) -> String {
     let decimals = usize::from(fraction.abs() < 0.1);
-    format!("{:+.decimals$} %", 100.0 * fraction)
+    let text = format!("{:+.decimals$} %", 100.0 * fraction);
+    if is_zero(&text) { text[1..].to_owned() } else { text }
 }
 
 fn print_runs(runs: &RunComparison) -> Result<(), Failure> {
@@ -149,14 +150,18 @@ fn shown(value: f64, name: &str) -> String {
         unit => quantity(value, unit, 1),
     };
     // Zero has no sign.
-    let is_zero = text.split(' ').next().is_some_and(|digits| !digits.contains(|c: char| ('1'..='9').contains(&c)));
-    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+    if is_zero(&text) { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+/// Whether the number that a text begins with is zero.
+fn is_zero(text: &str) -> bool {
+    text.split(' ').next().is_some_and(|digits| !digits.contains(|c: char| ('1'..='9').contains(&c)))
 }
 
 /// The same of a difference, with its sign.
 fn signed(value: f64, name: &str) -> String {
     let text = shown(value, name);
-    if text.starts_with('-') { text } else { format!("+{text}") }
+    if text.starts_with('-') || is_zero(&text) { text } else { format!("+{text}") }
 }
 
 /// Titles and rows of the quantities.

@@ -163,10 +163,11 @@ impl Run {
                     values: Vec::new(),
                 });
             }
-            open = is_in_shift;
-            if let Some(shift) = shifts.last_mut().filter(|_| open) {
+            // A shift ends with the first row behind it.
+            if let Some(shift) = shifts.last_mut().filter(|_| is_in_shift || open) {
                 shift.time_s[1] = time_s;
             }
+            open = is_in_shift;
         }
         for shift in &mut shifts {
             shift.values.push(("complete_s".to_owned(), shift.time_s[1] - shift.time_s[0]));
