@@ -452,6 +452,7 @@ fn sensitivity_of_a_car_with_a_gearbox_says_which_shifts_hide_their_torque() {
     );
     assert!(page.contains("Torque phase") && page.contains("AODE") && page.contains("bound, either way"));
     assert!(page.contains(&both.replace('`', "")));
+    assert!(page.find("<div class=\"figure\">").unwrap() < page.find("<table").unwrap());
     let apart = page.split_once("<h2>What cannot be separated</h2>").unwrap().1;
     for errors in ["Friction and valve gain", "kiss point and gain", "stiffness of the drive shafts", "Lag and delay"] {
         assert!(apart.contains(errors), "{errors}");

@@ -5,7 +5,10 @@ use config::CarFile;
 use minijinja::{Value, context};
 use study::gearbox::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity};
 
+use crate::figure::{Figure, Series, Stroke};
+use crate::log_page::ESTIMATE;
 use crate::page::{PageError, origin, render};
+use crate::panels::{panel, with_values};
 use crate::tables::number;
 
 /// Names of the phases, in the order of [`ShiftSensitivity::phases`].
@@ -89,7 +92,9 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &CarFile) -> Resul
     let budget = ErrorBudget::of_car(car);
     let bounds = errors.iter().map(|error| context! { error => error.name(), bound => error.bound(&budget) });
     let phases = PHASES.iter().enumerate().map(|(at, name)| {
-        let rows = shifts.iter().filter_map(|shift| Some(detail(shift, shift.phases[at].as_ref()?, &errors, car)));
+        let numbered = shifts.iter().enumerate();
+        let rows = numbered
+            .filter_map(|(number, shift)| Some(detail((number + 1, shift), shift.phases[at].as_ref()?, &errors, car)));
         context! { name => *name, rows => rows.collect::<Vec<_>>() }
     });
     let [hidden, all] = hidden_phases(shifts);
@@ -106,6 +111,7 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &CarFile) -> Resul
             phases => phases.collect::<Vec<_>>(),
             hidden,
             all,
+            figure => std_dev_figure(shifts).html(),
             // A car without converter has no designs.
             bound_and_deviation => car.converter.is_some().then(|| BOUND_AND_STD_DEV.replace('`', "")),
             inputs => origin(&[&car.source]),
@@ -113,8 +119,38 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &CarFile) -> Resul
     )
 }
 
+/// Standard deviations of filter and valve model over the shifts.
+fn std_dev_figure(shifts: &[ShiftSensitivity]) -> Figure {
+    let curves = [("filter", ESTIMATE), ("valve model", Stroke::THIRD)];
+    let panels = PHASES.iter().enumerate().map(|(at, name)| {
+        let series = curves.into_iter().enumerate().map(|(which, (label, stroke))| Series {
+            label: label.to_owned(),
+            stroke,
+            points: (1_u32..)
+                .zip(shifts)
+                .map(|(place, shift)| {
+                    let std_dev = shift.phases[at].as_ref().map_or(f64::NAN, |phase| phase.std_dev_n_m()[which]);
+                    (f64::from(place), std_dev)
+                })
+                .collect(),
+        });
+        panel(&format!("{name} (N\u{a0}m)"), 140.0, series.collect())
+    });
+    Figure {
+        x_label: "number of the shift".into(),
+        x_range: (1.0, (shifts.len() as f64).max(2.0)),
+        spans: Vec::new(),
+        panels: with_values(panels.collect()).0,
+    }
+}
+
 /// One shift in one phase, with every error.
-fn detail(shift: &ShiftSensitivity, phase: &PhaseOfShift, errors: &[ShiftErrorKind], car: &Car) -> Value {
+fn detail(
+    (place, shift): (usize, &ShiftSensitivity),
+    phase: &PhaseOfShift,
+    errors: &[ShiftErrorKind],
+    car: &Car,
+) -> Value {
     let maximum = phase.std_dev_n_m().into_iter().fold(1e-9, f64::max);
     let cell = |error: &ShiftErrorKind| {
         let effect = phase.effects.iter().find(|effect| effect.error == *error).map_or(0.0, |e| e.torque_n_m[0]);
@@ -122,6 +158,7 @@ fn detail(shift: &ShiftSensitivity, phase: &PhaseOfShift, errors: &[ShiftErrorKi
     };
     let [filter_pa, alone_pa] = phase.std_dev_pa().map(|pa| number(1e-3 * pa, 0));
     context! {
+        place,
         names => names(shift, car),
         torque => number(phase.torque_n_m, 0),
         ratio => ratio(phase),
