@@ -4,6 +4,7 @@
 //! `sum s_k a_k`, and each sticking element holds `sum s_k h_k`. The columns `a_k` and `h_k` are computed once for each set of
 //! sticking elements.
 
+use super::integrate::holding_margin;
 use super::model::{CarInputs, CarModel, CarState, Part, end_responses};
 use crate::gear_train::{HOLDS_ANY, MAX_ELEMENTS, MAX_FREEDOMS, TrainError};
 use crate::{Contact, Direction, MAX_CONTACTS};
@@ -224,15 +225,61 @@ impl Contacts {
         let others = Self::new(model, states)?;
         let torques = model.applied(&others, &state, &model.acting(inputs));
         let free = others.accelerations_rad_s2(&model.ends_n_m(&torques), &torques.elements_n_m);
-        let problem = train.problem(at_zero, |element| {
-            (train.slip(&free, element), model.holding_limits(element, &state, inputs).unwrap_or((0.0, 0.0)))
-        })?;
-        let solution = problem.solve(&[]);
+        // Elements that begin to slip have less friction than they held with, and the others must hold without it.
+        let mut slides = [false; MAX_ELEMENTS];
+        let solution = loop {
+            let problem = train.problem(at_zero, |element| {
+                let limits = if slides[element] {
+                    model.sliding_limits(element, &state, inputs)
+                } else {
+                    model.holding_limits(element, &state, inputs)
+                };
+                (train.slip(&free, element), limits.unwrap_or((0.0, 0.0)))
+            })?;
+            let solution = problem.solve(&[]);
+            let mut is_last = true;
+            for (&element, contact) in at_zero.iter().zip(solution.contacts) {
+                let begins = matches!(contact, Contact::Slipping(_)) && !slides[element];
+                slides[element] |= begins;
+                is_last &= !(begins && model.friction(element).is_some());
+            }
+            if is_last {
+                break solution;
+            }
+        };
         for (&element, contact) in at_zero.iter().zip(solution.contacts) {
             states[element] = Some(contact);
         }
         let contacts = Self::new(model, states)?.without_sharing(model, at_zero, &state, inputs)?;
+        let contacts = contacts.within_limits(model, at_zero.len(), &state, inputs)?;
         Ok((contacts, state))
+    }
+
+    /// The same where each sticking element can hold its torque. In a gearbox that is tied up more elements stick than its freedoms need: how
+    /// they share the torque is not determined, and the smallest torques may be more than one of them can hold. That one then gives what
+    /// it can, without slip, and the others hold the rest.
+    fn within_limits(
+        self,
+        model: &CarModel,
+        at_most: usize,
+        state: &CarState,
+        inputs: &CarInputs,
+    ) -> Result<Self, TrainError> {
+        let mut contacts = self;
+        for _ in 0..at_most {
+            let held = model.torques(&contacts, state, inputs).elements_n_m;
+            let margin = |&at: &usize| holding_margin(model, inputs, state, at, held[at]);
+            let over = contacts.stuck().iter().copied().filter(|at| margin(at) < 0.0);
+            let Some(element) = over.min_by(|a, b| margin(a).total_cmp(&margin(b))) else { break };
+            let mut states = contacts.states;
+            states[element] = Some(Contact::Slipping(Direction::of(held[element])));
+            let with = Self::new(model, states)?;
+            if !with.is_kept(element) {
+                break;
+            }
+            contacts = with;
+        }
+        Ok(contacts)
     }
 
     /// The same where no one-way clutch shares its slip with another sticking element, as with a brake beside it: how the two share a

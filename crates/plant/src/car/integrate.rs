@@ -39,7 +39,7 @@ pub enum CarError {
     },
     /// The elements found no consistent contact.
     #[error(
-        "the elements change endlessly between sticking and slipping at {time_s:.4} s\nhint: if neutral is requested here, request it with accelerator and brake released; else check inertias and friction of the elements"
+        "the elements change endlessly between sticking and slipping at {time_s:.4} s\nhint: check inertias and friction of the elements"
     )]
     Chatter {
         /// When.
@@ -335,7 +335,7 @@ impl CarIntegrator {
 
 /// What a sticking element could hold beyond what it does, N m.
 #[inline]
-fn holding_margin(model: &CarModel, inputs: &CarInputs, x: &CarState, element: usize, held_n_m: f64) -> f64 {
+pub(super) fn holding_margin(model: &CarModel, inputs: &CarInputs, x: &CarState, element: usize, held_n_m: f64) -> f64 {
     let (lower, upper) = model.holding_limits(element, x, inputs).unwrap_or((0.0, 0.0));
     // The contact solver counts in fractions of the limits.
     let slack = |limit: f64| TORQUE_SLACK * (1.0 + limit.abs());

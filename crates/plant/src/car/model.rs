@@ -285,12 +285,24 @@ impl CarModel {
         (capacity > 0.0).then_some((-capacity, capacity))
     }
 
-    /// Torque of an element that slips or is open, N m. `plates_pa` gives the pressure on the plates of a friction element, Pa.
+    /// Lowest and highest torque of an element that begins to slip, N m; `None` for one that is open.
+    pub(super) fn sliding_limits(&self, element: usize, state: &CarState, inputs: &CarInputs) -> Option<Limits> {
+        match self.friction(element) {
+            Some((slot, clutch)) => {
+                let capacity = clutch.clutch.torque_capacity(Self::plates_pa(slot, clutch, state), 0.0);
+                (capacity > 0.0).then_some((-capacity, capacity))
+            }
+            None => self.holding_limits(element, state, inputs),
+        }
+    }
+
+    /// Torque of an element that slips or is open, N m. `plates_pa` gives the pressure on the plates of a friction element, Pa. Plates whose slip
+    /// others keep at zero have the friction of plates that stick.
     #[inline(always)]
     fn sliding_torque(
         &self,
         element: usize,
-        contact: Option<Contact>,
+        (contact, is_kept): (Option<Contact>, bool),
         slip: f64,
         plates_pa: impl Fn(usize, &ShiftClutch) -> f64,
         u: &CarInputs,
@@ -303,6 +315,7 @@ impl CarModel {
             Part::Friction(slot, clutch) => {
                 let torque = match contact {
                     None => 0.0,
+                    Some(_) if is_kept => direction * clutch.clutch.static_capacity(plates_pa(*slot, clutch)),
                     Some(_) => direction * clutch.clutch.torque_capacity(plates_pa(*slot, clutch), slip),
                 };
                 if clutch.drag_n_m > 0.0 { torque + drag_torque(clutch.drag_n_m, slip) } else { torque }
@@ -378,7 +391,7 @@ impl CarModel {
             let volume_m3 = if N > states(F, P) { x[states(F, P) + slot] } else { 0.0 };
             clutch.pressure(x[MOTION + F + slot], volume_m3)
         };
-        self.sliding_torque(element, contacts.of(element), slip, plates_pa, acting.inputs)
+        self.sliding_torque(element, (contacts.of(element), contacts.is_kept(element)), slip, plates_pa, acting.inputs)
     }
 
     /// Torques on engine, gearbox input and gearbox output, N m, without those of the elements.

@@ -92,3 +92,54 @@ fn a_fault_of_an_element_that_the_gearbox_does_not_have_is_refused_with_the_name
     let error = samples(&car, &[fault]).unwrap_err().to_string();
     assert!(error.contains("\"K1\"") && error.contains("hint: it has A, B, C, D, E"), "{error}");
 }
+
+#[test]
+fn a_solenoid_stuck_on_or_off_lets_every_car_go_on_in_every_gear() {
+    let city = Source::built_in("city.toml", include_str!("../../../../drives/city.toml"));
+    let city = Drive { repetitions: 1, ..DriveFile::from_source(city).unwrap().drive };
+    let mut drives = Vec::new();
+    for car in super::road_cars() {
+        let model = CarModel::new(car.clone()).unwrap();
+        for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches).filter(|(_, clutch)| clutch.is_some()) {
+            let clutch = clutch.unwrap();
+            let commands = [0.0, car.line_pressure_pa].map(|pressure_pa| clutch.valve.command_for(pressure_pa));
+            // Each is within a gear or a shift; the car is driven to its halt with what is broken.
+            for from_s in [0.0, 20.0, 47.0, 75.0, 110.0, 150.0] {
+                drives.extend(commands.map(|command| (model.clone(), element.name.clone(), command, from_s)));
+            }
+        }
+    }
+    let mut wrong = Vec::new();
+    for (model, name, command, from_s) in super::runs(drives) {
+        let kind = FaultKind::StuckSolenoid { element: name.clone(), command: Some(command) };
+        let drive = Drive { faults: vec![Fault { kind, from_s }], ..city.clone() };
+        match simulate_car_drive(&model, &model.car, CarCalibration::STANDARD, &drive, |_| {}) {
+            Ok(_) => (),
+            // A clutch that does not open stalls the engine of a car without a converter.
+            Err(CarError::Request(message)) if model.car.converter.is_none() && message.contains("stalls") => (),
+            Err(error) => wrong.push(format!("{} {name} {command} from {from_s} s: {error}", model.car.gearbox.name)),
+        }
+    }
+    assert!(wrong.is_empty(), "{}\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn neutral_asked_for_while_the_engine_pulls_lets_the_elements_of_every_first_gear_slip() {
+    for car in super::road_cars().into_iter().filter(|car| car.converter.is_some()) {
+        for throttle in [0.0, 0.1, 0.3, 0.5] {
+            let file = format!(
+                "name = \"n\"\nstart = {{ gear = \"1\", vehicle_m_s = 5.0 }}\nshift = [{{ time_s = 3.0, gear = \"N\" }}]\n\
+                 [[segment]]\nduration_s = 6\nthrottle = {throttle}\n"
+            );
+            let drive = DriveFile::from_source(Source::built_in("drive.toml", &file)).unwrap().drive;
+            let model = CarModel::new(car.clone()).unwrap();
+            let mut samples = Vec::new();
+            let run = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |s| samples.push(*s));
+            let name = &car.gearbox.name;
+            assert!(run.is_ok(), "{name}, throttle {throttle}: {run:?}");
+            // The engine is free of the road.
+            let shaft_n_m = at(&samples, 5.5).torques.shaft_n_m;
+            assert!(shaft_n_m.abs() < 50.0, "{name}, throttle {throttle}: {shaft_n_m} N m");
+        }
+    }
+}

@@ -53,6 +53,28 @@ fn cars() -> Vec<Car> {
     ]
 }
 
+/// A car for every gearbox of cars on the road, and one whose pistons have a stroke.
+fn road_cars() -> Vec<Car> {
+    vec![
+        car!("gearboxes/8hp45.toml", ""),
+        car!("gearboxes/a8lr1.toml", ""),
+        car!("gearboxes/722_6.toml", ""),
+        car!("gearboxes/ravigneaux_4.toml", ""),
+        car!("gearboxes/4l60e.toml", ""),
+        car!("gearboxes/fn4a.toml", ""),
+        car!("gearboxes/ravigneaux_4_one_way.toml", ""),
+        car!("gearboxes/a340e.toml", ""),
+        car!("gearboxes/9g_tronic.toml", ""),
+        car!("gearboxes/lepelletier_6.toml", ""),
+        car!("gearboxes/tf80sc.toml", ""),
+        car!("gearboxes/10_speed.toml", ""),
+        car!("gearboxes/c6.toml", ""),
+        car!("gearboxes/th400.toml", ""),
+        dual_clutch(),
+        with_stroke(car!("gearboxes/8hp.toml", "")),
+    ]
+}
+
 /// The car with pistons that have a stroke.
 fn with_stroke(mut car: Car) -> Car {
     car.clutches.iter_mut().flatten().for_each(|clutch| clutch.has_stroke = true);
