@@ -118,6 +118,9 @@ fn the_bench_of_a_gearbox_has_every_shift_in_every_kind_on_any_number_of_threads
     for name in ["bench.csv", "bench.html"] {
         assert!(folder.read(&format!("one/{name}")) == folder.read(&format!("three/{name}")), "{name}");
     }
+    let page = folder.read("one/bench.html");
+    assert!(page.find("<div class=\"figure\">").unwrap() < page.find("<table").unwrap());
+    assert!(page.contains("<td>12</td><td>4-3</td>") && !page.contains("<td>13</td>"));
     printed(&run("other", &["--seed", "9"]));
     assert!(folder.read("other/bench.csv") != table);
 }

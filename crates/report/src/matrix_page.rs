@@ -9,7 +9,10 @@ use study::gearbox::matrix::{CLASSES, Matrix, MatrixCounts, MatrixRow, NOTHING_N
 use trace::Cell;
 use trace::shown_units::convert_table;
 
+use crate::figure::{Figure, Series, Stroke};
+use crate::log_page::ESTIMATE;
 use crate::page::{PageError, origin, render};
+use crate::panels::{panel, with_values};
 use crate::tables::number;
 
 /// Names of the phases and of the clutches, in the order of the errors.
@@ -198,6 +201,8 @@ pub fn matrix_page(matrix: &Matrix, car: &CarFile, seed: u64) -> Result<String, 
     let (mut titles, mut rows) = shift_rows(matrix, car);
     convert_table(&mut kind_titles, &mut kinds);
     convert_table(&mut titles, &mut rows);
+    titles.insert(0, "#".to_owned());
+    (1..).zip(&mut rows).for_each(|(place, row): (usize, _)| row.insert(0, place.to_string()));
     render(
         "matrix.html",
         context! {
@@ -211,6 +216,7 @@ pub fn matrix_page(matrix: &Matrix, car: &CarFile, seed: u64) -> Result<String, 
             nothing => NOTHING_N_M,
             kinds => ShiftKind::ALL.map(ShiftKind::name),
             chart => chart(matrix, car),
+            figure => error_figure(matrix).html(),
             kind_titles,
             kind_rows => kinds,
             titles,
@@ -226,6 +232,31 @@ pub fn matrix_page(matrix: &Matrix, car: &CarFile, seed: u64) -> Result<String, 
             inputs => origin(&[&car.source]),
         },
     )
+}
+
+/// RMS errors of filter and open loop over the shifts.
+fn error_figure(matrix: &Matrix) -> Figure {
+    let curves = [("filter", ESTIMATE), ("open loop", Stroke::THIRD)];
+    let panels = PHASES.iter().enumerate().map(|(phase, name)| {
+        let series = curves.into_iter().enumerate().map(|(which, (label, stroke))| Series {
+            label: label.to_owned(),
+            stroke,
+            points: (1_u32..)
+                .zip(&matrix.rows)
+                .map(|(place, row)| {
+                    let torque = &row.errors[phase][0].torque;
+                    (f64::from(place), if torque.rows > 0.0 { torque.rms_n_m()[which] } else { f64::NAN })
+                })
+                .collect(),
+        });
+        panel(&format!("{name} phase (N\u{a0}m)"), 140.0, series.collect())
+    });
+    Figure {
+        x_label: "number of the shift".into(),
+        x_range: (1.0, (matrix.rows.len() as f64).max(2.0)),
+        spans: Vec::new(),
+        panels: with_values(panels.collect()).0,
+    }
 }
 
 /// A row for each pair of gears, a cell for each kind: ratios of inertia and torque phase, coloured.
