@@ -14,7 +14,7 @@ const ALLOWED: [(&str, &[&str]); 22] = [
     ("plant", &["car", "drivetrain", "geartrain"]),
     // What a controller links.
     ("ecu", &["car", "drivetrain", "observer"]),
-    ("export", &["car", "config", "drivetrain", "ecu", "evaluate", "observer", "plant"]),
+    ("export", &["car", "config", "drivetrain", "ecu", "evaluate", "observer", "plant", "trace"]),
     // No files, no clock, no threads.
     ("evaluate", &["car", "drivetrain", "observer", "plant"]),
     // Its estimators are what a gain is for.

@@ -1,30 +1,9 @@
 //! Units of parameters, by the endings of their names.
 
-/// Endings and units, the longer ending first.
-const ENDINGS: [(&str, &str); 27] = [
-    ("_n_m_s_rad", "N m s/rad"),
-    ("_sqrt_pa_s", "sqrt(Pa)/s"),
-    ("_pa_s2_m5", "Pa s^2/m^5"),
-    ("_pa_s2_m6", "Pa s^2/m^6"),
-    ("_n_m_rad", "N m/rad"),
-    ("_m3_s_pa", "m^3/(s Pa)"),
-    ("_n_m_s2", "N m s^2"),
-    ("_rad_s2", "rad/s^2"),
-    ("_kg_m2", "kg m^2"),
-    ("_m3_pa", "m^3/Pa"),
-    ("_rad_s", "rad/s"),
-    ("_m3_s", "m^3/s"),
-    ("_m2_s", "m^2/s"),
-    ("_pa_a", "Pa/A"),
-    ("_rad", "rad"),
-    ("_n_m", "N m"),
-    ("_m3", "m^3"),
-    ("_m2", "m^2"),
-    ("_pa", "Pa"),
-    ("_n", "N"),
-    ("_m", "m"),
-    ("_a", "A"),
-    ("_s", "s"),
+use trace::units::of_key;
+
+/// Of the walk of a state: its unit over the root of time. Endings, with their units.
+const WALKS: [(&str, &str); 4] = [
     ("rate_walk", "rad/s^1.5"),
     ("load_walk", "N m/s^0.5"),
     ("acceleration_walk", "rad/s^2.5"),
@@ -40,7 +19,10 @@ pub(crate) fn unit_of(path: &[impl AsRef<str>]) -> &'static str {
         "values" => unit_of(above),
         name if name.bytes().all(|c| c.is_ascii_digit()) => unit_of(above),
         "command" | "command_max" | "command_error" => "A or %",
-        name => ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("1", |(_, unit)| unit),
+        name => {
+            let walk = WALKS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit);
+            walk.or_else(|| of_key(name)).unwrap_or("1")
+        }
     }
 }
 
