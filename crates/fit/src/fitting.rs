@@ -21,7 +21,7 @@ use crate::shift_model::ShiftModel;
 use crate::shift_weights::ShiftWeights;
 use crate::solver::{Problem, Solved, Unknowns};
 use crate::torque_change::TorqueChange;
-use crate::{Channel, FitError, Given, Parameter, ReadingAges, ShiftRecord, freeing};
+use crate::{Channel, FitError, Given, OneStep, Parameter, ReadingAges, ShiftRecord, freeing};
 
 /// More shifts only shrink what is below the floor of the intervals.
 pub const SHIFTS_MAX: usize = 30;
@@ -57,8 +57,8 @@ pub struct Fit {
     pub driving_left_out: Vec<String>,
     /// The backlash of the driveline, or what the logs lack for it.
     pub backlash: Result<BacklashFit, String>,
-    /// One-step scale of each channel, and its gain `g`; zero for a channel without readings.
-    pub channels: Vec<(Channel, f64, f64)>,
+    /// One-step errors of each channel that has readings.
+    pub channels: Vec<(Channel, OneStep)>,
     /// Whether the last step was small; otherwise the iterations were used up.
     pub is_converged: bool,
     /// Names of the parameters that ended where nothing beyond is held possible.
@@ -343,11 +343,11 @@ fn usable(
     Ok((models, unusable))
 }
 
-/// Scale and gain of the channels that the shifts have.
-fn channels(models: &[ShiftModel], weights: &ShiftWeights) -> Vec<(Channel, f64, f64)> {
+/// One-step errors of the channels that the shifts have.
+fn channels(models: &[ShiftModel], weights: &ShiftWeights) -> Vec<(Channel, OneStep)> {
     let has = |channel| models.iter().any(|model| model.blocks.iter().any(|block| block.channel == channel));
     let channels = Channel::ALL.into_iter().filter(|channel| has(*channel));
-    channels.map(|c| (c, weights.of(c).scale, weights.of(c).gain)).collect()
+    channels.map(|channel| (channel, weights.of(channel).one_step())).collect()
 }
 
 /// Without a pressure the gain of the valve cannot be told, nor, apart from the spring, its gain at the kiss point: what speeds seem to say of

@@ -148,11 +148,12 @@ impl Fit {
     }
 
     fn misfits(&self) -> Vec<String> {
-        let wrong = |(channel, _, gain): &(Channel, f64, f64)| *channel == Channel::Turbine && *gain > MISFIT_GAIN;
-        let warn = |_: &(Channel, f64, f64)| {
+        let wrong =
+            self.channels.iter().any(|(channel, errors)| *channel == Channel::Turbine && errors.gain > MISFIT_GAIN);
+        let warning = wrong.then(|| {
             "warning: the model does not follow the turbine speed: its errors do not decay. The intervals are too small\nhint: the converter or a valve may differ from the vehicle file in a way that the fit does not change; check their maps"
                 .to_owned()
-        };
+        });
         let limited = (!self.at_limit.is_empty()).then(|| {
             format!(
                 "warning: at the limit of the prior (4 standard deviations): {}\nhint: check that the vehicle file is of this car, and the \
@@ -168,14 +169,7 @@ impl Fit {
             )
         });
         let fill = self.fill.and_then(|fill| fill.misfit("the oncoming clutch"));
-        self.channels
-            .iter()
-            .filter(|channel| wrong(channel))
-            .map(warn)
-            .chain(finer)
-            .chain(limited)
-            .chain(fill)
-            .collect()
+        warning.into_iter().chain(finer).chain(limited).chain(fill).collect()
     }
 
     /// Delays, scale and zero offset of channels, which belong into a channel map, each with its interval.

@@ -11,6 +11,11 @@ pub(crate) const HUBER: f64 = 2.5;
 pub(crate) const FACTOR: f64 = 1.4;
 /// Standard deviation of a normal distribution over the median of its sizes.
 const MAD: f64 = 1.4826;
+/// Half of the interval that holds a normal value in 95 %, in standard deviations.
+pub(crate) const NORMAL_95: f64 = 1.96;
+/// Standard deviation of the logarithm of [`MAD`] times the median of the sizes of n errors, times the root of n: `1/(4 phi(q) q)` with the quartile `q` of
+/// a normal distribution and its density `phi`.
+const SCALE_SD: f64 = 1.166;
 /// The values that `g` is chosen from.
 const GAINS: [f64; 14] = [0.0, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8];
 
@@ -19,6 +24,8 @@ const GAINS: [f64; 14] = [0.0, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0
 pub(crate) struct ChannelWeights {
     pub(crate) gain: f64,
     pub(crate) scale: f64,
+    /// Intervals that hold gain and scale in 95 %.
+    intervals: [[f64; 2]; 2],
     /// Factor by which the information of the readings is less than that of independent ones of a perfect model, in the fit as in the
     /// intervals: otherwise what is known before would count too little in the fit.
     pub(crate) inflation: f64,
@@ -27,7 +34,13 @@ pub(crate) struct ChannelWeights {
 impl ChannelWeights {
     /// What is usual for a channel.
     pub(crate) const fn usual(gain: f64, scale: f64) -> Self {
-        Self { gain, scale, inflation: FACTOR * FACTOR }
+        Self { gain, scale, intervals: [[0.0, 1.0], [0.0, f64::INFINITY]], inflation: FACTOR * FACTOR }
+    }
+
+    /// What a fit says of them.
+    pub(crate) fn one_step(&self) -> OneStep {
+        let [gain_interval, scale_interval] = self.intervals;
+        OneStep { scale: self.scale, scale_interval, gain: self.gain, gain_interval }
     }
 
     /// One-step errors of residuals, or of a column of their derivatives, in scales.
@@ -48,23 +61,53 @@ impl ChannelWeights {
 
     /// For errors that are to be independent already.
     pub(crate) fn of_independent(errors: &[f64], scale: f64) -> Self {
-        Self { gain: 0.0, scale, inflation: FACTOR * FACTOR * correlation(&[errors], 0.0, scale) }
+        let inflation = FACTOR * FACTOR * correlation(&[errors], 0.0, scale);
+        Self { inflation, ..Self::usual(0.0, scale) }
     }
 
     /// Those that residuals ask for; without any they stay.
     pub(crate) fn following(self, blocks: &[&[f64]]) -> Self {
-        gain_and_scale(blocks).map_or(self, |(gain, scale)| {
-            let inflation = FACTOR * FACTOR * correlation(blocks, gain, scale);
-            Self { gain, scale, inflation }
-        })
+        let spreads = GAINS.map(|gain| spread(blocks, gain));
+        let (at, (sum, scale)) = least(&spreads);
+        if scale <= 0.0 {
+            return self;
+        }
+        let gain = GAINS[at];
+        let correlation = correlation(blocks, gain, scale);
+        // As many errors that are independent.
+        let count = blocks.iter().map(|block| block.len()).sum::<usize>() as f64 / correlation;
+        let half = NORMAL_95 * SCALE_SD / count.sqrt();
+        let scales = [-half, half].map(|side| scale * Real::exp(side));
+        // Gains whose likelihood is not too small; each stands for those that are nearest to it.
+        let is_possible = |&(other, _): &(f64, f64)| count * Real::ln(other / sum) <= NORMAL_95 * NORMAL_95;
+        let from = spreads.iter().position(is_possible).unwrap_or(at);
+        let to = spreads.iter().rposition(is_possible).unwrap_or(at);
+        let middle = |one: usize, other: f64| 0.5 * (GAINS[one] + other);
+        let gains = [
+            if from == 0 { 0.0 } else { middle(from, GAINS[from - 1]) },
+            middle(to, GAINS.get(to + 1).copied().unwrap_or(1.0)),
+        ];
+        Self { gain, scale, intervals: [gains, scales], inflation: FACTOR * FACTOR * correlation }
     }
 }
 
-/// The gain with which residuals have the minimum one-step errors, and the scale of these; none without residuals.
-fn gain_and_scale(blocks: &[&[f64]]) -> Option<(f64, f64)> {
-    let found = GAINS.into_iter().map(|gain| (gain, spread(blocks, gain)));
-    let (gain, (_, scale)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
-    (scale > 0.0).then_some((gain, scale))
+/// One-step errors of a channel, as `residual = white noise + random walk` leaves them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OneStep {
+    /// Their robust standard deviation, in the unit of the channel.
+    pub scale: f64,
+    /// What holds that of many such logs in 95 %.
+    pub scale_interval: [f64; 2],
+    /// The gain `g`: 0 for white noise, 1 for a random walk.
+    pub gain: f64,
+    /// What holds it in 95 %.
+    pub gain_interval: [f64; 2],
+}
+
+/// The least sum, with its place.
+fn least(spreads: &[(f64, f64); GAINS.len()]) -> (usize, (f64, f64)) {
+    let start = (0, spreads[0]);
+    spreads.iter().copied().enumerate().fold(start, |least, one| if one.1.0 < least.1.0 { one } else { least })
 }
 
 /// Turns residuals into one-step errors. The first is the residual itself.

@@ -2,7 +2,7 @@
 use std::ops::ControlFlow::Continue;
 
 use crate::common::{FittedFile as _, Logs, TestCar, given};
-use fit::{Collected, Driving, Fit, FitError, HeldOut, Map, Parameter, Series, ShiftRecord, Verdict};
+use fit::{Collected, Driving, Fit, FitError, HeldOut, Map, MeanError, Parameter, Series, ShiftRecord, Verdict};
 
 fn shifts(car: &mut TestCar, count: u64, logs: Logs) -> Vec<ShiftRecord> {
     (0..count).map(|number| car.shift(number, logs).record).collect()
@@ -82,14 +82,22 @@ fn a_file_that_is_worse_on_held_out_shifts_is_not_offered() {
     let shifts = shifts(&mut car, 2, Logs::SpeedsAndCurrent);
     let fit = fitted(&car, &shifts).unwrap();
     assert_eq!(fit.reason_against(None), None);
-    let checked = |turbine_rad_s| HeldOut { shifts: 3, turbine_rad_s, pressure_pa: None };
+    let checked = |turbine_rad_s: [f64; 2]| HeldOut {
+        shifts: 3,
+        turbine_rad_s: turbine_rad_s.map(|value| MeanError { value, interval: Some([0.5 * value, 2.0 * value]) }),
+        pressure_pa: None,
+    };
     assert_eq!(fit.reason_against(Some(&checked([0.2, 0.1]))), None);
     assert!(fit.reason_against(Some(&checked([0.2, f64::NAN]))).is_some());
     let reason = fit.reason_against(Some(&checked([0.1, 0.2]))).unwrap();
     let kept = fit::kept_text(&car.file.source.text, &format!("{reason}\n[driveline]"));
     assert!(kept.parse::<toml::Table>().is_ok());
     let (head, rest) = kept.split_once('\n').unwrap();
-    assert!(head.starts_with("# fit: all values are those of the given file") && head.contains("0.200"), "{head}");
+    assert!(
+        head.starts_with("# fit: all values are those of the given file")
+            && head.contains("0.200 (95 % 0.100 to 0.400)"),
+        "{head}"
+    );
     assert_eq!(rest, car.file.source.text);
 }
 

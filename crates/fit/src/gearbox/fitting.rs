@@ -24,7 +24,7 @@ use crate::fill::{FillFit, FillLog, Filling};
 use crate::parameters::OFFSET_UNIT_PA;
 use crate::pressure::Hydraulics;
 use crate::verdict::SIDES;
-use crate::{FitError, Known, Verdict};
+use crate::{FitError, Known, OneStep, Verdict};
 
 /// How far a fit is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,8 +50,8 @@ pub struct GearboxFit {
     pub by_pair: Vec<[usize; 4]>,
     /// Elements that slipped in a fitted shift.
     pub elements_seen: Vec<bool>,
-    /// One-step scale of the turbine speed, rad/s, and its gain `g`.
-    pub scale_and_gain: [f64; 2],
+    /// One-step errors of the turbine speed, rad/s.
+    pub one_step: OneStep,
     /// RMS over the shifts of the error of the torque at the turbine that each of them asks for, in what is held likely.
     pub torque_misfit: f64,
     /// Whether the last step was small; otherwise the iterations were used up.
@@ -171,7 +171,7 @@ fn fit_with(
         shifts: models.len(),
         by_pair,
         elements_seen,
-        scale_and_gain: [solved.weights.turbine.scale, solved.weights.turbine.gain],
+        one_step: solved.weights.turbine.one_step(),
         is_converged: solved.is_converged,
         driving_s: [driving.time_s(), driving.reported_s()],
         backlash: fit_backlash(&driven, std::iter::once(driving)),

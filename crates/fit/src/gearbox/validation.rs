@@ -11,7 +11,9 @@ use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, Quantities, Quantity};
 use super::shift::{Linearised, ShiftModel};
 use super::shift_log::ShiftLog;
+use crate::MeanError;
 use crate::validation::reason_to_keep;
+use crate::weights::NORMAL_95;
 
 /// Errors over shifts that were held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +22,7 @@ pub struct HeldOut {
     pub shifts: usize,
     /// Mean over the shifts of the RMS error of the turbine speed, rad/s, as torques and inertia of the given and of the fitted file make it
     /// run from its mean while both clutches slip.
-    pub turbine_rad_s: [f64; 2],
+    pub turbine_rad_s: [MeanError; 2],
     /// In how many of them the fitted file is the better one.
     pub better: usize,
     /// By how much the torques of the fitted file err, over what its error bounds say of friction and valves, from a third to 3.
@@ -40,7 +42,7 @@ impl HeldOut {
     pub fn valve_error_interval(&self) -> [f64; 2] {
         let count = self.shifts as f64 + SHIFTS_BEFORE;
         // The logarithm of the root of a mean of n squares has a standard deviation of 1/sqrt(2 n).
-        let half = 1.96 / (2.0 * count).sqrt();
+        let half = NORMAL_95 / (2.0 * count).sqrt();
         [-half, half].map(|side| (self.valve_error_scale * Real::exp(side)).clamp(MIN_SCALE, MAX_SCALE))
     }
 
@@ -63,7 +65,7 @@ impl GearboxFit {
         if let Some(late_s) = self.commands_late_s() {
             return Some(said_of_commands(late_s));
         }
-        let [one_step, _] = self.scale_and_gain;
+        let one_step = self.one_step.scale;
         // An error that is not a number counts against the fit.
         if !matches!(one_step.partial_cmp(&MAX_ONE_STEP_RAD_S), Some(Ordering::Less | Ordering::Equal)) {
             return Some(format!(
@@ -96,13 +98,10 @@ impl GearboxFit {
                 })
             })
             .collect();
-        if compared.is_empty() {
-            return None;
-        }
-        let mean = |of: fn(&Compared) -> f64| compared.iter().map(of).sum::<f64>() / compared.len() as f64;
+        let mean = |of: fn(&Compared) -> f64| MeanError::of(&compared.iter().map(of).collect::<Vec<_>>());
         Some(HeldOut {
             shifts: compared.len(),
-            turbine_rad_s: [mean(|one| one.given.sqrt()), mean(|one| one.fitted.sqrt())],
+            turbine_rad_s: [mean(|one| one.given.sqrt())?, mean(|one| one.fitted.sqrt())?],
             better: compared.iter().filter(|one| one.fitted < one.given).count(),
             valve_error_scale: valve_error_scale(&compared),
         })

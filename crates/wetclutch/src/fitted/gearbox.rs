@@ -6,7 +6,7 @@ use std::path::Path;
 use car::Car;
 use config::{CarFile, Source};
 use fit::gearbox::{GivenFile, HeldOut, Recorded, Recorder, ShiftLog};
-use fit::{FitError, ReadingAges};
+use fit::{Channel, FitError, ReadingAges};
 use observer::ShiftTables;
 use report::sheet::Part;
 use study::gearbox::logged::LoggedDrive;
@@ -14,7 +14,7 @@ use trace::ShownPath as _;
 
 use super::{
     FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, impossible, names,
-    nothing_held_out, say_reasons,
+    nothing_held_out, said_of_channel, say_reasons,
 };
 use crate::estimate::gearbox::check_ratios;
 use crate::estimate::gearbox::source::{CarReading, CarSource};
@@ -72,8 +72,7 @@ pub(super) fn fit(
         None => fitted,
         Some(reason) => read(fit::gearbox::kept_text(given, output, reason)?)?,
     };
-    let [scale, gain] = found.scale_and_gain;
-    let statements = [format!("turbine speed: one-step error {scale:.3} rad/s, g {gain:.2}")].into_iter();
+    let statements = [said_of_channel(Channel::Turbine, &found.one_step)].into_iter();
     let statements = statements.chain(found.statements());
     let fitted = Fitted {
         vehicle: VehicleFile::Gearbox(Box::new(written)),

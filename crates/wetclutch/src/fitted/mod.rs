@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use car::Sensors;
 use config::ConfigError;
+use fit::{Channel, OneStep};
 use report::sheet::{Part, Sheet};
 use trace::ShownPath as _;
 
@@ -206,6 +207,19 @@ fn impossible(error: &ConfigError) -> Error {
         "the fitted values are not those of a possible car: {error}\n\
          hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
     ))
+}
+
+/// One-step errors and gain of a channel, in words.
+fn said_of_channel(channel: Channel, errors: &OneStep) -> String {
+    let (factor, unit) = if channel == Channel::Pressure { (1e-3, "kPa") } else { (1.0, "rad/s") };
+    let [low, high] = errors.scale_interval.map(|side| factor * side);
+    let [weakest, strongest] = errors.gain_interval;
+    format!(
+        "{}: one-step error {:.3} {unit} (95 % {low:.3} to {high:.3}), g {:.2} ({weakest:.2} to {strongest:.2})",
+        channel.name(),
+        factor * errors.scale,
+        errors.gain
+    )
 }
 
 /// What is said where nothing is held out.

@@ -4,14 +4,14 @@ use std::ops::ControlFlow;
 
 use car::Vehicle;
 use config::{Source, VehicleFile as OneShiftFile};
-use fit::{Channel, Collected, FitError, Given, HeldOut, LogSource, ReadingAges, SHIFTS_MAX, ShiftRecord};
+use fit::{Collected, FitError, Given, HeldOut, LogSource, ReadingAges, SHIFTS_MAX, ShiftRecord};
 use logs::{Log, LogError};
 use report::sheet::Part;
 use trace::ShownPath as _;
 
 use super::{
     FitOptions, FitProgress, FitProgressTaker, Fitted, HELD_OUT_MIN, MIN_FOR_HELD_OUT, impossible, names,
-    nothing_held_out, say_reasons,
+    nothing_held_out, said_of_channel, say_reasons,
 };
 use crate::{Error, LogInput, Notes, VehicleFile, shell_quoted};
 
@@ -52,7 +52,7 @@ pub(super) fn fit(
         vehicle: VehicleFile::OneShift(Box::new(written)),
         parameters: found.report(),
         map_changes: found.map_changes(),
-        channels: found.channels.iter().map(channel_error).collect(),
+        channels: found.channels.iter().map(|(channel, errors)| said_of_channel(*channel, errors)).collect(),
         statements: [found.statements(), vec![kinds, said_of(checked.as_ref())]].concat(),
         shifts: found.shifts,
         kept,
@@ -64,12 +64,6 @@ pub(super) fn fit(
 /// The vehicle of a file as a fit takes it.
 fn given(file: &OneShiftFile) -> Result<Given, Error> {
     Ok(Given { vehicle: file.vehicle.clone(), shafts: file.shafts()?, text: file.source.text.clone() })
-}
-
-/// One-step error and gain of a channel, in words.
-fn channel_error((channel, scale, gain): &(Channel, f64, f64)) -> String {
-    let (scale, unit) = if *channel == Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
-    format!("{}: one-step error {scale:.3} {unit}, g {gain:.2}", channel.name())
 }
 
 /// The shifts of all logs.
@@ -127,9 +121,9 @@ fn said_of(checked: Option<&HeldOut>) -> String {
         "{} shifts held out: one-step error of the turbine speed {given:.3} rad/s with the given file, {fitted:.3} rad/s with the fitted one",
         checked.shifts
     );
-    if let Some([given, fitted]) = checked.pressure_pa.map(|errors| errors.map(|error| 1e-3 * error)) {
+    if let Some([given, fitted]) = checked.pressure_pa.map(|errors| errors.map(|error| error.map(|pa| 1e-3 * pa))) {
         text += &format!("; pressure of the valve maps against the measured one {given:.2} kPa, {fitted:.2} kPa");
-        if fitted > given {
+        if fitted.value > given.value {
             text += " (worse with the fitted file: check scale, unit and place of the pressure sensor)";
         }
     }
