@@ -27,6 +27,7 @@ mod garage;
 mod hostile_files;
 mod json;
 mod late_commands;
+mod late_speeds;
 mod layshaft;
 mod learnt;
 mod links;

@@ -36,7 +36,7 @@ layout! {
     TurbineTorque { converter, engine_inertia_kg_m2, converter_share, engine_share }
     ShiftUncertainty {
         torque_fraction_s, pressure_s, turbine_share, turbine_share_s, inertia_share, stiffness_fraction, wheel_scale,
-        wheel_scale_walk, rate_rad_s, rate_walk, load_walk, output_least_rad_s,
+        wheel_scale_walk, rate_rad_s, rate_walk, channel_skew_s, load_walk, output_least_rad_s,
     }
     SpeedReading { std_dev_rad_s, lag_rad, pitch_rad, delay_s }
     EngineNoise { reading_rad_s, acceleration_walk, acceleration_max_rad_s2 }

@@ -16,6 +16,7 @@ pub mod drive;
 pub mod errors;
 mod estimator;
 mod felt_shift;
+mod late_speeds;
 pub mod learning_count;
 pub mod logged;
 pub mod measured;

@@ -17,7 +17,7 @@ use crate::learning_count::LearningCount;
 use crate::score::within;
 use crate::shift_comfort::AccelerationSource;
 use crate::shift_jerk::ShiftJerk;
-use crate::{ClutchRow, EvaluateError, ROUNDING_N_M, ROUNDING_PA, ShiftScoreRow};
+use crate::{ClutchRow, EvaluateError, ROUNDING_N_M, ROUNDING_PA, ShiftScoreRow, late_speeds};
 
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
@@ -340,7 +340,9 @@ impl<'c> LoggedDrive<'c> {
         // A shift that the log cuts off is not complete.
         self.end(None);
         let of_car = self.beyond_bounds.warning(self.car, self.tables);
-        let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings()).chain(of_car).collect();
+        let late = late_speeds::warnings(self.state.speeds_late_s());
+        let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings());
+        let warnings = warnings.chain(late).chain(of_car).collect();
         ScoredDrive { warnings, ..self.passing.drive }
     }
 }

@@ -299,6 +299,9 @@ pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncerta
     }
 }
 
+/// Largest skew of turbine and output speed that is taken off, s \[chosen: as an age, to first order, more does not help\].
+const SKEW_MAX_S: f64 = 0.02;
+
 /// What the filter does not know beside the elements.
 fn uncertainty(errors: &ErrorBudget) -> ShiftUncertainty<f64> {
     ShiftUncertainty {
@@ -313,6 +316,7 @@ fn uncertainty(errors: &ErrorBudget) -> ShiftUncertainty<f64> {
         wheel_scale_walk: SCALE_MIN / WHEEL_SCALE_S.sqrt(),
         rate_rad_s: 0.1,
         rate_walk: 0.01,
+        channel_skew_s: SKEW_MAX_S,
         load_walk: 1500.0,
         output_least_rad_s: OUTPUT_MIN_RAD_S,
     }

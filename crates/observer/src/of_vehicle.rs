@@ -24,8 +24,7 @@ pub fn one_shift_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> OneShif
     };
     let filter = with_bounds_of(vehicle, filter, sensors);
     let unheard = unheard_torque(vehicle, filter.uncertainty.pressure_s);
-    let skew_max_s = vehicle.error_bounds.channel_skew_s;
-    OneShiftFilter::new(own, &filter, vehicle.shift, phase_supervisor(vehicle), unheard, skew_max_s)
+    OneShiftFilter::new(own, &filter, vehicle.shift, phase_supervisor(vehicle), unheard)
 }
 
 /// The torque of the offgoing clutch without its command: an error that lasts for this time, s, and changes as the vehicle file states.
@@ -47,6 +46,7 @@ fn with_bounds_of<'a>(
     let (bounds, settings) = (&vehicle.error_bounds, &vehicle.settings);
     let mut uncertainty = filter.uncertainty;
     uncertainty.output_least_rad_s = settings.filter.output_least_rad_s;
+    uncertainty.channel_skew_s = bounds.channel_skew_s;
     let engine = sensors.map(|sensors| &sensors.engine);
     GearboxFilter {
         uncertainty,

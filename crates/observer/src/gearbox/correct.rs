@@ -61,8 +61,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         rates: &Rates<T>,
     ) -> ChannelHealth {
         let sensor = &self.readings[k];
-        let age_s = self.age(sensor, reading);
-        let pitch_s = sensor.pitch_rad / reading.value.abs().max(self.uncertainty.output_least_rad_s);
+        let age_s = self.age(k, reading);
+        let pitch_s = sensor.pitch_rad / reading.value.abs().max(self.least_rad_s(k));
         let rate = rates.of(k, &running.x);
         // The speed at the time of the reading: `w - age w'`, that of the wheels in its own scale.
         let scale = if k == WHEEL { T::one() + running.x.mean[SCALE] } else { T::one() };

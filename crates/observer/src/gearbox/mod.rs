@@ -5,7 +5,7 @@
 //! | `w_t`, `w_o`, `w_w` | momentum | speeds of turbine, output and driven wheels, rad/s |
 //! | `T_s` | `K_s (w_o/i_df - w_w + r)` | torque of the shafts' spring, N m |
 //! | `T_L` | random walk | load at the wheels: road, grade, mass, brake, tyre, N m |
-//! | `r` | random walk | error of the rate of twist: what a scale leaves of the wheel speed's error, as by a delay, rad/s |
+//! | `r` | random walk | error of the rate of twist: what a scale leaves of the wheel speed's error, rad/s |
 //! | `s` | constant | error of the scale of the wheel speed, as a fraction: its reading is that of `(1 + s) w_w` |
 //! | `b` | fades in seconds | fraction by which the turbine torque differs from its sources |
 //! | `c` | fades in hours, unit variance | the part of that fraction that lasts |
@@ -74,6 +74,7 @@ use noise::ReadingNoise;
 use phases::{Contact, PhaseMemory, Slip};
 use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, output_rate, tied};
 use reported::Compared;
+use skew::Skew;
 use timing::Timing;
 use turbine::InputSide;
 
@@ -225,6 +226,7 @@ pub struct GearboxState<T> {
     /// The newest readings of turbine, output and wheel.
     newest: [Option<Newest<T>>; SPEEDS],
     noise: ReadingNoise<T>,
+    skew: Skew<T>,
     /// The steps whose readings are late, if the readings are.
     late: Late<T>,
     /// Whether a wheel speed ever came: a car without one has not lost it.
@@ -324,6 +326,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             reported: None,
             newest: [None; SPEEDS],
             noise: ReadingNoise::stated(),
+            skew: Skew::nothing(),
             late: Late::nothing(),
             wheel_came: false,
             running: None,
@@ -363,6 +366,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             return state.estimate;
         }
         state.started = true;
+        let of_one_time = state.skew.taken_off(input);
+        let input = of_one_time.as_ref().unwrap_or(input);
         if dt_s > T::of(LOST_S) {
             // Too long to be predicted.
             state.lose();
@@ -381,6 +386,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         channels.engine = self.take_engine(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);
         self.take_noise(state, input);
+        self.take_skew(state, input, dt_s);
         health = health.max(self.take_gear(state, input.gear));
         let side = self.input_side(state, input, dt_s);
         let torque = side.as_ref().and_then(|side| self.turbine.at(side));
@@ -505,6 +511,12 @@ impl<T: Real> GearboxState<T> {
     /// What was learnt up to now.
     pub fn learnt(&self) -> &Learnt<T> {
         &self.learnt
+    }
+
+    /// By how much the readings of turbine, output and wheel speed have shown to be older than those of the earliest of them, beyond what is
+    /// stated, s; they are taken to be so.
+    pub fn speeds_late_s(&self) -> [T; 3] {
+        self.skew.late_s()
     }
 
     /// Whether it can be the memory of the filter of a gearbox with these tables.

@@ -14,7 +14,6 @@
 use car::{Input, ShiftCommand};
 use drivetrain::{Driveline, Real, ReducedShift};
 
-use super::skew::Skew;
 use super::{
     FrictionElement, GearRow, GearboxFilter, GearboxState, GearboxTables, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
     ShiftPhase, ShiftRow, ShiftUncertainty, TurbineTorque,
@@ -53,8 +52,6 @@ pub struct OneShiftFilter<T> {
     shift: ReducedShift<T>,
     supervisor: Supervisor<T>,
     unheard: UnheardTorque<T>,
-    /// Largest skew of turbine and output speed, s.
-    skew_max_s: T,
 }
 
 /// The parameters of a [`GearboxFilter`] beside its tables.
@@ -91,7 +88,6 @@ pub struct OneShiftState<T> {
     /// For how long the turbine has run away from the old gear, s.
     flares_s: T,
     supervisor: SupervisorState<T>,
-    skew: Skew<T>,
 }
 
 /// Where the vehicle is.
@@ -139,11 +135,10 @@ impl<T: Real> OneShiftFilter<T> {
         shift: ReducedShift<T>,
         supervisor: Supervisor<T>,
         unheard: UnheardTorque<T>,
-        skew_max_s: T,
     ) -> Self {
         let GearboxFilter { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits, .. } = *filter;
         let parameters = Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits };
-        Self { tables, parameters, shift, supervisor, unheard, skew_max_s }
+        Self { tables, parameters, shift, supervisor, unheard }
     }
 
     /// Its tables.
@@ -159,7 +154,6 @@ impl<T: Real> OneShiftFilter<T> {
             self.shift.cast(),
             self.supervisor.cast(),
             self.unheard.cast(),
-            U::of(self.skew_max_s.to_f64_exact()),
         )
     }
 
@@ -206,16 +200,6 @@ impl<T: Real> OneShiftFilter<T> {
             };
             state.enter(stage);
         }
-    }
-
-    /// Follows the skew of the readings in a gear.
-    fn follow_skew(&self, filter: &GearboxFilter<'_, T>, state: &mut OneShiftState<T>, dt_s: T) {
-        let gear = match state.stage {
-            Stage::First => &self.tables.gears[OFFGOING],
-            Stage::Second => &self.tables.gears[ONCOMING],
-            Stage::Up | Stage::Down => return,
-        };
-        filter.take_skew(&mut state.skew, &state.filter.newest, (gear.ratio, dt_s), self.skew_max_s);
     }
 
     /// Follows what is known of the torque of the offgoing clutch without its command.
@@ -323,7 +307,6 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
             holds_s: T::zero(),
             flares_s: T::zero(),
             supervisor: SupervisorState::new(),
-            skew: Skew::nothing(),
         }
     }
 
@@ -331,9 +314,8 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
         let dt_s = if input.dt_s >= T::zero() && input.dt_s.is_finite() { input.dt_s } else { T::zero() };
         self.take_command(state, input.command);
         let filter = self.filter();
-        let taken = state.skew.taken_off(&self.shift_input(state, input));
+        let taken = self.shift_input(state, input);
         let found = filter.step(&mut state.filter, &taken);
-        self.follow_skew(&filter, state, dt_s);
         Self::follow_shift(state, &found, dt_s);
         self.follow_unheard(state, &found, dt_s);
         let speeds = filter.measured(&state.filter.newest, None);

@@ -2,7 +2,8 @@
 
 use super::{
     ChannelHealth, Channels, Engine, FIRST_S, GearboxFilter, GearboxState, InputSide, LOST_S, MAX_ELEMENTS, Newest,
-    OUTPUT, Reading, Running, SPEEDS, ShiftElement, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, pieces, square,
+    OUTPUT, Reading, Running, SPEEDS, ShiftElement, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, WHEEL, pieces,
+    square,
 };
 use car::ShiftCommand;
 use drivetrain::Real;
@@ -99,7 +100,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         if !(self.limits.speed_valid(reading.value) && reading.age_s >= T::zero() && reading.age_s <= lost) {
             return ChannelHealth::Refused;
         }
-        let age_s = self.age(sensor, &reading);
+        let [age_s, _] = Self::age_and_late((sensor, self.uncertainty.output_least_rad_s), &reading);
         match &mut state.engine {
             None => state.engine = Some(Engine::new(reading.value, noise)),
             Some(engine) => {
@@ -114,13 +115,19 @@ impl<T: Real> GearboxFilter<'_, T> {
         ChannelHealth::Good
     }
 
-    /// Age of the middle of a reading, s.
-    pub(super) fn age(&self, sensor: &SpeedReading<T>, reading: &Reading<T>) -> T {
-        self.age_and_late(sensor, reading)[0]
+    /// Speed of turbine, output or wheel below which the teeth of its sensor are not waited for, rad/s: that of the output, at the wheels.
+    pub(super) fn least_rad_s(&self, k: usize) -> T {
+        let output = self.uncertainty.output_least_rad_s;
+        if k == WHEEL { output / self.driveline.final_ratio } else { output }
     }
 
-    fn age_and_late(&self, sensor: &SpeedReading<T>, reading: &Reading<T>) -> [T; 2] {
-        let [lag_s, late_s] = sensor.lag_and_late(reading.value.abs(), self.uncertainty.output_least_rad_s);
+    /// Age of the middle of a reading of turbine, output or wheel, s.
+    pub(super) fn age(&self, k: usize, reading: &Reading<T>) -> T {
+        Self::age_and_late((&self.readings[k], self.least_rad_s(k)), reading)[0]
+    }
+
+    fn age_and_late((sensor, least_rad_s): (&SpeedReading<T>, T), reading: &Reading<T>) -> [T; 2] {
+        let [lag_s, late_s] = sensor.lag_and_late(reading.value.abs(), least_rad_s);
         [reading.age_s + sensor.delay_s + lag_s, late_s]
     }
 
@@ -134,8 +141,8 @@ impl<T: Real> GearboxFilter<'_, T> {
     ) {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         let health = [&mut channels.turbine, &mut channels.output, &mut channels.wheel];
-        for (((newest, reading), health), sensor) in state.newest.iter_mut().zip(given).zip(health).zip(&self.readings)
-        {
+        for (k, ((newest, reading), health)) in state.newest.iter_mut().zip(given).zip(health).enumerate() {
+            let sensor = &self.readings[k.min(SPEEDS - 1)];
             if let Some(newest) = newest {
                 newest.pass(dt_s);
             }
@@ -147,7 +154,12 @@ impl<T: Real> GearboxFilter<'_, T> {
             let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
             let taken = self.limits.speed_valid(reading.value)
                 && aged
-                && Newest::take(newest, reading.value, self.age_and_late(sensor, &reading), sensor.std_dev_rad_s);
+                && Newest::take(
+                    newest,
+                    reading.value,
+                    Self::age_and_late((sensor, self.least_rad_s(k)), &reading),
+                    sensor.std_dev_rad_s,
+                );
             *health = if taken { ChannelHealth::Good } else { ChannelHealth::Refused };
         }
         state.wheel_came |= input.wheel_rad_s.is_some();

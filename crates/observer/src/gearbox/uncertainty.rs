@@ -27,6 +27,8 @@ pub struct ShiftUncertainty<T> {
     pub rate_rad_s: T,
     /// Its random walk, rad/s per root second.
     pub rate_walk: T,
+    /// Largest skew of turbine and output speed, s.
+    pub channel_skew_s: T,
     /// Random walk of the load at the wheels, N m per root second.
     pub load_walk: T,
     /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
@@ -74,6 +76,7 @@ impl<T: Real> ShiftUncertainty<T> {
             wheel_scale_walk: to(self.wheel_scale_walk),
             rate_rad_s: to(self.rate_rad_s),
             rate_walk: to(self.rate_walk),
+            channel_skew_s: to(self.channel_skew_s),
             load_walk: to(self.load_walk),
             output_least_rad_s: to(self.output_least_rad_s),
         }
