@@ -68,10 +68,8 @@ impl ChannelWeights {
     /// Those that residuals ask for; without any they stay.
     pub(crate) fn following(self, blocks: &[&[f64]]) -> Self {
         let spreads = GAINS.map(|gain| spread(blocks, gain));
-        let (at, (sum, scale)) = least(&spreads);
-        if scale <= 0.0 {
-            return self;
-        }
+        let least = spreads.iter().copied().enumerate().min_by(|one, other| one.1.0.total_cmp(&other.1.0));
+        let Some((at, (sum, scale))) = least.filter(|(_, (_, scale))| *scale > 0.0) else { return self };
         let gain = GAINS[at];
         let correlation = correlation(blocks, gain, scale);
         // As many errors that are independent.
@@ -85,7 +83,7 @@ impl ChannelWeights {
         let middle = |one: usize, other: f64| 0.5 * (GAINS[one] + other);
         let gains = [
             if from == 0 { 0.0 } else { middle(from, GAINS[from - 1]) },
-            middle(to, GAINS.get(to + 1).copied().unwrap_or(1.0)),
+            GAINS.get(to + 1).map_or(1.0, |next| middle(to, *next)),
         ];
         Self { gain, scale, intervals: [gains, scales], inflation: FACTOR * FACTOR * correlation }
     }
@@ -96,18 +94,12 @@ impl ChannelWeights {
 pub struct OneStep {
     /// Their robust standard deviation, in the unit of the channel.
     pub scale: f64,
-    /// What holds that of many such logs in 95 %.
+    /// What holds it in 95 %, by the noise of the readings; shifts may differ by more.
     pub scale_interval: [f64; 2],
     /// The gain `g`: 0 for white noise, 1 for a random walk.
     pub gain: f64,
     /// What holds it in 95 %.
     pub gain_interval: [f64; 2],
-}
-
-/// The least sum, with its place.
-fn least(spreads: &[(f64, f64); GAINS.len()]) -> (usize, (f64, f64)) {
-    let start = (0, spreads[0]);
-    spreads.iter().copied().enumerate().fold(start, |least, one| if one.1.0 < least.1.0 { one } else { least })
 }
 
 /// Turns residuals into one-step errors. The first is the residual itself.
@@ -170,4 +162,58 @@ fn correlation_factor(blocks: &[&[f64]]) -> f64 {
         factor += 2.0 * correlation;
     }
     factor
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Normal values by the sum of twelve uniform ones, by Marsaglia's generator.
+    fn normal(bits: &mut u64) -> f64 {
+        let uniform = |_| {
+            *bits ^= *bits << 13;
+            *bits ^= *bits >> 7;
+            *bits ^= *bits << 17;
+            (*bits >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(uniform).sum::<f64>() - 6.0
+    }
+
+    #[test]
+    fn intervals_of_scale_and_gain_hold_the_values_of_the_process() {
+        let (mut bits, logs) = (88_172_645_463_325_252, 400);
+        for true_gain in [0.0, 0.3, 1.0] {
+            let mut holds = [0; 2];
+            for _ in 0..logs {
+                // Three shifts of 100 readings: r = s + e, s' = s + g e.
+                let shifts: Vec<Vec<f64>> = (0..3)
+                    .map(|_| {
+                        let mut state = 0.0;
+                        let mut next = |_| {
+                            let error = 0.2 * normal(&mut bits);
+                            let residual = state + error;
+                            state += true_gain * error;
+                            residual
+                        };
+                        (0..100).map(&mut next).collect()
+                    })
+                    .collect();
+                let blocks: Vec<&[f64]> = shifts.iter().map(Vec::as_slice).collect();
+                let found = ChannelWeights::usual(0.3, 0.5).following(&blocks).one_step();
+                let is_within = |[low, high]: [f64; 2], value: f64| (low..=high).contains(&value);
+                holds[0] += usize::from(is_within(found.scale_interval, 0.2));
+                holds[1] += usize::from(is_within(found.gain_interval, true_gain));
+                assert!(is_within(found.scale_interval, found.scale) && is_within(found.gain_interval, found.gain));
+            }
+            assert!(holds.iter().all(|held| *held >= logs * 9 / 10), "g {true_gain}: {holds:?} of {logs}");
+        }
+    }
+
+    #[test]
+    fn without_residuals_nothing_is_known_of_a_channel() {
+        for blocks in [&[][..], &[&[][..]], &[&[f64::NAN; 5][..]], &[&[0.0; 5][..]]] {
+            let found = ChannelWeights::usual(0.3, 0.5).following(blocks).one_step();
+            assert_eq!((found.scale_interval, found.gain_interval), ([0.0, f64::INFINITY], [0.0, 1.0]));
+        }
+    }
 }
