@@ -22,8 +22,11 @@ fn error_n_m(folder: &Folder, sensors: &str, late: Option<(&str, f64)>) -> (f64,
     said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &sim]));
     let log = folder.path("sim/city_measured.csv");
     let found = said(&wetclutch(&["estimate", &log, "--vehicle", &car, "--sensors", &stated, "-o", &out]));
-    let delay_ms = found.split("_speed is ").nth(1).and_then(|rest| rest.split(" ms later than").next()?.parse().ok());
-    assert_eq!(delay_ms.is_some(), found.contains("later than"), "{found}");
+    let delay_ms = found
+        .split("_speed comes ")
+        .nth(1)
+        .and_then(|rest| rest.split(" ms later").next()?.trim_start_matches("at least ").parse().ok());
+    assert_eq!(delay_ms.is_some(), found.contains("later than is stated"), "{found}");
     let [truth, estimate] =
         [("sim/city.csv", NAMES[0]), ("out.csv", NAMES[1])].map(|(file, name)| numbers(&folder.read(file), name));
     assert_eq!(truth.len(), estimate.len());

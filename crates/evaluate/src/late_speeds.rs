@@ -1,19 +1,34 @@
 //! Speeds that come later than is stated.
 
 /// A delay below this is within what the lag of a toothed wheel may be, s \[chosen\].
-const SAID_S: f64 = 0.01;
-/// Turbine, output and wheel speed, each with that which it was compared with.
-const SPEEDS: [[&str; 2]; 3] =
-    [["turbine_speed", "output_speed"], ["output_speed", "turbine_speed"], ["wheel_speed", "output_speed"]];
+const REPORTED_S: f64 = 0.01;
+/// Turbine, output and wheel speed.
+const SPEEDS: [&str; 3] = ["turbine_speed", "output_speed", "wheel_speed"];
 
-/// What the filter has found of the delays of turbine, output and wheel speed, s, in words.
-pub(crate) fn warnings(late_s: [f64; 3]) -> impl Iterator<Item = String> {
-    let late = SPEEDS.into_iter().zip(late_s).filter(|(_, late_s)| *late_s >= SAID_S);
-    late.map(|([speed, other], late_s)| {
+/// What the filter has found of the delays of turbine, output and wheel speed, s, of which these are the longest that it finds, in words.
+pub(crate) fn warnings(late_s: [f64; 3], longest_s: [f64; 3]) -> impl Iterator<Item = String> {
+    let speeds = SPEEDS.into_iter().zip(late_s.into_iter().zip(longest_s));
+    speeds.filter(|(_, (late_s, _))| *late_s >= REPORTED_S).map(|(speed, (late_s, longest_s))| {
+        let at_least = if late_s >= longest_s { "at least " } else { "" };
         format!(
-            "warning: {speed} is {:.0} ms later than {other}, beyond what is stated; the estimate takes it so once that is known\nhint: state it from the first row on: `delay_s` of this \
-             channel in the channel map, or of its sensor in the file of --sensors",
+            "warning: {speed} comes {at_least}{:.0} ms later than is stated, against the other speeds; the estimate takes it so once that is known\nhint: state it from \
+             the first row on: `delay_s` of this channel in the channel map, or of its sensor in the file of --sensors",
             1e3 * late_s
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_delay_is_a_lower_limit() {
+        let said: Vec<String> = warnings([0.02, 0.0, 0.031], [0.02, 0.02, 0.05]).collect();
+        assert_eq!(said.len(), 2);
+        assert!(
+            said[0].starts_with("warning: turbine_speed comes at least 20 ms later") && said[1].contains("comes 31 ms")
+        );
+        assert_eq!(warnings([0.009, 0.0, f64::NAN], [0.02; 3]).count(), 0);
+    }
 }

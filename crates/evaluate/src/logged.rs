@@ -340,7 +340,7 @@ impl<'c> LoggedDrive<'c> {
         // A shift that the log cuts off is not complete.
         self.end(None);
         let of_car = self.beyond_bounds.warning(self.car, self.tables);
-        let late = late_speeds::warnings(self.state.speeds_late_s());
+        let late = late_speeds::warnings(self.state.speeds_late_s(), self.filter.longest_found_s());
         let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings());
         let warnings = warnings.chain(late).chain(of_car).collect();
         ScoredDrive { warnings, ..self.passing.drive }

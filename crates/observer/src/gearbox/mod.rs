@@ -424,6 +424,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         state.lose();
         state.newest = [None; SPEEDS];
         state.noise.pause();
+        state.skew.pause();
         state.engine = None;
         state.reported = None;
         for (memory, element) in state.elements.iter_mut().zip(self.tables.elements) {
@@ -513,8 +514,8 @@ impl<T: Real> GearboxState<T> {
         &self.learnt
     }
 
-    /// By how much the readings of turbine, output and wheel speed have shown to be older than those of the earliest of them, beyond what is
-    /// stated, s; they are taken to be so.
+    /// By how much the readings of turbine, output and wheel speed have shown to be late against the earlier one of turbine and output, beyond
+    /// what is stated, s; they are taken to be so.
     pub fn speeds_late_s(&self) -> [T; 3] {
         self.skew.late_s()
     }
