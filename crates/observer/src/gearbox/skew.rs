@@ -222,7 +222,8 @@ impl<T: Real> GearboxFilter<'_, T> {
 mod tests {
     use super::*;
 
-    /// The skew after pulling away and coasting by turns for so many seconds, with these delays of turbine and wheel speed against the output, s, and a wheel speed that reads 1 % too little.
+    /// The skew after pulling away and coasting by turns for so many seconds, with these delays of turbine and wheel speed against the output,
+    /// s, and a wheel speed that reads 1 % too little.
     fn found_s([turbine_s, wheel_s]: [f64; 2], seconds: u32) -> [f64; SPEEDS] {
         let mut skew = Skew::nothing();
         for row in 0..100 * seconds {
