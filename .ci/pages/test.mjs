@@ -203,7 +203,7 @@ test("the table of shifts is sorted and filtered", () => on(DRIVE, async (page) 
 
 test("a row opens its shift, n and p go on from there", () => on(DRIVE, async (page) => {
   const openShift = () => page.$$eval("details.shift[open]", (shifts) => shifts.map((shift) => shift.id));
-  const row = await page.evaluateHandle(() => document.querySelector("a[href='#shift5']").closest("tr").cells[2]);
+  const row = await page.evaluateHandle(() => document.querySelector("table a[href='#shift5']").closest("tr").cells[2]);
   await row.click();
   await frame(page);
   assert.deepEqual(await openShift(), ["shift5"]);
