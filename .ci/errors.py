@@ -33,7 +33,6 @@ NOT_PROVOKED = {
     "damage deep in a file, which the fuzz targets make": [
         "it has … packed bytes, expected at most",
         "the data end after … of … records",
-        "the frames of its bus",
         "a dictionary is shorter than its stated size",
         "a page needs a dictionary",
         "the levels of a page are longer",
@@ -45,10 +44,6 @@ NOT_PROVOKED = {
         "the gain of the solver does not satisfy the inequalities",
         "the search failed",
         "the fit left the range in which the model",
-    ],
-    "what no input has brought about so far, and no rule excludes": [
-        "the shift has no acceleration before its request",
-        "does not end within … s",
     ],
     "one part of the program that uses another wrongly": [
         "this is an error in wetclutch",
@@ -67,8 +62,117 @@ NOT_PROVOKED = {
         "the vehicle file has no `gear_train.oncoming`",
         "is not made: …",
         "there are … of … runs",
+        "the shift has no acceleration before its request",
     ],
 }
+
+
+# Names of a place or a kind, which stand in a message.
+NAMES = {"the vehicle file", "date or time", "the frames of its bus"}
+# What to do about messages whose hint the sources hold elsewhere, or which say in themselves what is expected.
+CURES = {
+    "an error in wetclutch: report it with the file that brings it about": [
+        *NOT_PROVOKED["one part of the program that uses another wrongly"],
+        "a cell repeats that of the row before",
+        "the log was read already",
+        "line …: a cell is not a number",
+        "another gearbox than the simulated one",
+    ],
+    "the file is cut or damaged: copy it again from the recorder": [
+        *NOT_PROVOKED["damage deep in a file, which the fuzz targets make"],
+        "there is no object where one should begin",
+        "an object has a stated size of",
+        "object is cut",
+        "the head of the file is cut",
+        "a container unpacks to",
+        "a container is packed by method",
+        "in the container that ends here",
+        "unpacked size is … bytes",
+        "it unpacks to",
+        "what is packed in it is damaged",
+        "block at byte",
+        "the column does not hold numbers",
+    ],
+    "the table has been changed or removed since it was written; make its runs again in another folder": [
+        "contains … of … runs",
+        "the row is of run",
+        "the seed of run",
+        "of run … is …, expected",
+        "the numbers of the row have been changed",
+        "do not go with its status",
+        "the names of the columns are missing",
+        "the line is not UTF-8 text",
+        "the line ends with CR LF",
+        "the columns are not those of this study",
+    ],
+    "use letters, digits, spaces and underscores, such as \"town 1\"": [
+        "be longer than … bytes",
+        "contain a line break",
+        "contain a double quote",
+        "begin with one of",
+        "begin or end with a space",
+    ],
+    "give a value in the range that the message names": [
+        "`…` is …, expected",
+        "expected a number from",
+        "expected I/N with I",
+        "expected two gears by their names",
+        "such as [\"1-2\", \"2-1\"]",
+        "\"…\", or a list of shifts",
+    ],
+    "the lines before name each file with its error and what to do": [
+        "… files have errors",
+        "logs have no estimate",
+        "logs are not inspected",
+    ],
+    "the reason and its hint follow in the message": [
+        "the converter cannot be fitted",
+        "the first car that failed",
+        "there is no shift to fit",
+        "no shift can be used",
+        "cannot be simulated",
+        "continuing with the best certified gain",
+    ],
+    "[what to do when a fit keeps the file](../how-to/when-a-fit-keeps-the-file.md)": ["the given values are kept"],
+    "`late_s` of the channel map: `fit --write-map` writes it": ["The values above are those with corrected times of the commands"],
+    "set `channel.NAME.unit`, or use `--channel NAME=\"NAME [UNIT]\"`": ["… cannot be in …"],
+    "set `channel.NAME.scale` to a negative number": ["its sign is the other way round", "an engine does not turn backwards"],
+    "check that `channel.NAME.name` is this signal and that its sensor works": ["rad/s in all samples, and"],
+    "times are numbers, `12:00:01.25` or `2024-03-31 12:00:01.25`, all in one form": ["rows have no time, the first is"],
+    "correct the signal in the DBC: the log is read without it": ["expected 1 to 64 within 64 bytes", "expected 32 or 64"],
+    "make a new observer with what was learnt of the car, and save that: it is valid for all versions": ["is of version …, and this is", "is of another gearbox"],
+    "free memory, or give the process more": ["no thread could be started", "the search failed"],
+    "use a system on which a process may handle signals": ["interrupts cannot be received"],
+    "use a gain that the command `design` certifies, or a shorter sample time": ["the gains are unstable"],
+    "use a shorter sample time, or discretisation = \"exact\"": ["is longer than the valve's time constant"],
+    "use a longer sample time, or a shorter `sample_time_s` of the experiment": ["of the recorded signals"],
+    "`--observer rigid` or `compliant`, with any method but `iss`; --shift 1-2 gives the gains of one shift": ["has no certificate…", "has no bound for a sample time"],
+    "widen the requirement, or use another method: `design --page` shows what is reachable": ["in each of … programs"],
+    "give the throttle fewer points": ["points to the … of the throttle", "give the throttle fewer points"],
+    "remove the key; [the keys of each kind](../reference/keys.md)": ["has no effect with this kind"],
+    "name two elements of the gearbox": ["has to name two elements"],
+    "level = \"ratios\", \"shares\" or \"stick-diagram\"": ["there is no such level"],
+    "begin with one of these tables; `wetclutch init` writes a vehicle file": ["expected a vehicle file"],
+    "give a smaller number": ["the number is too large"],
+    "the first line is \"time_s,speed_km_h\" (or speed_m_s, speed_mph), then one point in each line": ["has no comma", "the columns are \"", "fewer than two points"],
+    "the hint lists the observers of the experiment: name one or more of them, each once": ["a study needs at least one observer", "the experiment has no observer `", "is in the list twice"],
+    "the hint lists the elements of the gearbox": ["the gearbox has no clutch or brake"],
+    "proportional: time_constant_s, gain_pa_a; pulse-width: flow_sqrt_pa_s, line_pressure_pa": ["has a key of another kind of valve"],
+    "describe at least one": ["there are none"],
+    "give the key in the vehicle file": ["the vehicle file has no numbers at"],
+    "leave out those that no gear engages": ["at most … are possible"],
+    "give the gearbox an output shaft of its own": ["input and output are the same shaft"],
+    "check the unit: g m2 is 0.001 kg m2": ["what turns with it usually has"],
+    "`wetclutch check` of the gearbox file lists its shifts, and the elements that open and close in each": ["there is no way from gear"],
+    "the message itself says what to check": ["check the units of both speeds"],
+    "copy the file to a path with fewer links": ["too many symbolic links"],
+    "make room on the disk, then run it again": ["the thread that brings the file to the disk has ended"],
+}
+
+
+def cure_of(message):
+    """What to do about a message without a hint beside it."""
+    return next((cure for cure, parts in CURES.items() if any(part in plain(message) for part in parts)), "")
 
 
 def sources():
@@ -116,41 +220,50 @@ def call_of(code, place):
     return None
 
 
+def constant_hint(code, place, text):
+    """The text of the constant that is the hint in the call after a message, if there is one."""
+    for word in re.findall(r"\b[A-Z][A-Z_]{3,}\b", code[place : code.find(";", place)][:240]):
+        value = re.search(rf"\bconst {word}: &str =\s*", code)
+        value = value and next((literal for at, literal in literals(text) if at == value.end()), "")
+        if value and is_prose(value):
+            return value
+    return ""
+
+
 def messages(path, text):
     """Message, hint and variant of an error, of each literal that is a message. A hint of its own stands in the same function."""
     makes = MAKES if path.relative_to(ROOT).parts[1] not in REASONS else re.compile(MAKES.pattern.replace(r"\bErr\(|", ""))
     code = TOKEN.sub(lambda match: " " * len(match[0]), text)
     of_variants = hints_by_variant(code, text)
-    found, function, waiting = [], None, None
-    for place, literal in filter(lambda found: is_prose(found[1]), literals(text)):
+    # By function, in their order.
+    functions = {}
+    for place, literal in literals(text):
         begin = code.rfind("fn ", 0, place)
         statement = code[max(code.rfind(end, 0, place) for end in (";", "}\n", "fn ")) + 1 : place][-300:]
-        if function != begin:
-            function, waiting = begin, None
-            # Some functions have each hint before its message.
-            is_behind = not HINTS.search(statement)
-        if HINTS.search(statement):
-            if not is_behind:
-                waiting = (place, literal)
-            elif found and found[-1][3] == begin and not found[-1][1]:
-                found[-1][1] = literal
-            continue
+        found = functions.setdefault(begin, [])
         call = call_of(code, place)
-        if call and found and found[-1][4] == call:
-            # The second text of a call is the hint.
-            found[-1][1] = found[-1][1] or literal
+        is_second = call and found and found[-1]["call"] == call
+        if HINTS.search(statement) or is_second:
+            # A hint with a name belongs to the message that stands before its use, any other one to the message before itself.
+            is_named = re.search(r"\blet hint\b", statement)
+            use = is_named and re.compile(r"\bhint\b").search(code, place)
+            before = use.start() if use else place
+            functions[begin].append({"hint": literal, "before": before, "place": place, "call": call})
             continue
         message, has_hint, hint = literal.partition("\\nhint: ")
-        if not has_hint and not literal.startswith("warning") and not makes.search(statement):
-            continue
-        variant = re.match(r"[^\]]*\]\s*(\w+)", code[place:]) if "#[error(" in statement else None
-        variant = variant and variant[1]
-        if is_prose(message):
-            # One that was used before is of another message.
-            is_free = waiting and not re.search(r"\bhint\b", code[waiting[0] : place])
-            found.append([message, hint or of_variants.get(variant) or (waiting[1] if is_free else ""), variant, begin, call])
-            waiting = None
-    return [(message, hint, variant) for message, hint, variant, *_ in found]
+        if message not in NAMES and is_prose(message) and (has_hint or literal.startswith("warning") or makes.search(statement)):
+            variant = re.match(r"[^\]]*\]\s*(\w+)", code[place:]) if "#[error(" in statement else None
+            variant = variant and variant[1]
+            hint = hint or of_variants.get(variant) or ""
+            found.append({"message": message, "hint": hint, "variant": variant, "place": place, "call": call})
+    for found in functions.values():
+        said = [piece for piece in found if "message" in piece]
+        for hint in filter(lambda piece: "message" not in piece, found):
+            last = max((piece for piece in said if piece["place"] < hint["before"]), key=lambda piece: piece["place"], default=None)
+            if last and not last["hint"]:
+                last["hint"] = hint["hint"]
+        for piece in said:
+            yield piece["message"], piece["hint"] or constant_hint(code, piece["place"], text), piece["variant"]
 
 
 def plain(literal):
@@ -170,14 +283,17 @@ def write_index(page):
     found = {}
     for path, text in sources():
         for message, hint, _ in messages(path, text):
-            found[cell(message)] = cell(hint) or found.get(cell(message), "")
+            found[cell(message)] = cell(hint) or found.get(cell(message), "") or cell(cure_of(message))
     if len(found) < 500:
         sys.exit(f"{len(found)} messages found: are they still written as before?")
+    without = [message for message, hint in found.items() if not hint]
+    if without:
+        sys.exit("\n".join(["messages without a hint, and none in CURES:", *without]))
     rows = [f"| {message} | {hint} |" for message, hint in sorted(found.items(), key=lambda row: row[0].lower().lstrip("`…- "))]
     head = [
         "# Index of messages\n",
-        "Each error and warning, in the order of its words; … is a value, a name or a file. Where the hint is empty, it depends on what was found, or the message itself says what is expected. What a message about a log means: [messages](messages.md).\n",
-        "| message | hint |",
+        "Each error and warning, in the order of its words; … is a value, a name or a file. What a message about a log means: [messages](messages.md).\n",
+        "| message | what to do |",
         "|---|---|",
     ]
     Path(page).write_text("\n".join(head + rows) + "\n", encoding="utf-8")

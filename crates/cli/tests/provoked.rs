@@ -40,6 +40,24 @@ fn files_that_are_no_logs_are_named() {
 }
 
 #[test]
+fn a_clutch_that_fills_too_slowly_and_is_too_weak_is_named_by_its_shift() {
+    let folder = Folder::new("endless-shift");
+    let slow = folder.write(
+        "slow.toml",
+        format!(
+            "name = \"slow\"\ngearbox = \"{ROOT}gearboxes/8hp.toml\"\n[fill]\nflow_max_m3_s = 1e-6\n[hydraulics]\nline_pressure_pa = 0.4e6\n"
+        ),
+    );
+    let run = wetclutch(&["demo", "--vehicle", &slow, "-o", &folder.path("out")]);
+    let text = stderr(&run);
+    assert!(
+        !run.status.success()
+            && text.contains("error: the shift 1-2 does not end within 6 s\nhint: its oncoming clutch"),
+        "{text}"
+    );
+}
+
+#[test]
 fn channels_and_maps_that_do_not_fit_the_command_are_named() {
     let folder = Folder::new("no-map");
     let log = folder.write("log.csv", "time_s,turbine_speed_rad_s,output_speed_rad_s\n0,1,2\n0.01,2,3\n0.02,2,3\n");

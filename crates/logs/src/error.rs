@@ -1,5 +1,6 @@
 //! Errors in logs and channel maps.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use trace::ShownPath as _;
@@ -57,6 +58,12 @@ impl LogError {
 
     pub(crate) fn damaged(path: &Path, position: impl Into<String>, message: impl Into<String>) -> Self {
         Self::Damaged { path: path.to_owned(), position: position.into(), message: message.into() }
+    }
+
+    /// What a binary file holds at this place contradicts itself, or ends too early.
+    pub(crate) fn cut_or_damaged(path: &Path, position: impl Into<String>, message: impl Display) -> Self {
+        let hint = "the file is cut or damaged: copy it again from the recorder";
+        Self::damaged(path, position, format!("{message}\nhint: {hint}"))
     }
 
     /// Something in a channel map is wrong, or does not fit the log.

@@ -164,7 +164,7 @@ fn check_places(path: &Path, length: u64, reader: &SerializedFileReader<File>) -
             let inside =
                 start >= 0 && column.compressed_size() >= 0 && end.is_some_and(|end| end.unsigned_abs() <= length);
             if !inside || metadata.num_rows() < 0 || column.num_values() < 0 {
-                return Err(LogError::damaged(
+                return Err(LogError::cut_or_damaged(
                     path,
                     format!("row group {}", group + 1),
                     format!("column `{}` lies outside the file", error::shown(&column.column_path().string())),
@@ -176,7 +176,7 @@ fn check_places(path: &Path, length: u64, reader: &SerializedFileReader<File>) -
 }
 
 fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
-    LogError::damaged(path, position, error.to_string())
+    LogError::cut_or_damaged(path, position, error)
 }
 
 /// A file that begins as Parquet and does not end so.
@@ -349,7 +349,7 @@ impl Stream for Groups<'_> {
         let read = catch_unwind(AssertUnwindSafe(|| self.read(block)));
         let read = read.unwrap_or_else(|_| {
             let place = format!("row group {}", self.group + 1);
-            Err(LogError::damaged(&self.log.path, place, "the pages of a column contradict themselves"))
+            Err(LogError::cut_or_damaged(&self.log.path, place, "the pages of a column contradict themselves"))
         });
         // What is not whole is not given.
         read.inspect_err(|_| block.truncate(before))

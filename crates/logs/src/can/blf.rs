@@ -3,6 +3,7 @@
 //! The crate `ablf` 0.2 was tried: it prints, panics on damaged data, and does not know the object of plain CAN messages (type 1)
 //! nor those of CAN FD. The layout here follows python-can's reader and the public header of the format.
 
+use std::fmt::Display;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -102,11 +103,7 @@ impl Blf {
             || !(48..=4096).contains(&length)
             || blf.bytes(length as usize - 8)?.len() + 8 < length as usize
         {
-            return Err(LogError::damaged(
-                path,
-                "byte 4",
-                "the head of the file is cut or has a wrong length\nhint: copy the file again from the recorder",
-            ));
+            return Err(LogError::cut_or_damaged(path, "byte 4", "the head of the file is cut or has a wrong length"));
         }
         Ok(blf)
     }
@@ -119,9 +116,8 @@ impl Blf {
         Ok(bytes)
     }
 
-    fn damaged(&self, offset: u64, message: impl Into<String>) -> LogError {
-        let hint = "the file is cut or damaged: copy it again from the recorder";
-        LogError::damaged(&self.path, format!("byte {offset}"), format!("{}\nhint: {hint}", message.into()))
+    fn damaged(&self, offset: u64, message: impl Display) -> LogError {
+        LogError::cut_or_damaged(&self.path, format!("byte {offset}"), message)
     }
 
     /// Reads the next object of the file into the memory; false at the end.

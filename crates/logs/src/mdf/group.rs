@@ -189,13 +189,13 @@ impl Stream for Group<'_> {
             Err(message) => {
                 block.truncate(first);
                 let place = format!("{}, record {}", self.place, self.read + 1);
-                Err(LogError::damaged(self.path, place, message))
+                Err(LogError::cut_or_damaged(self.path, place, message))
             }
             Ok(false) if self.read < self.declared => {
                 let message = format!("the data end after {} of {} records", self.read, self.declared);
                 // Said once: the next call ends the stream.
                 self.declared = self.read;
-                Err(LogError::damaged(self.path, &self.place, message))
+                Err(LogError::cut_or_damaged(self.path, &self.place, message))
             }
             Ok(false) => Ok(false),
             Ok(true) => {

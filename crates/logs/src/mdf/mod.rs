@@ -309,11 +309,14 @@ fn groups(file: &Mf4File) -> impl Iterator<Item = (GroupAt, &ChannelGroup)> {
 }
 
 fn damaged(path: &Path, place: &str, error: &Mf4Error) -> LogError {
-    let hint = match error {
-        Mf4Error::UnsupportedVersion { .. } => "\nhint: versions 4.00 to 4.20 are read; save it as one of them",
-        _ => "",
-    };
-    LogError::damaged(path, place, format!("{error}{hint}"))
+    match error {
+        Mf4Error::UnsupportedVersion { .. } => LogError::damaged(
+            path,
+            place,
+            format!("{error}\nhint: versions 4.00 to 4.20 are read; save it as one of them"),
+        ),
+        _ => LogError::cut_or_damaged(path, place, error),
+    }
 }
 
 /// What was seen when the file was opened.

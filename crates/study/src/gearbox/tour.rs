@@ -125,7 +125,10 @@ impl TourDriver<'_> {
         while self.run.controller().shift().is_some() {
             if self.run.time_s() > until_s {
                 let (from, to) = (name(leg.from), name(leg.to));
-                let message = format!("the shift {from}-{to} does not end within {LONGEST_SHIFT_S} s");
+                let message = format!(
+                    "the shift {from}-{to} does not end within {LONGEST_SHIFT_S} s\nhint: its oncoming clutch fills too slowly or is too weak: check `fill`, `valve` and \
+                     `hydraulics.line_pressure_pa` of the vehicle file"
+                );
                 return Err(CarError::Request(message).into());
             }
             self.advance(leg.throttle, 0.0, record)?;
