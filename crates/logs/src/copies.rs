@@ -49,8 +49,8 @@ const WITH_TURBINE: f64 = 0.003;
 const USUAL: f64 = 5.0;
 /// A speed of the shaft behind that is older than this says nothing, s.
 const FRESH_S: f64 = 0.25;
-/// In slower samples a shift passes between two of them, s: an inertia phase takes longer.
-const SLOWEST_S: f64 = 0.05;
+/// In slower samples a shift passes between two of them, s: an inertia phase takes longer. Rows at 20 Hz, whose times are rounded, are not slower.
+const SLOWEST_S: f64 = 0.06;
 /// Below this a shaft stands, rad/s.
 const STANDS_RAD_S: f64 = 1.0;
 /// Relative difference of one number in two units.

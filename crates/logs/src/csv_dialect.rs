@@ -137,7 +137,8 @@ impl<'a> Table<'a> {
             _ => None,
         };
         let nearest = near.first().filter(has_names);
-        match near.iter().find(has_time).or(below_names).or(nearest) {
+        // A description of the time may begin with its name, too, and stands below the names.
+        match near.iter().rev().find(has_time).or(below_names).or(nearest) {
             Some(&preamble) => {
                 let between: Vec<usize> = (preamble + 1..first).filter(is_filled).collect();
                 let units = units.and_then(|units| between.iter().position(|at| at == units));

@@ -389,11 +389,11 @@ pub(crate) fn text(bytes: &[u8]) -> String {
     std::str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&byte| char::from(byte)).collect(), str::to_owned)
 }
 
-/// Whether a text is a number with thousands apart: `1,007.25`, `1.007,25`, `1 007,25`, `1'007.25`. Such a number is not read: `1,007` may
+/// Whether a text is a number with thousands apart: `1,007.25`, `1.007,25`, `1 007,25`, `1'007.25`, `1’007.25`. Such a number is not read: `1,007` may
 /// as well be a little more than one.
-pub(crate) fn has_groups(text: &str) -> bool {
+pub fn has_groups(text: &str) -> bool {
     let text = text.trim().trim_start_matches(['+', '-']);
-    let groups: Vec<&str> = text.split(['.', ',', '\'', ' ', '\u{a0}', '\u{202f}']).collect();
+    let groups: Vec<&str> = text.split(['.', ',', '\'', '\u{2019}', ' ', '\u{a0}', '\u{2009}', '\u{202f}']).collect();
     let are_digits = groups.iter().all(|group| !group.is_empty() && group.bytes().all(|byte| byte.is_ascii_digit()));
     // Behind the last sign may be decimals. A date has groups of two digits.
     let between = groups.get(1..groups.len().saturating_sub(1).max(2)).unwrap_or_default();

@@ -37,9 +37,10 @@ const TOGETHER_S: f64 = 5.0;
 /// brings to the speed of the output does so by some 1000 rad/s^2.
 const TO_ANOTHER: (f64, f64) = (1000.0, 5.0);
 /// A shift brings the turbine to the speed of the output, where the new gear is the direct one: at the lowest rate of an inertia phase, rad/s^2,
-/// and the engine goes along by this fraction at least \[chosen\].
+/// and the engine goes along by this fraction at least, for so long, s, after which the inertia phase is over \[chosen\].
 const SHIFTS_RAD_S2: f64 = 300.0;
-const GOES_ALONG: f64 = 0.25;
+const GOES_ALONG: f64 = 0.5;
+const GONE_S: f64 = 0.15;
 /// By this fraction the ratio of two readings may differ from that of the gear: noise, and shafts that twist.
 const BESIDE_GEAR: f64 = 0.02;
 /// Factors beyond which output over wheel speed has parted from what it was: readings that are 50 ms apart differ by less.
@@ -128,6 +129,8 @@ struct Fault {
     engine_rad_s: Option<f64>,
     /// The last speed that was believed over the first reading that was not.
     ratio: f64,
+    /// Since when a shift may have brought the turbine to the speed of the output, s; not a number before.
+    shifted_since_s: f64,
 }
 
 /// Output over wheel speed, and when it was read, s.
@@ -190,7 +193,15 @@ impl SpeedFaults {
             let another = self.another(at, rad_s, time_s);
             let engine_rad_s = self.turning(ENGINE, time_s);
             let ratio = self.believed[at].map_or(f64::NAN, |before| before.rad_s / rad_s);
-            self.faults[at].get_or_insert(Fault { since_s: time_s, another, engine_rad_s, ratio });
+            let begun = Fault { since_s: time_s, another, engine_rad_s, ratio, shifted_since_s: f64::NAN };
+            let fault = *self.faults[at].get_or_insert(begun);
+            let shifts = self.believed[at].is_some_and(|before| self.may_shift(before, rad_s, (fault, time_s)));
+            let shifted_since_s = match fault.shifted_since_s {
+                since_s if shifts && !since_s.is_nan() => since_s,
+                _ if shifts => time_s,
+                _ => f64::NAN,
+            };
+            self.faults[at] = Some(Fault { shifted_since_s, ..fault });
         } else {
             self.believe(at, rad_s, time_s);
         }
@@ -252,8 +263,7 @@ impl SpeedFaults {
         let fell = rad_s.abs() <= FELL * before.rad_s.abs();
         let is_short = time_s - fault.since_s <= LONGEST_S;
         let shows_another = fault.another.is_some_and(|another| self.is_near(STILL_ANOTHER, another, rad_s, time_s))
-            && !((at, fault.another) == (TURBINE, Some(OUTPUT))
-                && self.may_have_shifted(before, rad_s, (fault, time_s)));
+            && !((at, fault.another) == (TURBINE, Some(OUTPUT)) && time_s - fault.shifted_since_s >= GONE_S);
         let is_wrong = || jumps(at, before, rad_s, time_s) || fell || shows_another || self.parts(at, rad_s, time_s);
         let is_dead = || rad_s.abs() <= ZERO_RAD_S && fell && self.is_contradicted(at, before, time_s);
         (is_short && is_wrong()) || is_dead()
@@ -261,7 +271,7 @@ impl SpeedFaults {
 
     /// Whether a shift may have brought the turbine to this speed since it was believed last: it was on the way to the direct gear, there was time
     /// for it, and the engine went along.
-    fn may_have_shifted(&self, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
+    fn may_shift(&self, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
         let change = rad_s - before.rad_s;
         let engine = fault.engine_rad_s.zip(self.turning(ENGINE, time_s)).map(|(then, now)| now - then);
         let goes_along = engine.is_some_and(|engine| engine * change.signum() > GOES_ALONG * change.abs());
@@ -512,7 +522,7 @@ mod tests {
         // The shift ends while the turbine is wrong: what it reads at the end and afterwards is right.
         let [engine, turbine, output, wheel] = shift(1.9, 2.3);
         assert!(engine.is_empty() && output.is_empty() && wheel.is_empty());
-        assert!(turbine.len() >= 30 && turbine.iter().all(|time_s| *time_s < 2.51), "{turbine:?}");
+        assert!(turbine.len() >= 30 && turbine.iter().all(|time_s| *time_s < 2.51 + GONE_S), "{turbine:?}");
         // No shift: the engine does not go along.
         let [_, turbine, ..] = shift(5.0, 5.5);
         assert!((48..=50).contains(&turbine.len()), "{turbine:?}");

@@ -138,9 +138,19 @@ pub(crate) fn may_be_time(names: &[(String, String)], time: usize, other: usize)
         Some(_) => base_name(name) == base,
         None => *name == names[time].0,
     };
+    let has_name =
+        has_name || time_of_signal(&names[time]).is_some_and(|word| time_of_signal(&names[other]) == Some(word));
     let name = name.to_lowercase();
     let is_named = ["time", "zeit", "stamp"].iter().any(|word| name.contains(word));
     (has_name || is_named).then_some(has_name)
+}
+
+/// The word for time before the name of a signal, as in `t_Eng [ms]`: the time of that signal alone.
+fn time_of_signal((name, unit): &(String, String)) -> Option<String> {
+    let is_in_time = Unit::parse(unit).is_some_and(|unit| unit.quantity == Quantity::Time);
+    let (word, signal) = name.split_once(['_', ' ', '.', '-']).filter(|_| is_in_time)?;
+    let word = word.to_lowercase();
+    (!signal.is_empty() && ["t", "ts", "time", "zeit"].contains(&word.as_str())).then_some(word)
 }
 
 /// The column of the time: the one that is wanted, or has a usual name, or is the first one and in a unit of time.

@@ -83,6 +83,7 @@ fn a_third_row_of_titles_is_read_over() {
         "Time;N_Eng;P_Clutch\ns;rpm;bar\ndouble;float;float\n0.00;1500;4.5\n0.01;1501;4.6\n",
         "Group;Engine;Gearbox\nTime;N_Eng;P_Clutch\ns;rpm;bar\n0.00;1500;4.5\n0.01;1501;4.6\n",
         "Time;N_Eng;P_Clutch\nclock;crank shaft;clutch A\ns;rpm;bar\n0.00;1500;4.5\n0.01;1501;4.6\n",
+        "Time;N_Eng;P_Clutch\ns;rpm;bar\nTime since start;crank shaft;clutch A\n0.00;1500;4.5\n0.01;1501;4.6\n",
     ];
     for text in texts {
         let (values, unit, _) = engine(text, "N_Eng");

@@ -103,6 +103,27 @@ fn tables_of_frames_of_python_can_are_read() {
     }
 }
 
+#[test]
+fn a_classic_frame_with_a_length_code_above_eight_has_eight_bytes_in_every_format() {
+    let cells = DATA.replace(' ', ",");
+    for code in [9, 11, 15] {
+        let logs = [
+            format!(
+                ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n      1   1000.000 DT 1 0100 Rx - {code} {DATA}\n"
+            ),
+            format!(";$FILEVERSION=1.1\n     1)   1000.0  Rx   0100  {code}  {DATA}\n"),
+            format!(
+                "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n1000000,00000100,false,Rx,0,{code},{cells},\n"
+            ),
+            format!("timestamp,arbitration_id,extended,remote,error,dlc,data\n1.0,0x100,0,0,0,{code},QAwAAAAAAAA=\n"),
+        ];
+        for log in logs {
+            let (_, values, notes) = engine(&log);
+            assert_eq!((values, notes), (vec![(1.0, 0.25 * f64::from(0x0c40))], vec![]), "{log}");
+        }
+    }
+}
+
 /// A DBC of J1939: engine speed of EEC1, both shaft speeds of ETC1.
 const J1939: &str = "VERSION \"\"\n\nBU_: A\n\nBO_ 2364540158 EEC1: 8 A\n SG_ EngSpeed : 24|16@1+ (0.125,0) [0|8031.875] \"rpm\" A\n\n\
     BO_ 2364539646 ETC1: 8 A\n SG_ TransOutputShaftSpeed : 8|16@1+ (0.125,0) [0|8031.875] \"rpm\" A\n SG_ TransInputShaftSpeed : 40|16@1+ (0.125,0) [0|8031.875] \"rpm\" A\n";

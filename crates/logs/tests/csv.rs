@@ -102,7 +102,7 @@ fn only_thousands_in_groups_are_hinted_at() {
 #[test]
 fn thousands_in_groups_are_refused_with_a_hint_whatever_stands_between_them() {
     let folder = Folder::new("thousands-in-all-rows");
-    for group in [".", "\u{a0}", "\u{202f}", " ", "'"] {
+    for group in [".", "\u{a0}", "\u{2009}", "\u{202f}", " ", "'", "\u{2019}"] {
         let row = |i: u32| format!("0,0{i};1{group}50{i},5;1{group}40{i},25\r\n");
         let text = format!("Zeit [s];N_Mot [1/min];N_Turb [1/min]\r\n{}", (0..4).map(row).collect::<String>());
         let (found, notes) = values(&folder, &text, "N_Mot").unwrap_or_else(|error| panic!("{group:?} {error}"));
@@ -149,6 +149,7 @@ fn a_table_with_a_time_for_each_signal_is_refused() {
         ("Zeit [s]", "Zeit_2 [s]"),
         ("timestamp", "timestamp (2)"),
         ("t [s]", "t [s]"),
+        ("t_Eng [s]", "t_Turb [s]"),
     ] {
         let text = format!(
             "{one};N [rpm];{other};M [rpm]\n0.00;1500;0.000;1400\n0.01;1501;0.005;1401\n0.02;1502;0.010;1402\n"

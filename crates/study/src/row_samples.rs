@@ -25,6 +25,8 @@ struct Counts {
     good: Cell<u64>,
     /// Text and infinite numbers.
     missing: Cell<u64>,
+    /// Those of them with a sign between their thousands.
+    grouped: Cell<u64>,
 }
 
 impl RowSamples {
@@ -45,6 +47,7 @@ impl RowSamples {
             Some(number) if number.is_nan() => f64::NAN,
             _ => {
                 counts.missing.update(|count| count + 1);
+                counts.grouped.update(|count| count + u64::from(logs::csv_log::has_groups(&rows.text(column))));
                 f64::NAN
             }
         }
@@ -64,7 +67,10 @@ impl RowSamples {
             let note =
                 format!("{missing} of {} samples of {name} are text or infinite, and are not used", good + missing);
             if missing > good {
-                let hint = "check this column with `wetclutch inspect`; leave a lost sample empty";
+                let hint = match 2 * counts.grouped.get() > missing {
+                    true => "write numbers without a sign between their thousands",
+                    false => "check this column with `wetclutch inspect`; leave a lost sample empty",
+                };
                 return Err(rows.refused(format!("{note}\nhint: {hint}")));
             }
             notes.push(note);

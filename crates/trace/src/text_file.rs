@@ -80,7 +80,7 @@ fn check_size(bytes: u64, largest_bytes: u64) -> io::Result<()> {
         return Ok(());
     }
     let message = format!(
-        "the file is larger than {} MiB, the maximum for a file of this kind\nhint: check the order of the files",
+        "the file is larger than {} MiB, the maximum for a file of this kind\nhint: check which file this is, and the order of the files",
         largest_bytes >> 20
     );
     Err(io::Error::new(ErrorKind::FileTooLarge, message))

@@ -17,6 +17,11 @@ pub(super) fn classic_length(code: &str) -> Option<usize> {
     usize::from_str_radix(code, 16).ok().filter(|code| *code <= 0xf).map(|code| code.min(8))
 }
 
+/// Bytes of a frame by its length code or length, of which so many are there: a classic frame with a code from 9 to 15 has eight bytes.
+pub(super) fn length_with(length: usize, bytes: usize) -> usize {
+    if bytes == 8 && (9..=15).contains(&length) { 8 } else { length }
+}
+
 /// An identifier in base 16, of at most 29 bits.
 pub(super) fn id_of(digits: &str) -> Option<u32> {
     let digits = digits.strip_prefix("0x").unwrap_or(digits);

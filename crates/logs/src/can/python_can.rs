@@ -2,7 +2,7 @@
 //! the data in base 64.
 
 use super::frame::{Frame, PAYLOAD};
-use super::line::{Line, id_of};
+use super::line::{Line, id_of, length_with};
 
 /// What a row is.
 pub(super) fn line(text: &str) -> Line {
@@ -24,7 +24,8 @@ fn row(text: &str) -> Option<Line> {
         return Some(Line::Remark);
     }
     let data = of_base64(data)?;
-    (data.len() == length.parse::<usize>().ok()?).then(|| Line::Frame(Frame::new(time_s, id, extended, &data)))
+    (data.len() == length_with(length.parse().ok()?, data.len()))
+        .then(|| Line::Frame(Frame::new(time_s, id, extended, &data)))
 }
 
 fn flag(cell: &str) -> Option<bool> {

@@ -1,7 +1,7 @@
 //! Rows of tables of frames as SavvyCAN writes them (GVRET): `Time Stamp,ID,Extended,Dir,Bus,LEN,D1,...,D8`, with times in microseconds.
 
 use super::frame::{Frame, PAYLOAD};
-use super::line::{Line, id_of, payload};
+use super::line::{Line, id_of, length_with, payload};
 
 /// Where the columns stand; none before the row of names.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -59,6 +59,8 @@ impl Columns {
             _ => return None,
         };
         let length: usize = cells.get(self.length)?.parse().ok().filter(|length| *length <= PAYLOAD)?;
+        let bytes = cells.get(self.data..)?.iter().take_while(|cell| !cell.is_empty()).count();
+        let length = length_with(length, bytes);
         let (bytes, length) = payload(cells.get(self.data..self.data + length)?)?;
         let frame = Frame::new(time_s, id_of(cells.get(self.id)?)?, extended, bytes.get(..length)?);
         let bus = self.bus.and_then(|bus| cells.get(bus)?.parse().ok());

@@ -3,7 +3,7 @@
 //! A version below 2 has fixed columns; from version 2 on `;$COLUMNS=N,O,T,I,d,l,D` names them. Times are in ms from the start of the trace.
 
 use super::frame::{Frame, PAYLOAD};
-use super::line::{Line, classic_length, id_of, payload};
+use super::line::{Line, id_of, length_with, payload};
 
 /// A column of a line, by its letter in `;$COLUMNS`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,9 +91,12 @@ impl Trc {
             return Line::Remark;
         }
         let length = || match (word(Column::Length), word(Column::LengthCode)) {
-            (Some(length), _) => length.parse().ok().filter(|length| *length <= PAYLOAD),
+            (Some(length), _) => {
+                length.parse().ok().filter(|length| *length <= PAYLOAD).map(|length| length_with(length, data.len()))
+            }
             (None, Some(code)) if is_fd => FD_LENGTHS.get(code.parse::<usize>().ok()?).copied(),
-            (None, code) => classic_length(code?),
+            // In base 10, as all numbers of a trace but identifiers and data.
+            (None, code) => Some(length_with(code?.parse().ok()?, data.len())),
         };
         let read = || {
             let time_s = 1e-3 * word(Column::Time)?.parse::<f64>().ok().filter(|time_ms| time_ms.is_finite())?;
