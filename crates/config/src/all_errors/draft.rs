@@ -15,6 +15,8 @@ pub(super) enum Guess {
     Near,
     /// Two, or the middle of the range.
     Middle,
+    /// What a file has that leaves the key out; the same as the nearest where it must have it.
+    Default,
 }
 
 /// A text that is mended.
@@ -24,17 +26,19 @@ pub(super) struct Draft {
     added: Vec<usize>,
     /// Places with values that are not those of the file: lines, with the key of a number.
     guessed: HashSet<(usize, String)>,
+    /// Keys that were taken out, as a reader names them.
+    taken: HashSet<String>,
     guess: Guess,
 }
 
 impl Draft {
     pub(super) fn of(text: &str, guess: Guess) -> Self {
-        Self { text: text.to_owned(), added: Vec::new(), guessed: HashSet::new(), guess }
+        Self { text: text.to_owned(), added: Vec::new(), guessed: HashSet::new(), taken: HashSet::new(), guess }
     }
 
     /// Whether all values are those of the file.
     pub(super) fn is_unchanged(&self) -> bool {
-        self.added.is_empty() && self.guessed.is_empty()
+        self.added.is_empty() && self.guessed.is_empty() && self.taken.is_empty()
     }
 
     /// Whether a line is not in the file.
@@ -51,11 +55,13 @@ impl Draft {
     pub(super) fn is_guessed(&self, line: usize, wrong: &Wrong) -> bool {
         let key = match wrong {
             Wrong::Range { key, .. } => key.as_str(),
-            // A key that is missing in a table that was put in.
-            Wrong::Missing { .. } | Wrong::Unknown { .. } => return self.added.contains(&line),
+            // A key that is missing in a table that was put in, or that was taken out.
+            Wrong::Missing { key, .. } => return self.added.contains(&line) || self.taken.contains(key),
+            Wrong::Unknown { .. } => return self.added.contains(&line),
             _ => "",
         };
-        self.added.contains(&line) || self.guessed.contains(&(line, key.to_owned()))
+        // A value of another type was replaced, whatever its key is called.
+        self.added.contains(&line) || [key, ""].iter().any(|key| self.guessed.contains(&(line, (*key).to_owned())))
     }
 
     /// Mends what is wrong at a line, so that a reader goes on; whether it did.
@@ -64,10 +70,13 @@ impl Draft {
             Wrong::Unknown { key, .. } => self.take_out(line, key),
             Wrong::Missing { table, key } => self.put_in(line, table.as_deref(), key),
             Wrong::Type(expected) => self.replace(line, expected),
-            Wrong::Range { key, within } => {
-                let [near, middle] = *within;
-                self.put_within(line, key, if self.guess == Guess::Near { near } else { middle })
+            Wrong::Range { key, .. } if self.guess == Guess::Default && !self.is_guessed(line, wrong) => {
+                self.leave_out(line, key)
             }
+            Wrong::Range { key, within: [near, middle] } => {
+                self.put_within(line, key, if self.guess == Guess::Middle { *middle } else { *near })
+            }
+            Wrong::Value { key } => self.leave_out(line, key),
             Wrong::Kind | Wrong::Other => false,
         }
     }
@@ -146,6 +155,14 @@ impl Draft {
 
     fn begins_line(&self, at: usize) -> bool {
         self.text.get(self.begin(self.line(at))..at).is_some_and(|before| before.trim().is_empty())
+    }
+
+    /// Takes out a key whose value is wrong, or the list with such a value.
+    fn leave_out(&mut self, line: usize, key: &str) -> bool {
+        let name = key.rsplit('.').next().unwrap_or(key);
+        let name = name.split('[').next().unwrap_or(name);
+        self.taken.insert(name.to_owned());
+        self.take_out(line, name)
     }
 
     /// Takes a key out, with its value.
@@ -285,7 +302,7 @@ impl Draft {
 fn first_guess(key: &str, guess: Guess) -> &'static str {
     match (key, guess) {
         ("name" | "title", _) => "\"x\"",
-        (_, Guess::Near) => "1.0",
+        (_, Guess::Near | Guess::Default) => "1.0",
         (_, Guess::Middle) => "2.0",
     }
 }

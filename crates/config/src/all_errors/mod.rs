@@ -29,8 +29,9 @@ type Reader<'r> = dyn Fn(Source) -> Result<(), ConfigError> + 'r;
 /// The errors of a file by its reader, and those of a file that it names and that the reader can read: unknown keys first, then in the order of
 /// their lines; empty for a file without any.
 ///
-/// A range may follow from another value. So the file is read with two guesses of what is wrong, and a value that is outside its range with one
-/// of them alone is none of the errors.
+/// A range may follow from another value. So the file is read with several guesses of what is wrong, and a value that is outside its range with one
+/// of them alone is none of the errors. Where a guess is wrong beside other values, the reader does not come to the end, and errors behind are not
+/// found with it.
 pub fn all_errors(source: &Source, read: &Reader<'_>) -> Vec<ConfigError> {
     errors_of(source, read, &mut Vec::new())
 }
@@ -38,20 +39,32 @@ pub fn all_errors(source: &Source, read: &Reader<'_>) -> Vec<ConfigError> {
 /// The same, of none of the files that were read `before`.
 fn errors_of(source: &Source, read: &Reader<'_>, before: &mut Vec<PathBuf>) -> Vec<ConfigError> {
     before.push(source.path.clone());
-    let (mut errors, _) = errors_with(Guess::Near, source, read);
+    let (mut errors, is_near_whole) = errors_with(Guess::Near, source, read);
+    let first = errors.first().map(ToString::to_string);
     if errors.len() > 1 {
         let (others, is_whole) = errors_with(Guess::Middle, source, read);
-        let is_in_both = |error: &ConfigError| {
-            let ConfigError::Range { line, key, .. } = error else { return true };
-            let is_same_place = |other: &&ConfigError| matches!(other, ConfigError::Range { line: at, key: of, .. } if (at, of) == (line, key));
-            let other = others.iter().find(is_same_place);
-            other.map_or(!is_whole, |other| other.to_string() == error.to_string())
-        };
-        errors.retain(is_in_both);
+        errors.retain(|error| is_in_both(error, &others, is_whole));
+    }
+    if !errors.is_empty() && !is_near_whole {
+        let (others, is_whole) = errors_with(Guess::Default, source, read);
+        if is_whole {
+            // The reader has come to the end with what a file has that leaves the keys out.
+            errors.retain(|error| is_in_both(error, &others, is_whole) || Some(error.to_string()) == first);
+            errors.extend(others);
+        }
     }
     errors.sort_by_key(|error| (!Wrong::of(error).is_unknown_key(), error.line().is_none(), error.line()));
     errors.dedup_by(|one, other| one.to_string() == other.to_string());
     errors.into_iter().flat_map(|error| with_others_of_its_file(error, source, read, before)).collect()
+}
+
+/// Whether an error with one guess is one with another, with which the reader came to the end or not.
+fn is_in_both(error: &ConfigError, others: &[ConfigError], is_whole: bool) -> bool {
+    let ConfigError::Range { line, key, .. } = error else { return true };
+    let is_same_place =
+        |other: &&ConfigError| matches!(other, ConfigError::Range { line: at, key: of, .. } if (at, of) == (line, key));
+    let other = others.iter().find(is_same_place);
+    other.map_or(!is_whole, |other| other.to_string() == error.to_string())
 }
 
 /// The errors of the file that an error is of, where another file names it.

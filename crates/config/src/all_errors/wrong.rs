@@ -13,6 +13,8 @@ pub(super) enum Wrong {
     Type(String),
     /// A number outside its range: its key, and the nearest number and the middle one within.
     Range { key: String, within: [f64; 2] },
+    /// A value that is wrong by itself, as an interval that does not contain what it must: its key.
+    Value { key: String },
     /// The whole file, which is of another kind.
     Kind,
     /// Anything else.
@@ -49,6 +51,7 @@ impl Wrong {
                 Some((table, key)) => Self::Missing { table: Some(table.to_owned()), key: key.to_owned() },
                 None => Self::Missing { table: None, key: key.clone() },
             },
+            ConfigError::Meaning { key, message, .. } if is_of_value_alone(message) => Self::Value { key: key.clone() },
             ConfigError::Syntax { message, .. } => match message {
                 // A channel map has roles as keys.
                 message
@@ -82,4 +85,10 @@ impl Wrong {
             _ => Self::Other,
         }
     }
+}
+
+/// Whether an error follows from the value alone, whatever others are.
+fn is_of_value_alone(message: &str) -> bool {
+    let parts = [" does not contain ", "has no such command", " must be two numbers"];
+    message.starts_with("expected [") || parts.iter().any(|part| message.contains(part))
 }

@@ -5,12 +5,13 @@ use std::ops::RangeInclusive;
 use car::error_budget::{
     BACKLASH_RAD, CHANNEL_SKEW_S, COMMAND_AGE_S, ENGINE, HYSTERESIS_PA, STIFFNESS_FACTOR, WHEEL_DELAY_S, WHEEL_SCALE,
 };
-use car::{ErrorBounds, ShiftClutch};
+use car::{ErrorBounds, ShiftClutch, Vehicle};
+use drivetrain::ClutchValve;
 use toml::Spanned;
 
 use super::car_bounds::contain_delay;
 use super::raw::RawErrorBounds;
-use super::{HYSTERESES_PA, fill_bounds, valves};
+use super::{HYSTERESES_PA, fill_bounds, plausible, valves};
 use crate::ConfigError;
 use crate::check::{Check, Number, Numbers};
 
@@ -92,16 +93,40 @@ pub(super) fn error_bounds(
     })
 }
 
-/// Refuses bounds that do not contain the delay of the oncoming clutch's valve. The other bounds are checked where they are read; this one is
-/// not, so that a study may change the delay of the true car beyond it.
-pub(super) fn contain_vehicle(
-    check: &Check<'_>,
-    raw: &RawErrorBounds,
-    bounds: &ErrorBounds,
-    oncoming: &ShiftClutch,
-) -> Result<(), ConfigError> {
+/// Refuses bounds that do not contain the delay and the pressures of the oncoming clutch's valve. The other bounds are checked where they are read;
+/// these are not, so that a study may change the true car beyond them.
+pub(super) fn contain_vehicle(check: &Check<'_>, raw: &RawErrorBounds, vehicle: &Vehicle) -> Result<(), ConfigError> {
+    let Vehicle { error_bounds: bounds, oncoming, settings, .. } = vehicle;
     let stated = (bounds.valve_delay_s, &raw.valve_delay_s);
-    contain_delay(check, "design.error_bounds.valve_delay_s", stated, &oncoming.valve)
+    contain_delay(check, "design.error_bounds.valve_delay_s", stated, &oncoming.valve)?;
+    let outside = |key: &str, at: usize, (message, hint): (String, String)| {
+        let message = format!("{message}: the car of this file would be outside its own error bounds");
+        Err(check.meaning(format_args!("design.error_bounds.{key}"), at, message, Some(hint)))
+    };
+    let full = plausible::full_command(&oncoming.valve).min(settings.command_max);
+    let highest_pa = oncoming.valve.settled_pressure(full);
+    let pressure_max_pa = bounds.pressure_max_pa;
+    if pressure_max_pa < highest_pa {
+        let message = format!(
+            "{pressure_max_pa} Pa is less than the {highest_pa:.0} Pa that the valve of this file gives at its largest command"
+        );
+        let hint = format!("{:.0} with the largest gain of the bounds", highest_pa * bounds.valve_gain_factor[1]);
+        return outside("pressure_max_pa", raw.pressure_max_pa.span().start, (message, hint));
+    }
+    match (&oncoming.valve, &raw.line_pressure_pa) {
+        (ClutchValve::PulseWidth { law, .. }, Some(given)) => {
+            let ([least_pa, greatest_pa], own_pa) = (bounds.line_pressure_pa, law.line_pressure_pa);
+            if (least_pa..=greatest_pa).contains(&own_pa) {
+                return Ok(());
+            }
+            let message = format!(
+                "{least_pa} to {greatest_pa} does not contain the line pressure of the valve in this file, {own_pa} Pa"
+            );
+            let hint = format!("[{}, {}] contains it", least_pa.min(own_pa), greatest_pa.max(own_pa));
+            outside("line_pressure_pa", given.span().start, (message, hint))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Minimum and maximum of a factor on a value of the file.

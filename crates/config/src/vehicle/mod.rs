@@ -183,7 +183,7 @@ fn of_tree(source: &Source, tree: &Tree) -> Result<Vehicle, ConfigError> {
 fn of_file(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Vehicle, ConfigError> {
     let vehicle = checked(check, raw)?;
     let stated = raw.design.error_bounds.get_ref();
-    budget::contain_vehicle(check, stated, &vehicle.error_bounds, &vehicle.oncoming)?;
+    budget::contain_vehicle(check, stated, &vehicle)?;
     Ok(vehicle)
 }
 

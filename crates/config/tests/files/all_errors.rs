@@ -54,6 +54,69 @@ fn a_key_that_is_missing_without_another_in_its_place_is_named_alone() {
     assert!(has(&found, &text, "drag_coefficient", "`vehicle.drag_coefficient` is 5000"), "{found:#?}");
 }
 
+/// The text of a car's file with other values.
+fn changed(text: &str, changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(text.to_owned(), |text, (of, to)| {
+        assert!(text.contains(of), "{of}");
+        text.replacen(of, to, 1)
+    })
+}
+
+#[test]
+fn values_that_are_far_off_in_many_tables_are_all_named() {
+    let car = format!("{}/../../vehicles/eight_speed.toml", env!("CARGO_MANIFEST_DIR"));
+    let whole = std::fs::read_to_string(&car).unwrap();
+    let read = |source: Source| CarFile::from_source(Source { path: car.clone().into(), ..source }).map(drop);
+    let of_car = |text: &str| {
+        let source = Source { path: car.clone().into(), text: text.to_owned() };
+        all_errors(&source, &|source| read(source)).iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let far = [
+        ("mass_kg = 1500", "mass_kg = -1"),
+        ("final_ratio = 3.0", "final_ratio = 900"),
+        ("slip_scale = 0.1", "slip_scale = 99"),
+        ("temperature_degc = 80", "temperature_degc = 999"),
+        ("static_factor = 1.08", "static_factor = 0.1"),
+    ];
+    let found = of_car(&changed(&whole, &far));
+    assert_eq!(found.len(), far.len(), "{found:#?}");
+    for (_, to) in far {
+        let (key, value) = to.split_once(" = ").unwrap();
+        assert!(found.iter().any(|error| error.contains(&format!("{key}` is {value}, expected"))), "{to}: {found:#?}");
+    }
+    // One of another type is named once.
+    let heavy = of_car(&changed(
+        &whole,
+        &[("mass_kg = 1500", "mass_kg = \"heavy\""), ("final_ratio = 3.0", "final_ratio = 900")],
+    ));
+    assert_eq!(heavy.len(), 2, "{heavy:#?}");
+    // Intervals that do not contain what they must, in several tables.
+    let bounds = "[error_bounds]\nconverter_share = 2\nmass_share = -1\n\
+        [clutch.A.error_bounds]\nvalve_gain_factor = [1.1, 1.2]\nfriction_factor = [0.5, 0.9]\nduty_percent = 3\n\
+        [clutch.E.error_bounds]\nvalve_delay_s = [0.02, 0.03]\nvalve_lag_factor = [1.2, 1.0]\n";
+    let found = of_car(&format!("{whole}{bounds}"));
+    let keys = [
+        "converter_share",
+        "mass_share",
+        "valve_gain_factor",
+        "friction_factor",
+        "duty_percent",
+        "valve_delay_s",
+        "valve_lag_factor",
+    ];
+    for key in keys {
+        assert!(found.iter().any(|error| error.contains(key)), "{key}: {found:#?}");
+    }
+    assert_eq!(found.len(), keys.len(), "{found:#?}");
+    let three = [
+        ("valve_gain_factor = [0.9, 1.1]", "valve_gain_factor = [1.05, 1.2]"),
+        ("friction_factor = [0.8, 1.2]", "friction_factor = [1.1, 1.3]"),
+        ("valve_lag_factor = [0.5, 1.5]", "valve_lag_factor = [0.1, 0.9]"),
+    ];
+    let found = errors(&changed(VEHICLE, &three), &vehicle);
+    assert_eq!(found.len(), 3, "{found:#?}");
+}
+
 /// A range that follows from a value that is not that of the file would be an error of none.
 #[test]
 fn what_follows_from_a_guess_is_no_error() {

@@ -115,6 +115,26 @@ fn a_valve_whose_told_numbers_are_wrong_is_named_with_its_line() {
 }
 
 #[test]
+fn pressures_that_the_valve_of_the_file_exceeds_are_refused() {
+    let line = line_of(VEHICLE, "pressure_max_pa = 1.25e6");
+    let low = vehicle_error("pressure_max_pa = 1.25e6", "pressure_max_pa = 0.5e6 ");
+    let expected =
+        format!("vehicle.toml:{line}: `design.error_bounds.pressure_max_pa`: 500000 Pa is less than the 1100000 Pa");
+    assert!(low.starts_with(&expected) && low.contains("\nhint: 1210000 with the largest gain"), "{low}");
+    let path = format!("{}/../../vehicles/two_speed_pwm.toml", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap().replacen(
+        "[design.error_bounds]\n",
+        "[design.error_bounds]\nline_pressure_pa = [1.1e6, 1.2e6]\n",
+        1,
+    );
+    let error = VehicleFile::from_source(Source::built_in("pwm.toml", &text)).map(drop).unwrap_err().to_string();
+    assert!(
+        error.contains("1100000 to 1200000 does not contain the line pressure of the valve in this file, 1000000 Pa"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_gain_map_whose_pressure_falls_with_the_current_is_refused() {
     let gains = "gain_pa_a = [0.70e6, 0.80e6, 0.88e6, 0.94e6, 1.00e6, 1.05e6, 1.10e6]";
     let falling = vehicle_error(gains, &gains.replace("1.00e6", "0.10e6"));
