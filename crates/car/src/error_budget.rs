@@ -183,6 +183,25 @@ impl ElementErrors {
         half_width(self.valve_lag_factor)
     }
 
+    /// How many times as wide as the default the widest of its bounds is; at least one.
+    pub fn width(&self) -> f64 {
+        let usual = Self::NO_ELEMENT;
+        // The largest factor by which a value may be off, in either direction.
+        let off = |[minimum, maximum]: [f64; 2]| maximum.max(minimum.recip()) - 1.0;
+        let of_factors = [
+            (self.friction_factor, usual.friction_factor),
+            (self.valve_gain_factor, usual.valve_gain_factor),
+            (self.valve_lag_factor, usual.valve_lag_factor),
+        ];
+        let factors = of_factors.map(|(own, usual)| off(own) / off(usual));
+        let others = [
+            self.valve_delay() / usual.valve_delay(),
+            self.valve_hysteresis_pa / usual.valve_hysteresis_pa,
+            self.command / (COMMAND * self.command_max / COMMAND_ROOM),
+        ];
+        factors.into_iter().chain(others).filter(|width| width.is_finite()).fold(1.0, f64::max)
+    }
+
     /// What an error of the reading of the command does to the pressure of the valve at this pressure, Pa.
     pub fn by_command_pa(&self, valve: &ClutchValve<f64>, pressure_pa: f64) -> f64 {
         let at = valve.command_for(pressure_pa);

@@ -42,11 +42,11 @@ const ENOUGH_SHIFTS: u32 = 2;
 /// Delay from which on it is reported, s \[chosen\]: above what errors of friction, valves and strokes within the default bounds look like, as far
 /// as the filter has not learnt lag and delay of the valves.
 const REPORTED_S: f64 = 0.065;
-/// Half of the range of the delay of a valve, s, and its relative error of the lag in the default bounds, and a lag, s: wider bounds report later by
-/// what they add.
+/// Half of the range of the delay of a valve, s, and its relative error of the lag in the default bounds, and the lag of a usual valve at low pressure, s:
+/// wider bounds report later by what they add.
 const DEFAULT_DELAY_S: f64 = 0.015;
 const DEFAULT_LAG: f64 = 0.5;
-const LAG_S: f64 = 0.04;
+const LAG_S: f64 = 0.2;
 /// Relative errors of friction and valve gain together in the default bounds, and the time in which a clutch takes its load, s \[chosen\]: a clutch that
 /// is stronger by a fraction takes it earlier by about that fraction of this time.
 const DEFAULT_STRENGTH: f64 = 0.25;
@@ -117,7 +117,8 @@ pub(crate) struct CommandDelay<'c> {
 
 impl<'c> CommandDelay<'c> {
     pub(crate) fn new(tables: &'c ShiftTables<f64>, budget: &ErrorBudget) -> Self {
-        let gain = budget.widest(ElementErrors::valve_gain);
+        let most_off = |[minimum, maximum]: [f64; 2]| (maximum - 1.0).max(1.0 - minimum);
+        let gain = budget.widest(|of| most_off(of.valve_gain_factor));
         let offsets = budget.elements.iter().enumerate().filter_map(|(at, errors)| {
             let (errors, element) = (errors.as_ref()?, tables.tables().elements.get(tables.place(at)?)?);
             let by_command_pa = errors.by_command_pa(&element.valve.valve, element.clutch.kiss_pressure());
@@ -129,8 +130,8 @@ impl<'c> CommandDelay<'c> {
             ((1.0 + of_gain * gain).max(GAIN_MIN), of_offset * offset_pa)
         });
         let more_delay_s = (budget.widest(ElementErrors::valve_delay) - DEFAULT_DELAY_S).max(0.0);
-        let more_lag_s = LAG_S * (budget.widest(ElementErrors::valve_lag) - DEFAULT_LAG).max(0.0);
-        let strength = gain + budget.widest(ElementErrors::friction);
+        let more_lag_s = LAG_S * (budget.widest(|of| most_off(of.valve_lag_factor)) - DEFAULT_LAG).max(0.0);
+        let strength = gain + budget.widest(|of| most_off(of.friction_factor));
         let more_strength_s = LOAD_S * (strength - DEFAULT_STRENGTH).max(0.0);
         Self {
             tables,

@@ -9,7 +9,8 @@
 //! d = sum(w e)/n      s^2 = 1/n + beta      n = sum(w w)
 //! ```
 //!
-//! with the variance `beta` of what all shifts have wrong alike ([`super::systematic`]). A quantity is beyond its bound where `d` exceeds it by
+//! with the variance `beta` of what all shifts have wrong alike ([`super::systematic`]), times the square of how much wider than usual the bounds
+//! of the elements are: hysteresis, offsets of commands and the curvature of the models are as large as these allow. A quantity is beyond its bound where `d` exceeds it by
 //! [`CERTAIN`] times `s`. The cause that is named is the most likely one of those with a size beyond their bounds, where sizes have the standard
 //! deviation `c` ([`BEYOND`]) beforehand: so a cause that needs an unlikely size is none. By the logarithm of the likelihood that is
 //!
@@ -109,8 +110,9 @@ impl<T: Real> Evidence<T> {
         self.found.is_some()
     }
 
-    /// Takes what a shift has shown, with a wheel speed or without. Without one the load of the road and the stiffness of the drive shafts look alike.
-    pub(super) fn take(&mut self, acting: &Acting<T>, shown: &Shown<T>, has_wheels: bool) {
+    /// Takes what a shift has shown of elements whose bounds have these widths, with a wheel speed or without. Without one the load of the road and
+    /// the stiffness of the drive shafts look alike.
+    pub(super) fn take(&mut self, acting: &Acting<T>, shown: &Shown<T>, widths: &[T; MAX_ELEMENTS], has_wheels: bool) {
         let mut add = |at: usize, column: &[T; ACTING]| {
             let w = shown.per_quantity(column);
             let square_now = dot(&w, &w);
@@ -140,18 +142,18 @@ impl<T: Real> Evidence<T> {
         for (k, column) in alike.iter().enumerate() {
             add(LEARNT + k, column);
         }
-        self.found = self.beyond().map(|k| (k, self.size(k)));
+        self.found = self.beyond(widths).map(|k| (k, self.size(k, widths)));
     }
 
     /// The most likely one of the quantities beyond their bounds, if one is for certain.
-    fn beyond(&self) -> Option<usize> {
+    fn beyond(&self, widths: &[T; MAX_ELEMENTS]) -> Option<usize> {
         let (mut is_certain, mut found) = (false, (None, T::zero()));
         let sums = self.products.iter().zip(&self.squares).zip(&self.shifts).enumerate();
         for (k, ((product, n), shifts)) in sums.filter(|(_, ((_, n), _))| **n > T::of(LEAST)) {
-            let (edge, variance) = (T::of(edge(place(k))), *n * (T::one() + T::of(in_common(k)) * *n));
+            let (edge, variance) = (T::of(edge(place(k))), *n * (T::one() + in_common(k, widths) * *n));
             let above = product.abs() - edge * *n;
             is_certain |= *shifts >= SHIFTS && above > T::of(CERTAIN) * variance.sqrt();
-            let likelihood = self.likelihood(k);
+            let likelihood = self.likelihood(k, widths);
             if above > T::zero() && (found.0.is_none() || likelihood > found.1) {
                 found = (Some(k), likelihood);
             }
@@ -161,22 +163,22 @@ impl<T: Real> Evidence<T> {
 
     /// Size of a quantity by the shifts alone and its variance, in the standard deviation unlearnt, and the part of the size that is left with
     /// what sizes beyond a bound are likely.
-    fn by_shifts(&self, k: usize) -> [T; 3] {
+    fn by_shifts(&self, k: usize, widths: &[T; MAX_ELEMENTS]) -> [T; 3] {
         let k = k.min(HYPOTHESES - 1);
         let (n, beyond) = (self.squares[k], T::of(BEYOND * BEYOND));
-        let variance = n.recip() + T::of(in_common(k));
+        let variance = n.recip() + in_common(k, widths);
         [self.products[k] / n, variance, beyond / (beyond + variance)]
     }
 
     /// Size of a quantity beyond its bound and its standard deviation, in that unlearnt.
-    fn size(&self, k: usize) -> [T; 2] {
-        let [size, variance, weight] = self.by_shifts(k);
+    fn size(&self, k: usize, widths: &[T; MAX_ELEMENTS]) -> [T; 2] {
+        let [size, variance, weight] = self.by_shifts(k, widths);
         [weight * size, (weight * variance).sqrt()]
     }
 
     /// `L` of a quantity.
-    fn likelihood(&self, k: usize) -> T {
-        let [size, variance, weight] = self.by_shifts(k);
+    fn likelihood(&self, k: usize, widths: &[T; MAX_ELEMENTS]) -> T {
+        let [size, variance, weight] = self.by_shifts(k, widths);
         T::of(0.5) * (weight * size * size / variance + (T::one() - weight).ln())
     }
 }
@@ -186,15 +188,24 @@ fn place(k: usize) -> usize {
     k.checked_sub(LEARNT).map_or(k, |alike| ALIKE[alike.min(ALIKE.len() - 1)])
 }
 
-/// Variance of the error that all shifts have in common of what they show of it.
-fn in_common(k: usize) -> f64 {
-    match place(k) {
+/// Variance of the error that all shifts have in common of what they show of it: of one element by its own bounds, of others by the widest.
+fn in_common<T: Real>(k: usize, widths: &[T; MAX_ELEMENTS]) -> T {
+    let variance = match place(k) {
         STIFFNESS_AT => OF_STIFFNESS,
         other => variance_in_common(other),
-    }
+    };
+    let of_one = ALIKE.into_iter().find(|first| (*first..first + MAX_ELEMENTS).contains(&k));
+    let own = of_one.and_then(|first| widths.get(k - first).copied());
+    let width = own.unwrap_or_else(|| widths.iter().copied().fold(T::one(), T::max));
+    T::of(variance) * width * width
 }
 
 impl<T: Real> GearboxFilter<'_, T> {
+    /// The widths of the bounds of all elements.
+    pub(super) fn widths(&self) -> [T; MAX_ELEMENTS] {
+        core::array::from_fn(|at| self.tables.elements.get(at).map_or(T::one(), |element| element.uncertainty.width))
+    }
+
     /// The quantity of the car that is beyond the bound of its error by the shifts of this drive, if one is: then the guaranteed ranges do not
     /// hold.
     pub fn beyond_bounds(&self, state: &GearboxState<T>) -> Option<BeyondBounds<T>> {

@@ -203,7 +203,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             let both = running.x.timing.together(before, running.lasting()).filter(|_| running.x.is_sound());
             let shown = both.and_then(|(before, after)| Shown::of(&acting, &before, &after, &correlations));
             let taken = shown.is_some_and(|shown| {
-                evidence.take(&acting, &shown, has_wheels);
+                evidence.take(&acting, &shown, &self.widths(), has_wheels);
                 learnt.take_shown(&acting, shown, &correlations)
             });
             learnt.count(taken, &correlations);

@@ -24,11 +24,11 @@ use super::learnt::{DELAY_AT, INERTIA_AT, KISS_AT, LAG_AT, LEARNT, Learnt, REPOR
 /// Variance of `u`, in that of the quantity unlearnt \[chosen, from cars of the whole budget: the example
 /// `learnt_coverage` of `study`\]: of torque factors, kiss
 /// points, inertias, lags and delays. The hysteresis of a valve shows as a delay, the age of the readings as an inertia.
-const OF_FACTOR: f64 = 0.5;
+const OF_FACTOR: f64 = 0.8;
 const OF_KISS: f64 = 0.15;
 const OF_INERTIA: f64 = 1.0;
-const OF_LAG: f64 = 0.15;
-const OF_DELAY: f64 = 0.8;
+const OF_LAG: f64 = 0.4;
+const OF_DELAY: f64 = 2.0;
 
 /// Variance of the error that all shifts have in common of what they show of a quantity.
 pub(super) fn variance_in_common(k: usize) -> f64 {

@@ -49,14 +49,23 @@ pub struct ValveLimits<T> {
 }
 
 impl<T: Real> ValveLimits<T> {
+    /// Whether the valve can have a command that is read as this, within its error.
+    pub fn is_possible(&self, command: T) -> bool {
+        // A comparison with NaN is false, so this refuses non-finite values too.
+        (command - self.nearest(command)).abs() <= self.command_error
+    }
+
+    #[inline]
+    fn nearest(&self, command: T) -> T {
+        command.at_least(T::zero()).at_most(self.command_max)
+    }
+
     /// A reading of the command as one that the valve can have; `None` if it is none within its error.
     #[inline]
     pub(super) fn usable(&self, reading: &Reading<T>) -> Option<Reading<T>> {
         let Reading { value, age_s } = *reading;
-        let possible = value.at_least(T::zero()).at_most(self.command_max);
-        // A comparison with NaN is false, so this refuses non-finite values too.
-        ((value - possible).abs() <= self.command_error && age_s >= T::zero() && age_s.is_finite())
-            .then_some(Reading { value: possible, age_s })
+        (self.is_possible(value) && age_s >= T::zero() && age_s.is_finite())
+            .then(|| Reading { value: self.nearest(value), age_s })
     }
 
     /// The nearest pressure that the valve can give, Pa.

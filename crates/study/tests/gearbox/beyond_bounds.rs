@@ -2,7 +2,7 @@
 //!
 //! `BEYOND_REPETITIONS=20` are an hour of driving, of each element; without it the drive takes six minutes, and most changes are of one element.
 
-use car::{Car, Drive, ErrorBudget, ShiftClutch};
+use car::{Car, Drive, ElementErrorBounds, ErrorBudget, ShiftClutch};
 use config::{DriveFile, Source};
 use observer::gearbox::{BeyondBounds, CarQuantity, Elements, GearboxFilter, ShiftInput};
 use observer::{ShiftTables, gearbox_filter};
@@ -132,6 +132,31 @@ fn of_a_car_within_its_budget_nothing_is_said() {
     }
     println!("{said} of {drives} drives within the budget");
     assert!(100 * said <= drives, "{said} of {drives}");
+}
+
+/// Bounds that are wider than usual allow hysteresis, offsets and timings whose traces in all shifts are as much larger.
+#[test]
+fn of_a_car_at_the_end_of_wide_bounds_nothing_is_said() {
+    let usual = cars().swap_remove(0);
+    let stating = |state: &dyn Fn(&mut ElementErrorBounds)| {
+        let mut known = usual.clone();
+        let elements = vec![ElementErrorBounds::default(); known.clutches.len()];
+        known.error_bounds.elements = elements;
+        known.error_bounds.elements.iter_mut().for_each(state);
+        known
+    };
+    let valve = |clutch: &mut ShiftClutch, lag, gain, delay| clutch.valve = clutch.valve.changed(lag, gain, delay);
+    let current = stating(&|bounds| bounds.command = Some(0.05));
+    assert!(Driven::new(current.clone()).found(current, 0.04, 1).is_none(), "offset of all currents");
+    let mut own = stating(&|bounds| bounds.valve_hysteresis_pa = Some(60e3));
+    own.clutches.iter_mut().flatten().for_each(|clutch| clutch.hysteresis_pa = 60e3);
+    assert!(Driven::new(own.clone()).found(own, 0.0, 1).is_none(), "hysteresis of the file");
+    let gain = Driven::new(stating(&|bounds| bounds.valve_gain_factor = Some([0.7, 1.0])));
+    assert!(gain.of_all(|clutch| valve(clutch, 1.0, 0.7, None)).is_none(), "gain 0.7");
+    let late = Driven::new(stating(&|bounds| bounds.valve_delay_s = Some([0.0, 0.12])));
+    assert!(late.of_all(|clutch| valve(clutch, 1.0, 1.0, Some(0.12))).is_none(), "delay 120 ms");
+    let slow = Driven::new(stating(&|bounds| bounds.valve_lag_factor = Some([1.0, 2.5])));
+    assert!(slow.of_all(|clutch| valve(clutch, 2.5, 1.0, None)).is_none(), "lag 2.5 times");
 }
 
 /// The load of the road is then known by the output speed alone.

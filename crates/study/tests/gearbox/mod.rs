@@ -137,7 +137,7 @@ const DOCUMENTED_OF_WHOLE_BUDGET: Ratios = [
     (ShiftKind::PowerOnUp, [0.73, 0.36]),
     (ShiftKind::PowerOnDown, [0.71, 0.52]),
     (ShiftKind::PowerOffUp, [0.56, 0.59]),
-    (ShiftKind::CoastDown, [0.67, 0.40]),
+    (ShiftKind::CoastDown, [0.67, 0.39]),
 ];
 
 /// The matrix is that of the documentation to the last digit, and all values are in their guaranteed ranges.
@@ -165,7 +165,7 @@ fn matrix_of_cars_of_the_whole_budget() {
     let rows = rows(&cars(), MATRIX_DRAWS, true);
     print(&rows);
     is_not_worse_than_the_open_loop(&rows);
-    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 213);
+    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 212);
 }
 
 /// All values are in their guaranteed ranges, and of no kind and no phase is the filter worse than the valve model, over all
