@@ -71,7 +71,7 @@ impl Launch {
         let waiting_pa = (self.clutch.kiss_pa() - c.below_kiss_pa).max(0.0);
         let pressure_pa =
             if self.torque_n_m > 0.0 { self.clutch.pressure_for(self.torque_n_m, slip) } else { waiting_pa };
-        let pressure_pa = self.clutch.lead(c, pressure_pa, car.line_pressure_pa);
+        let pressure_pa = self.clutch.lead(c, pressure_pa, car.line_pressure_pa, 0.0);
         (self.clutch.element, self.clutch.valve_command(pressure_pa))
     }
 

@@ -16,6 +16,9 @@ const FILLED_AT: f64 = 0.75;
 /// A clutch that slips so long at line pressure is left at it, s \[chosen\]: nothing more can be commanded.
 const GIVEN_UP_S: f64 = 3.0;
 
+/// By how much the command of a clutch that has locked may fall from one period to the next, as a pressure, Pa \[chosen\].
+const LOCK_FALL_PA: f64 = 50e3;
+
 /// Ratios closer than this are one.
 const SAME_RATIO: f64 = 1e-6;
 
@@ -93,6 +96,8 @@ pub(super) struct ActiveShift {
     engine: EngineRequest,
     /// Rate of the reference of the slip when the clutches answer, rad/s^2.
     reference_rad_s2: f64,
+    /// Pressure at which the command of the oncoming clutch settles, Pa.
+    oncoming_pa: f64,
 }
 
 /// What a step of the controller looks at.
@@ -150,6 +155,7 @@ impl ActiveShift {
             slips_before_rad_s: None,
             engine: EngineRequest { fraction: 1.0, added_n_m: 0.0 },
             reference_rad_s2: 0.0,
+            oncoming_pa: 0.0,
         }
     }
 
@@ -248,9 +254,12 @@ impl ActiveShift {
         let on_pa = if self.is_filled_by_plan {
             self.oncoming.without_lead(c, on_pa, self.line_pa)
         } else {
-            self.oncoming.lead(c, on_pa, self.line_pa)
+            // A clutch that has just locked keeps about what it carried.
+            let least_pa = if self.stage == ShiftStage::Lock { self.oncoming_pa - LOCK_FALL_PA } else { 0.0 };
+            self.oncoming.lead(c, on_pa, self.line_pa, least_pa)
         };
-        [self.offgoing.lead(c, off_pa, self.line_pa), on_pa]
+        self.oncoming_pa = on_pa;
+        [self.offgoing.lead(c, off_pa, self.line_pa, 0.0), on_pa]
     }
 
     fn change_stage(&mut self, c: &CarCalibration, now: &Now) {
