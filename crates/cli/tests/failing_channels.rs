@@ -191,6 +191,43 @@ fn a_speed_that_sticks_or_shows_the_speed_next_to_it_is_refused_from_its_first_w
     }
 }
 
+/// Friction work of the first shift, J: the value and its range; and the worst health.
+fn work_of_first(shifts: &str) -> ([f64; 3], String) {
+    let of = |name: &str| column(shifts, name)[0].parse().unwrap_or(f64::NAN);
+    (
+        ["friction_work_j", "friction_work_least_j", "friction_work_greatest_j"].map(of),
+        column(shifts, "worst_health")[0].clone(),
+    )
+}
+
+#[test]
+fn a_shift_in_which_a_speed_fails_keeps_its_friction_work_and_says_what_failed() {
+    let case = Case::one_shift();
+    let (_, _, clean) = case.estimate(&case.log, &[]);
+    let ([work_j, ..], _) = work_of_first(&clean);
+    // From before the shift into it, and over all of it.
+    for (from_s, to_s) in [(7.43, 8.13), (7.43, 8.93)] {
+        let log = case.with("turbine_speed_rad_s", [from_s, to_s], "0");
+        let (note, _, shifts) = case.estimate(&log, &[]);
+        assert_eq!(shifts.lines().count(), clean.lines().count(), "{note}");
+        let ([_, least_j, greatest_j], health) = work_of_first(&shifts);
+        assert!(least_j < work_j && work_j < greatest_j, "{least_j} {work_j} {greatest_j}");
+        assert!(!["", "good"].contains(&&*health), "{shifts}");
+    }
+}
+
+#[test]
+fn a_command_that_its_valve_cannot_have_refuses_the_log_of_either_car() {
+    for case in Case::both() {
+        let name = format!("{}_a", case.commands[0]);
+        let log = with_column(&case.log, &name, |cell| {
+            cell.parse::<f64>().map_or(String::new(), |current| (5.0 * current + 2.0).to_string())
+        });
+        let error = refused(&case.run(&log, &[]));
+        assert!(error.contains("were refused: ") && error.contains("hint: check "), "{error}");
+    }
+}
+
 #[test]
 fn a_channel_that_ends_in_the_drive_does_not_refuse_the_log() {
     for case in Case::both() {
@@ -273,7 +310,11 @@ fn the_open_loop_does_without_an_engine_speed() {
         let map =
             case.map("").replacen("[channel.engine_speed]\nname = \"engine_speed_rad_s\"\nunit = \"rad/s\"\n", "", 1);
         let map = case.folder.write("map.toml", map);
-        for (log, more) in [(&absent, vec![]), (&empty, vec![]), (&absent, vec!["--map", &map])] {
+        // One that ends, or reads zero from then on: the open loop of the car of one shift does without it alike.
+        let ends = ["", "0"].map(|value| case.with("engine_speed_rad_s", [2.0, f64::INFINITY], value));
+        let ends = ends.iter().filter(|_| is_one).map(|log| (log, vec![]));
+        for (log, more) in [(&absent, vec![]), (&empty, vec![]), (&absent, vec!["--map", &map])].into_iter().chain(ends)
+        {
             let (note, table, _) = case.estimate(log, &[observer, more.as_slice()].concat());
             // What a filter learns of its valves takes a shift with all speeds.
             let found = column(&table, column_of);

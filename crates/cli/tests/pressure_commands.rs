@@ -77,8 +77,8 @@ fn the_pressure_that_is_asked_of_an_element_stands_for_the_command_of_its_valve(
     let error = refused(&estimate(&folder, "wrong.csv", &["-o", &folder.path("no.csv")]));
     assert!(error.contains("_pressure_command cannot be in Pa"), "{error}");
     folder.write("wrong.csv", bar.replacen("_pressure_command_bar", "_pressure_command_mpa", 1));
-    let told = said(&estimate(&folder, "wrong.csv", &["-o", &folder.path("much.csv")]));
-    assert!(told.contains("command rejected: an unusable valve command"), "{told}");
+    let error = refused(&estimate(&folder, "wrong.csv", &["-o", &folder.path("no.csv")]));
+    assert!(error.contains("were refused: its valve cannot have them\nhint: check unit, scale and sign"), "{error}");
     let both = format!("{map}[channel.element_{}_current]\nname = \"engine_speed_rad_s\"\nunit = \"A\"\n", elements[0]);
     let path = folder.write("both.toml", both);
     let error = refused(&estimate(&folder, "own.csv", &["--map", &path, "-o", &folder.path("no.csv")]));

@@ -1,6 +1,7 @@
 //! From a vehicle to the rigid observer: model, polytopes, gains, certificates.
 
 use car::{DesignRequirement, Vehicle};
+use drivetrain::CommandKind;
 use observer::{
     Bounded, Budget, Discretisation, InputLimits, Phase, RangeEstimator, RigidGains, RigidModel, RigidObserver,
     Schedule, ShaftErrors, ShaftRange, Tracker, phase_supervisor,
@@ -87,11 +88,19 @@ pub fn tracker(vehicle: &Vehicle) -> Tracker<f64> {
     }
 }
 
-/// What a reading or an estimate of this vehicle can be.
+/// The least factor on the gain of a valve for which the largest command of a file is taken to be stated: that of the usual bounds.
+const USUAL_GAIN: f64 = 0.9;
+
+/// What a reading or an estimate of this vehicle can be. A current valve that may be weaker than usual may get a larger command by as much.
 pub fn input_limits(vehicle: &Vehicle) -> InputLimits<f64> {
+    let [weakest, _] = vehicle.error_bounds.valve_gain_factor;
+    let room = match vehicle.oncoming.valve.command_kind() {
+        CommandKind::Current => (USUAL_GAIN / weakest).max(1.0),
+        CommandKind::DutyCycle => 1.0,
+    };
     InputLimits {
         speed_max_rad_s: vehicle.settings.speed_max_rad_s,
-        command_max: vehicle.settings.command_max,
+        command_max: room * vehicle.settings.command_max,
         command_error: vehicle.error_bounds.command,
         pressure_max_pa: vehicle.error_bounds.pressure_max_pa,
         shaft_torque_max_n_m: vehicle.shaft_torque_max_n_m(),

@@ -10,7 +10,7 @@ use plant::car::{BeyondGears, CarShiftQuality};
 use crate::LogStep;
 use crate::car_beyond_bounds::CarBeyondBounds;
 use crate::carried_pressures::CarriedPressures;
-use crate::checks::{CameSpeed, CheckedRow, Checks, EndedShift, GearSpeeds, Unusable, WrongScale};
+use crate::checks::{CameSpeed, CheckedRow, Checks, EndedShift, GearSpeeds, RefusedCommand, Unusable, WrongScale};
 use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift, slips_rad_s};
 use crate::felt_shift::{FeltShift, Motion};
 use crate::learning_count::LearningCount;
@@ -211,6 +211,11 @@ impl<'c> LoggedDrive<'c> {
     /// Whether a speed of the engine, turbine or output came before, and comes no more.
     fn has_ended(&self, came_rad_s: &[f64; 3]) -> bool {
         self.came.iter().zip(came_rad_s).any(|(came, now)| came.has_come() && now.is_nan())
+    }
+
+    /// A command that its valve cannot have in most of its readings.
+    pub fn refused_command(&self) -> Option<RefusedCommand<'_>> {
+        self.checks.refused.mostly()
     }
 
     /// Whether an element slips where it should hold, or holds without its command: then the speeds are those of the car.

@@ -162,11 +162,12 @@ fn step_observer<T: Real, O: SampleEstimator<T>>(
     aligned: &Aligned<T>,
 ) -> Estimate<T> {
     let Aligned { mut sample, mut channels } = *aligned;
-    if channels.engine == ChannelHealth::Unused {
-        match observer.needs_engine() {
-            true => channels.engine = ChannelHealth::Lost,
-            false => sample.engine_rad_s = sample.turbine_rad_s,
+    if !observer.needs_engine() {
+        if sample.engine_rad_s.is_nan() {
+            sample.engine_rad_s = sample.turbine_rad_s;
         }
+    } else if channels.engine == ChannelHealth::Unused {
+        channels.engine = ChannelHealth::Lost;
     }
     let mut estimate = observer.step_sample(state, &sample);
     estimate.channels = channels;

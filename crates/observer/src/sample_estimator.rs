@@ -10,7 +10,7 @@ pub trait SampleEstimator<T> {
     /// Whether it reads the speed of the driven wheels.
     const READS_WHEEL: bool;
 
-    /// Whether it needs the engine speed. One that does not takes the turbine speed in its place where the log has none: a converter that
+    /// Whether it needs the engine speed. One that does not takes the turbine speed in its place where none comes: a converter that
     /// does not slip.
     #[inline]
     fn needs_engine(&self) -> bool {

@@ -197,7 +197,7 @@ fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
         points: both(&|interval| interval.pressure_pa, mpa),
     };
     let ends = |end: usize| overview.intervals().map(|([from_s, _], i)| (from_s, mpa(i.range_pa[end]))).collect();
-    let band = Band { label: "range by the error budget".to_owned(), colour: RANGE, lower: ends(0), upper: ends(1) };
+    let band = Band { label: "range (error budget)".to_owned(), colour: RANGE, lower: ends(0), upper: ends(1) };
     let healths: Vec<(f64, [bool; HEALTHS])> =
         overview.intervals().flat_map(|([from_s, to_s], i)| [(from_s, i.healths), (to_s, i.healths)]).collect();
     let first_s = overview.intervals().next().map_or(0.0, |([from_s, _], _)| from_s);
@@ -288,7 +288,7 @@ impl Samples<'_> {
 
     fn bands(&self, range: &dyn Fn(&LogSample) -> Option<[f64; 2]>) -> Vec<Band> {
         let end = |end: usize| self.all(&|sample| range(sample).map_or(f64::NAN, |range| range[end]));
-        vec![Band { label: "range by the error budget".to_owned(), colour: RANGE, lower: end(0), upper: end(1) }]
+        vec![Band { label: "range (error budget)".to_owned(), colour: RANGE, lower: end(0), upper: end(1) }]
     }
 
     /// The largest value up to a time; at least zero.
@@ -349,7 +349,9 @@ impl Samples<'_> {
 /// The phases, as the observer saw them or else as the ratio shows them.
 fn phases(shift: &ShiftEstimate) -> Vec<Span> {
     let span = |label: &str, [start, end]: [f64; 2], colour| Span { label: label.to_owned(), start, end, colour };
-    match &shift.estimated {
+    let seen =
+        shift.estimated.as_ref().filter(|estimated| estimated.torque_phase_s.iter().all(|time_s| time_s.is_finite()));
+    match seen {
         Some(estimated) => {
             let [begin_s, inertia_s] = estimated.torque_phase_s;
             vec![

@@ -4,6 +4,8 @@
 //! both say about one shift. Pressures and torques are given for the shift that the vehicle file describes; of other shifts only
 //! the speeds tell something.
 
+use std::ops::Range;
+
 use car::Vehicle;
 use drivetrain::ReducedShift;
 use logs::shifts::Held;
@@ -151,7 +153,8 @@ pub struct MeasuredError {
 /// What an observer says about the shift of its vehicle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatedShift {
-    /// Torque phase: from the kiss point until the offgoing clutch slips, s.
+    /// Torque phase: from the kiss point until the offgoing clutch slips, s; not numbers where the observer did not see the shift, because a speed
+    /// did not come or was refused.
     pub torque_phase_s: [f64; 2],
     /// When the oncoming clutch was locked, s; none if it was not seen.
     pub lock_up_s: Option<f64>,
@@ -233,7 +236,7 @@ impl ShiftEstimate {
     /// When it began, s: with its command, else with the torque phase, else with what the finder saw first.
     pub fn begin_s(&self) -> f64 {
         let torque_phase_s = self.estimated.as_ref().map(|estimated| estimated.torque_phase_s[0]);
-        self.shift.command_s.or(torque_phase_s).unwrap_or(self.shift.start_s())
+        self.shift.command_s.or(torque_phase_s.filter(|time_s| time_s.is_finite())).unwrap_or(self.shift.start_s())
     }
 
     /// When it was over, s.
@@ -317,7 +320,11 @@ impl EstimatedShift {
         let [inertia_from_s, inertia_to_s] = shift.inertia_s.unwrap_or([shift.start_s(), shift.end_s()]);
         let first = samples.partition_point(|sample| sample.time_s < inertia_from_s);
         let mut of_ratio = samples[first..].iter().take_while(|sample| sample.time_s <= inertia_to_s);
-        let within = first + of_ratio.position(|sample| phase(sample) == Phase::InertiaPhase)?;
+        let Some(within) = of_ratio.position(|sample| phase(sample) == Phase::InertiaPhase) else {
+            let last = samples.partition_point(|sample| sample.time_s <= inertia_to_s);
+            return Self::unseen(samples, first..last, reduced);
+        };
+        let within = first + within;
         let begin = samples[..within]
             .iter()
             .rposition(|sample| matches!(phase(sample), Phase::BeforeShift | Phase::AfterShift))
@@ -327,10 +334,12 @@ impl EstimatedShift {
         let end = samples[within..].iter().position(after).map_or(samples.len(), |length| within + length);
         let lock_up_s = samples.get(end).filter(|s| phase(s) == Phase::AfterShift).map(|sample| sample.time_s);
         let in_inertia = samples[inertia..end].iter().filter(|sample| phase(sample) == Phase::InertiaPhase);
-        let of_shift = &samples[begin..end];
+        // Where a speed did not come, or was refused, the shift may have begun before it was seen.
+        let from = begin - samples[..begin].iter().rev().take_while(|sample| is_blind(sample)).count();
+        let of_shift = &samples[from..end];
         let shaft = of_shift.iter().filter_map(|sample| sample.estimate.shaft_torque_n_m);
         let measured = |value: fn(&LogSample) -> Option<Reading<f64>>, estimate: fn(&LogSample) -> Ranged| {
-            MeasuredError::of(samples, begin..end, value, estimate)
+            MeasuredError::of(samples, from..end, value, estimate)
         };
         Some(Self {
             torque_phase_s: [samples[begin].time_s, samples[inertia].time_s],
@@ -338,12 +347,45 @@ impl EstimatedShift {
             pressure_pa: mean(in_inertia.clone().map(pressure))?,
             torque_n_m: mean(in_inertia.map(torque))?,
             min_shaft_n_m: shaft.reduce(f64::min),
-            friction_work_j: friction_work(samples, begin..end, reduced),
+            friction_work_j: friction_work(samples, from..end, reduced),
             pressure_error_pa: measured(|s| s.pressure_pa, pressure),
             torque_error_n_m: measured(|s| s.torque_n_m, torque),
             unhealthy: unhealthy(of_shift),
         })
     }
+
+    /// A shift in these samples that the observer did not see, because a speed did not come or was refused; none where most of them came.
+    fn unseen(samples: &[LogSample], shift: Range<usize>, reduced: &ReducedShift<f64>) -> Option<Self> {
+        let blind = |samples: &[LogSample]| samples.iter().take_while(|sample| is_blind(sample)).count();
+        let within = samples.get(shift.clone())?;
+        if 2 * within.iter().filter(|sample| is_blind(sample)).count() <= within.len() {
+            return None;
+        }
+        let from = shift.start - samples[..shift.start].iter().rev().take_while(|sample| is_blind(sample)).count();
+        let to = shift.end + blind(&samples[shift.end..]);
+        let of_shift = &samples[from..to];
+        let shaft = of_shift.iter().filter_map(|sample| sample.estimate.shaft_torque_n_m);
+        let measured = |value: fn(&LogSample) -> Option<Reading<f64>>, estimate: fn(&LogSample) -> Ranged| {
+            MeasuredError::of(samples, from..to, value, estimate)
+        };
+        Some(Self {
+            torque_phase_s: [f64::NAN; 2],
+            lock_up_s: None,
+            pressure_pa: mean(of_shift.iter().map(pressure))?,
+            torque_n_m: mean(of_shift.iter().map(torque))?,
+            min_shaft_n_m: shaft.reduce(f64::min),
+            friction_work_j: friction_work(samples, from..to, reduced),
+            pressure_error_pa: measured(|s| s.pressure_pa, pressure),
+            torque_error_n_m: measured(|s| s.torque_n_m, torque),
+            unhealthy: unhealthy(of_shift),
+        })
+    }
+}
+
+/// Whether turbine or output speed did not come for a while, or was refused.
+fn is_blind(sample: &LogSample) -> bool {
+    let Channels { turbine, output, .. } = sample.estimate.channels;
+    turbine.is_refused() || output.is_refused()
 }
 
 fn pressure(sample: &LogSample) -> Ranged {
@@ -367,7 +409,7 @@ fn mean(values: impl Iterator<Item = Ranged>) -> Option<Ranged> {
 }
 
 /// Torque times slip over time.
-fn friction_work(samples: &[LogSample], shift: std::ops::Range<usize>, reduced: &ReducedShift<f64>) -> Ranged {
+fn friction_work(samples: &[LogSample], shift: Range<usize>, reduced: &ReducedShift<f64>) -> Ranged {
     let of = |at: usize| {
         let [turbine, output] = [1, 2].map(|speed| SpeedAt::of(samples, at, speed));
         let slip_rad_s = reduced.oncoming_slip(turbine.rad_s, output.rad_s);
@@ -429,7 +471,7 @@ impl MeasuredError {
     /// the estimates around it; its range is that of the step that brought it.
     fn of(
         samples: &[LogSample],
-        part: std::ops::Range<usize>,
+        part: Range<usize>,
         measured: impl Fn(&LogSample) -> Option<Reading<f64>>,
         estimate: impl Fn(&LogSample) -> Ranged,
     ) -> Option<Self> {

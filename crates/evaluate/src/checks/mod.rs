@@ -14,6 +14,7 @@ mod open_loop;
 mod other_shifts;
 pub mod ratio_histogram;
 mod ratio_scale;
+mod refused_commands;
 mod scales;
 mod slipping_elements;
 mod still_commands;
@@ -33,6 +34,7 @@ use self::in_gear::InGear;
 use self::lock_up_check::LockUpCheck;
 use self::open_loop::OpenLoop;
 use self::other_shifts::OtherShifts;
+use self::refused_commands::RefusedCommands;
 use self::scales::Scales;
 use self::slipping_elements::SlippingElements;
 use self::still_commands::StillCommands;
@@ -42,6 +44,7 @@ use self::unannounced::UnannouncedShifts;
 pub use came_speed::CameSpeed;
 pub use in_gear::Unusable;
 pub use ratio_scale::WrongScale;
+pub use refused_commands::RefusedCommand;
 
 pub(crate) use check::{Check, CheckedRow, EndedShift};
 pub(crate) use in_gear::GearSpeeds;
@@ -57,6 +60,7 @@ pub(crate) struct Checks<'c> {
     pub(crate) delay: CommandDelay<'c>,
     converter: ConverterCheck<'c>,
     lock_up: LockUpCheck<'c>,
+    pub(crate) refused: RefusedCommands<'c>,
     still: StillCommands<'c>,
     held: HeldCommands<'c>,
     pub(crate) holes: Holes,
@@ -77,6 +81,7 @@ impl<'c> Checks<'c> {
             delay: CommandDelay::new(tables, budget),
             converter: ConverterCheck::new(car),
             lock_up: LockUpCheck::new(car),
+            refused: RefusedCommands::new(car, tables),
             still: StillCommands::new(car, tables),
             held: HeldCommands::new(car, tables),
             holes: Holes::default(),
@@ -88,7 +93,7 @@ impl<'c> Checks<'c> {
     }
 
     /// Each of them, in the order of their warnings.
-    pub(crate) fn each(&mut self) -> [&mut dyn Check; 15] {
+    pub(crate) fn each(&mut self) -> [&mut dyn Check; 16] {
         [
             &mut self.swapped,
             &mut self.commands,
@@ -98,6 +103,7 @@ impl<'c> Checks<'c> {
             &mut self.delay,
             &mut self.converter,
             &mut self.lock_up,
+            &mut self.refused,
             &mut self.still,
             &mut self.held,
             &mut self.holes,

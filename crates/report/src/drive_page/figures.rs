@@ -243,7 +243,7 @@ fn clutch_panel(
     if !is_one_way(rows, c) {
         series.push(curve(2, "valve model", OPEN_LOOP));
     }
-    let bands = [("range by the error budget", WIDE_RANGE), ("two standard deviations", RANGE)];
+    let bands = [("range (error budget)", WIDE_RANGE), ("two standard deviations", RANGE)];
     let bands = bands.into_iter().enumerate().map(|(which, (label, colour))| Band {
         label: label.to_owned(),
         colour,

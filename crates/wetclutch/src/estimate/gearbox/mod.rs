@@ -10,6 +10,7 @@ use std::path::Path;
 
 use car::Car;
 use config::CarFile;
+use evaluate::checks::RefusedCommand;
 use evaluate::drive::ScoredDrive;
 use evaluate::logged::LoggedDrive;
 use observer::ShiftTables;
@@ -29,7 +30,7 @@ use super::one_shift::ratios::check_wheel;
 use super::output::Destination;
 use super::output::Output;
 use super::selection::Selection;
-use crate::{Error, Notes, Table};
+use crate::{Error, Notes, Table, grouped};
 
 /// What is common to all logs of a car.
 pub struct Setup<'a> {
@@ -190,6 +191,15 @@ pub fn estimate(
 fn check_speeds(drive: &LoggedDrive<'_>, (setup, path): (&Setup<'_>, &Path), say: Notes<'_>) -> Result<(), Error> {
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
         say(&format!("warning: {swapped}"));
+    }
+    if let Some(RefusedCommand { element, readings: [refused, all] }) = drive.refused_command() {
+        return Err(Error::Input(format!(
+            "{}: {} of {} readings of the command of {element} were refused: its valve cannot have them\nhint: check unit, scale and sign of the channel, and \
+             whether the vehicle file is of this car; `wetclutch inspect` shows minimum and maximum values",
+            path.shown(),
+            grouped(refused),
+            grouped(all)
+        )));
     }
     let wrong_scale = drive.wrong_scale().map(|wrong| wrong.text);
     if drive.has_slipping_element() && wrong_scale.is_none() {
