@@ -54,7 +54,7 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
         "M11 of 1-2",
         "torque scale: not identified by these logs",
         "correlated: ",
-        "shifts held out: ",
+        "shifts held out",
         "which is better in ",
         "mass and road load from ",
         "the reported engine torque is used in ",

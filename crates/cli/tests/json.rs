@@ -12,7 +12,8 @@ fn commands() -> Vec<String> {
     let help = printed(&wetclutch(&["--help"]));
     let listed = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let names = listed.lines().filter_map(|line| line.split_whitespace().next());
-    names.filter(|name| *name != "help").map(str::to_owned).collect()
+    // Completions and manual pages are for a shell, not for a program.
+    names.filter(|name| !["help", "completions", "man"].contains(name)).map(str::to_owned).collect()
 }
 
 /// Arguments of each command, in the order in which they are run: one makes the log of the others.
@@ -72,13 +73,15 @@ fn every_command_prints_one_object_with_the_version_of_its_keys() {
             assert!(page.contains(&format!("`{key}`")), "{}: `{key}` is not in docs/reference/json.md", arguments[0]);
         }
     }
-    // Of a drive of a car with a gearbox, and one run of a study.
+    // A suggested map, a drive of a car with a gearbox, and one run of a study.
     let drive = folder.write("drive.toml", "name = \"d\"\n[[segment]]\nduration_s = 3\nthrottle = 0.3\n");
     let car = format!("{ROOT}vehicles/four_speed.toml");
     let json = |arguments: &[&str]| -> Value {
         let output = wetclutch(&[arguments, &["--json"]].concat());
         serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{arguments:?}: {}", stderr(&output)))
     };
+    let suggested = json(&["inspect", &folder.path("sim/e1_measured.csv"), "--suggest"]);
+    assert!(suggested["channel_map"].as_str().unwrap().contains("[channel.engine_speed]"), "{suggested}");
     let driven = json(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("drive")]);
     assert!(driven["drive"]["duration_s"] == 3.0 && driven["files"].as_array().unwrap().len() == 2, "{driven}");
     let demo = json(&["demo", "--vehicle", &car, "--drive", &drive, "-o", &folder.path("demo_drive")]);

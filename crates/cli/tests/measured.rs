@@ -163,7 +163,7 @@ fn a_misspelt_channel_is_named_before_what_the_shift_finder_lacks() {
     let output = wetclutch(&["inspect", &log, "--shifts", "--channel", "gear=Gaer"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(
-        stderr(&output).contains("there is no channel `Gaer`\nhint: `Gear` has a similar name"),
+        stderr(&output).contains("there is no channel `Gaer` for `channel.gear`\nhint: `Gear` has a similar name"),
         "{}",
         stderr(&output)
     );

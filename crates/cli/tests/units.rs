@@ -67,10 +67,11 @@ fn units_and_force_that_change_nothing_are_said() {
     let car = format!("{ROOT}vehicles/eight_speed.toml");
     let log = folder.write("log.csv", "time_s,turbine_speed_rad_s\n0,1\n0.1,2\n0.2,3\n");
     let table = folder.path("table.csv");
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 7] = [
         (&["sensitivity", "--json", "--units", "bar"], "--units has no effect: JSON has SI units"),
         (&["check", VEHICLE, "--json", "--units=bar"], "--units has no effect: JSON has SI units"),
         (&["convert", &log, "-o", &table, "--units", "bar"], "--units has no effect: files have SI units"),
+        (&["compare", VEHICLE, VEHICLE, "--units", "bar"], "--units has no effect: keys of files have SI units"),
         (&["check", VEHICLE, "--force"], "--force has no effect: no file is written"),
         (&["inspect", &log, "--force"], "--force has no effect: no file is written"),
         (

@@ -6,12 +6,15 @@ use drivetrain::Real;
 
 use crate::weights::NORMAL_95;
 
+/// Shifts of which a mean has an interval.
+const LEAST_SHIFTS: usize = 3;
+
 /// A mean error over shifts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanError {
     /// Over these shifts.
     pub value: f64,
-    /// Holds that over many such shifts in 95 %; none of one shift.
+    /// Holds that over many such shifts in 95 %; none of fewer than three shifts, which say nothing useful of their scatter.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -24,7 +27,8 @@ impl MeanError {
         let std_dev = (squares / (count - 1.0) / count).sqrt();
         // Of the logarithm: an error is not below zero.
         let half = student_95(count - 1.0) * std_dev / value;
-        let interval = (errors.len() > 1 && value > 0.0).then(|| [-half, half].map(|side| value * Real::exp(side)));
+        let within = || if value > 0.0 { [-half, half].map(|side| value * Real::exp(side)) } else { [value; 2] };
+        let interval = (errors.len() >= LEAST_SHIFTS).then(within);
         (!errors.is_empty()).then_some(Self { value, interval })
     }
 
@@ -60,8 +64,7 @@ fn student_95(degrees: f64) -> f64 {
         (5.0 * Real::powi(z, 5) + 16.0 * Real::powi(z, 3) + 3.0 * z) / 96.0,
         (3.0 * Real::powi(z, 7) + 19.0 * Real::powi(z, 5) + 17.0 * Real::powi(z, 3) - 15.0 * z) / 384.0,
     ];
-    // With one degree the series does not converge: the tangent that its distribution has.
-    if degrees < 1.5 { 12.7 } else { polynomials.iter().rev().fold(0.0, |sum, term| (sum + term) / degrees) + z }
+    polynomials.iter().rev().fold(0.0, |sum, term| (sum + term) / degrees) + z
 }
 
 #[cfg(test)]
@@ -70,9 +73,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_tables() {
-        for (degrees, quantile) in
-            [(1.0, 12.706), (2.0, 4.303), (3.0, 3.182), (5.0, 2.571), (10.0, 2.228), (60.0, 2.000)]
-        {
+        for (degrees, quantile) in [(2.0, 4.303), (3.0, 3.182), (5.0, 2.571), (10.0, 2.228), (60.0, 2.000)] {
             let found = student_95(degrees);
             assert!((found / quantile - 1.0).abs() < 0.04, "{degrees}: {found}");
         }
@@ -100,10 +101,12 @@ mod tests {
     }
 
     #[test]
-    fn one_shift_has_no_interval_and_none_has_no_error() {
+    fn few_shifts_have_no_interval_and_none_has_no_error() {
         assert_eq!(MeanError::of(&[]), None);
         let rms = MeanError::rms(&[4.0]).unwrap();
-        assert_eq!((rms.value, rms.interval, format!("{rms:.1}")), (2.0, None, "2.0".to_owned()));
-        assert_eq!(format!("{:.1}", MeanError::rms(&[4.0, 4.0]).unwrap()), "2.0 (95 % 2.0 to 2.0)");
+        assert_eq!((rms.value, rms.interval, MeanError::rms(&[4.0, 5.0]).unwrap().interval), (2.0, None, None));
+        assert_eq!(format!("{rms:.1}"), "2.0");
+        assert_eq!(format!("{:.1}", MeanError::rms(&[4.0; 3]).unwrap()), "2.0 (95 % 2.0 to 2.0)");
+        assert_eq!(format!("{:.1}", MeanError::rms(&[0.0; 3]).unwrap()), "0.0 (95 % 0.0 to 0.0)");
     }
 }

@@ -207,6 +207,9 @@ pub(crate) struct Held {
 
 /// Minimum standard deviation of the zero offset of a pressure sensor, Pa \[chosen: what a valve at rest may leave in an open clutch\].
 pub(crate) const OFFSET_FLOOR_PA: f64 = 500.0;
+/// The same of one that is fitted with the valve, Pa \[chosen\]: the noise of a current at zero, of which no reading is negative, opens the valve of the
+/// model.
+const OFFSET_BY_FIT_PA: f64 = 1e3;
 
 /// Minimum standard deviation of a parameter: what the model leaves out does not shrink with more shifts.
 pub(crate) fn floor(parameter: Parameter) -> f64 {
@@ -217,7 +220,7 @@ pub(crate) fn floor(parameter: Parameter) -> f64 {
         Parameter::Air => WIND,
         Parameter::WheelScale => 1e-4,
         Parameter::PressureScale => 1e-3,
-        Parameter::PressureOffset => OFFSET_FLOOR_PA / OFFSET_UNIT_PA,
+        Parameter::PressureOffset => OFFSET_BY_FIT_PA / OFFSET_UNIT_PA,
         _ if parameter.is_delay() => 0.3e-3 / DELAY_UNIT_S,
         _ => 0.005,
     }

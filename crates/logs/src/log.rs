@@ -315,13 +315,19 @@ impl Log {
             let name = channel.name.to_lowercase();
             name.contains(&wanted) || (!name.is_empty() && wanted.contains(&name))
         };
+        // As an abbreviation, whose letters stand in the name in their order.
+        let is_short_for = |channel: &&Channel| {
+            let mut letters = channel.name.chars().flat_map(char::to_lowercase);
+            wanted.chars().count() > 2 && wanted.chars().all(|wanted| letters.any(|letter| letter == wanted))
+        };
         let alike = || {
             let likeness =
                 |channel: &Channel| strsim::normalized_damerau_levenshtein(&channel.name.to_lowercase(), &wanted);
             let all = self.channels.iter().map(|channel| (likeness(channel), channel));
             all.filter(|(likeness, _)| *likeness >= ALIKE).max_by(|one, other| one.0.total_cmp(&other.0))
         };
-        if let Some(channel) = self.channels.iter().find(similar).or_else(|| Some(alike()?.1)) {
+        let all = || self.channels.iter();
+        if let Some(channel) = all().find(similar).or_else(|| all().find(is_short_for)).or_else(|| Some(alike()?.1)) {
             return format!("`{}` has a similar name", error::shown(&channel.name));
         }
         const MAXIMUM: usize = 12;

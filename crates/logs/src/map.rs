@@ -363,8 +363,15 @@ pub struct Resolved {
 
 impl Resolved {
     fn of(entry: &Mapped, log: &Log, gearbox: &Gearbox) -> Result<Self, LogError> {
-        let channels =
-            entry.names.iter().map(|name| log.find(name, entry.group.as_deref())).collect::<Result<Vec<_>, _>>()?;
+        // The message names the entry of the map, before its hint.
+        let named = |error| match error {
+            LogError::Map { message } => {
+                LogError::map(message.replacen('\n', &format!(" for `channel.{}`\n", entry.key()), 1))
+            }
+            other => other,
+        };
+        let found = entry.names.iter().map(|name| log.find(name, entry.group.as_deref()).map_err(named));
+        let channels = found.collect::<Result<Vec<_>, _>>()?;
         let units: Vec<&str> = channels.iter().map(|&i| log.channels()[i].unit.as_str()).collect();
         let text = match &entry.unit {
             Some(unit) => unit.clone(),

@@ -95,6 +95,9 @@ enum Fit {
 /// From so many commands of elements on they are those of a whole gearbox.
 const WHOLE_GEARBOX: usize = 3;
 
+/// Most letters of the name of an element; a solenoid has its number besides.
+const LONGEST_ELEMENT: usize = 3;
+
 /// The element whose valve has this command, or whose pressure is measured here, and the role; none if the channel is neither.
 fn element(channel: &Channel) -> Option<(Role, String)> {
     const ELEMENT: &[&str] = &["element", "brake", "bremse", "elem"];
@@ -122,7 +125,7 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
         _ => return None,
     };
     // `I_EDS_A`, `MV1`: the solenoid of an element, with the letter of the element or its own number.
-    const BANK: &[&str] = &["eds", "edc", "mv", "dr", "pcs", "ssv", "vbs", "nfs"];
+    const BANK: &[&str] = &["eds", "edc", "mv", "dr", "pcs", "ssv", "vbs", "nfs", "y", "druckregler", "regelventil"];
     // `I_A`, `I_K1`: a current and a letter, with or without a number.
     let is_lettered = match &words[..] {
         [i, letter, number @ ..] => {
@@ -150,14 +153,20 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
     };
     let mut named: Vec<&str> = words.iter().filter(is_name).map(String::as_str).collect();
     // The letter alone is the element; a number is one of its bank.
-    if named.len() > 1 && named.iter().any(|word| word.len() == 1 && word.starts_with(char::is_alphabetic)) {
+    let is_letter = |word: &&str| word.len() == 1 && word.starts_with(char::is_alphabetic) && !BANK.contains(word);
+    if named.len() > 1 && named.iter().any(is_letter) {
         named.retain(|word| !BANK.contains(word));
     }
     if named.len() > 1 && named.last().is_some_and(|word| UNITS.contains(word)) {
         named.pop();
     }
+    // `Druckregler_1`: a long word is the kind of all of them.
+    if named.len() > 1 {
+        named.retain(|word| word.len() <= LONGEST_ELEMENT || !BANK.contains(word));
+    }
     let name = named.concat();
-    (1..=3).contains(&name.len()).then_some((role, name))
+    let longest = if named.iter().any(|word| BANK.contains(word)) { LONGEST_ELEMENT + 2 } else { LONGEST_ELEMENT };
+    (1..=longest).contains(&name.len()).then_some((role, name))
 }
 
 /// The commands of the elements of a whole gearbox, and what is measured of their pressures: keys in a map, and channels. None if there are
@@ -189,17 +198,27 @@ fn elements(channels: &[Channel]) -> Vec<(String, usize)> {
     found
 }
 
-/// The channel with the fraction of the values of another one, whose name it has with a word more: `v` and `v_frac`.
+/// The channel with the fraction of the values of another one, whose name it has with another end: `v` and `v_frac`, `v_int` and `v_fract`.
 fn fraction_of(whole: usize, channels: &[Channel]) -> Option<usize> {
-    const FRACTION: &[&str] = &["frac", "fraction", "fract", "nachkomma", "nk", "dec", "decimals", "fine"];
+    const FRACTION: &[&str] = &["frac", "fraction", "fract", "nachkomma", "nk", "dec", "decimal", "decimals", "fine"];
+    // A unit, or what says that there are no decimals.
+    const ENDS: &[&str] = &["int", "integer", "vorkomma", "kmh", "kph", "mph", "rpm", "km", "h"];
     let channel = &channels[whole];
-    let of_whole = words(&channel.name);
+    let without_ends = |mut words: Vec<String>| {
+        while words.len() > 1 && words.last().is_some_and(|last| ENDS.contains(&&**last)) {
+            words.pop();
+        }
+        words
+    };
+    let of_whole = without_ends(words(&channel.name));
     let is_fraction = |other: &Channel| {
-        let mut of_other = words(&other.name);
+        let mut of_other = without_ends(words(&other.name));
         let last = of_other.pop();
+        let has_unit = other.unit == channel.unit || other.unit.trim().is_empty();
         last.is_some_and(|last| FRACTION.contains(&&*last))
-            && of_other == of_whole
-            && (&other.unit, &other.group) == (&channel.unit, &channel.group)
+            && without_ends(of_other) == of_whole
+            && has_unit
+            && other.group == channel.group
     };
     channels.iter().position(is_fraction)
 }
@@ -304,7 +323,13 @@ fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
 fn sum_of([whole, fraction]: [usize; 2], role: Role, channels: &[Channel]) -> String {
     let name = |at: usize| quoted(&channels[at].name);
     let both = format!("names = [{}, {}]\ncombine = \"sum\"\n", name(whole), name(fraction));
-    table_of(role.name(), role, whole, channels).replacen(&format!("name = {}\n", name(whole)), &both, 1)
+    let table = table_of(role.name(), role, whole, channels).replacen(&format!("name = {}\n", name(whole)), &both, 1);
+    let (unit, other) = (&channels[whole].unit, &channels[fraction].unit);
+    if unit == other {
+        return table;
+    }
+    // One without a unit has that of the other.
+    table.replace(&format!("# unit of the log: {}", error::shown(unit)), &format!("unit = {}", quoted(unit)))
 }
 
 /// The table of a channel that is per cent of a torque, as a comment: without a scale it would be wrong by a factor.

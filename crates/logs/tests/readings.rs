@@ -227,12 +227,17 @@ fn what_does_not_fit_says_what_to_do() {
         (
             "time_s,N_Eng [rpm]\n0,1\n1,2\n",
             "engine_speed=Eng",
-            "there is no channel `Eng`\nhint: `N_Eng` has a similar name",
+            "there is no channel `Eng` for `channel.engine_speed`\nhint: `N_Eng` has a similar name",
         ),
         (
             "time_s,gear,N_Eng [rpm]\n0,1,1\n1,2,1\n",
             "engine_speed=N_Egn",
-            "there is no channel `N_Egn`\nhint: `N_Eng` has a similar name",
+            "there is no channel `N_Egn` for `channel.engine_speed`\nhint: `N_Eng` has a similar name",
+        ),
+        (
+            "time_s,engine_share,engine_speed_rad_s\n0,1,1\n1,2,1\n",
+            "engine_speed=engine_spd",
+            "hint: `engine_speed_rad_s` has a similar name",
         ),
         (
             "time_s,n [rad/s]\n0,800\n1,2500\n",

@@ -97,6 +97,7 @@ fn shift_cells(shift: &Shift) -> Vec<(String, Cell<'_>)> {
         ("flare_rad_s", number(quality.flare_rad_s)),
         ("flare_half_interval_rad_s", number(quality.flare_half_rad_s)),
         ("jerk_m_s3", number(quality.jerk_m_s3)),
+        ("jerk_half_interval_m_s3", number(quality.jerk_half_m_s3)),
     ];
     cells.map(|(name, cell)| (name.to_owned(), cell)).into()
 }

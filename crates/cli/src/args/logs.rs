@@ -49,18 +49,18 @@ pub(crate) struct Inspect {
     #[arg(long)]
     pub(crate) shifts: bool,
     /// With --shifts: write a page of the drive, with its shifts, converter, engine torque and turbine torque
-    #[arg(short, long, value_name = "PAGE.html", requires = "shifts")]
+    #[arg(short, long, value_name = "PAGE.html", requires = "shifts", conflicts_with = "suggest")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) open: OpenOutput,
     /// With --shifts: write the fitted converter as a table of a vehicle file; needs the engine torque
-    #[arg(long, value_name = "OUT.toml", requires = "shifts")]
+    #[arg(long, value_name = "OUT.toml", requires = "shifts", conflicts_with = "suggest")]
     pub(crate) write_converter: Option<PathBuf>,
     /// Ratios of the forward gears, 1st first; they replace those of the map
-    #[arg(long, value_name = "R1,R2,...", value_delimiter = ',', requires = "shifts")]
+    #[arg(long, value_name = "R1,R2,...", value_delimiter = ',', requires = "shifts", conflicts_with = "suggest")]
     pub(crate) ratios: Vec<f64>,
-    /// Print the channels, or with --shifts the shifts, as JSON
-    #[arg(long, conflicts_with_all = ["suggest", "output"])]
+    /// Print the channels, with --shifts the shifts, or with --suggest the map, as JSON
+    #[arg(long, conflicts_with = "output")]
     pub(crate) json: bool,
 }
 

@@ -348,10 +348,8 @@ pub(crate) enum Command {
     #[command(verbatim_doc_comment)]
     Export(Export),
     /// Print completions for a shell
-    #[command(hide = true)]
     Completions(Completions),
     /// Write the manual pages into a folder
-    #[command(hide = true)]
     Man(Man),
 }
 

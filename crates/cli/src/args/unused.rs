@@ -19,7 +19,15 @@ impl Command {
     /// Why nothing is shown in units of choice.
     fn shows_no_units(&self) -> Option<&'static str> {
         match self {
-            Self::Convert(_) | Self::Export(_) | Self::Completions(_) | Self::Man(_) => Some("files have SI units"),
+            Self::Convert(_) | Self::Init(_) | Self::Export(_) | Self::Completions(_) | Self::Man(_) => {
+                Some("files have SI units")
+            }
+            Self::Compare(of)
+                if of.output.is_none()
+                    && [&of.a, &of.b].iter().all(|path| path.extension() == Some("toml".as_ref())) =>
+            {
+                Some("keys of files have SI units")
+            }
             _ if self.prints_json() && !self.writes_page() => Some("JSON has SI units"),
             _ => None,
         }

@@ -144,6 +144,7 @@ fn print_json(options: &Fit, found: &Fitted) -> Result<(), Failure> {
         "vehicle": options.vehicle.shown().to_string(),
         "fitted": options.output.shown().to_string(),
         "shifts": found.shifts,
+        "not_used": found.not_used,
         "given_values_kept_because": found.kept,
         "parameters": found.parameters.iter().map(parameter).collect::<Vec<_>>(),
         "channel_map": found.map_changes.iter().map(change).collect::<Vec<_>>(),

@@ -86,7 +86,11 @@ fn inspect_log(options: &Inspect, path: &Path) -> Result<Option<Value>, Failure>
             dbc.map(|dbc| std::path::absolute(dbc).unwrap_or_else(|_| dbc.clone()).to_string_lossy().into_owned());
         let by_names = logs::suggest(log.channels(), dbc.as_deref());
         let by_values = by_values(path, &by_names);
-        output::toml(format!("{by_names}{by_values}").trim_end())?;
+        let suggested = format!("{by_names}{by_values}");
+        if options.json {
+            return Ok(Some(json!({ "log": path.shown().to_string(), "channel_map": suggested })));
+        }
+        output::toml(suggested.trim_end())?;
         return Ok(None);
     }
     if options.shifts {
@@ -324,9 +328,12 @@ fn shifts(options: &Inspect, path: &Path, log: &mut Log, map: &ChannelMap) -> Re
             "gear signal s",
             "inertia phase s, 95 %",
             "flare rpm, 95 %",
-            "jerk m/s^3",
+            "jerk m/s^3, 95 %",
         ];
         output::table(3, titles.map(str::to_owned).to_vec(), found.iter().map(row).collect())?;
+        output::line(
+            "command and gear signal: to one row; phases: as uncertain as begin and end of the inertia phase",
+        )?;
     }
     if !has_command(map) {
         output::note("no valve command is mapped: shifts and speeds can be studied, a pressure cannot be estimated");
@@ -362,8 +369,6 @@ fn with_half(half: Option<f64>, digits: i32) -> String {
 
 fn row(shift: &Shift) -> Vec<String> {
     let time = |time_s: Option<f64>| time_s.map_or(String::new(), |time_s| format!("{time_s:.2}"));
-    let number =
-        |number: Option<f64>, digits: usize| number.map_or(String::new(), |number| format!("{number:.digits$}"));
     let phases: Vec<String> =
         shift.phases().iter().map(|(phase, [from_s, to_s])| format!("{} {:.2}", phase.name(), to_s - from_s)).collect();
     vec![
@@ -378,6 +383,9 @@ fn row(shift: &Shift) -> Vec<String> {
         shift.quality.flare_rad_s.map_or(String::new(), |flare| {
             format!("{:.0}{}", rpm(flare), with_half(shift.quality.flare_half_rad_s.map(rpm), 0))
         }),
-        number(shift.quality.jerk_m_s3, 1),
+        shift
+            .quality
+            .jerk_m_s3
+            .map_or(String::new(), |jerk| format!("{jerk:.1}{}", with_half(shift.quality.jerk_half_m_s3, 1))),
     ]
 }

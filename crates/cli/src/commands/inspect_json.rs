@@ -71,6 +71,7 @@ fn of_shift(shift: &Shift) -> Value {
         "flare_rad_s": quality.flare_rad_s,
         "flare_half_interval_rad_s": quality.flare_half_rad_s,
         "jerk_m_s3": quality.jerk_m_s3,
+        "jerk_half_interval_m_s3": quality.jerk_half_m_s3,
     })
 }
 

@@ -31,6 +31,8 @@ const COARSE: usize = 4;
 /// Errors beyond so many scales count less.
 const HUBER: f64 = 2.0;
 const ITERATIONS: u32 = 4;
+/// Standard deviation of capacities and inertia by what the equations leave out, as a fraction \[chosen\]: rates over 20 ms, drag, one delay of the torque.
+const MODEL: f64 = 0.015;
 /// Standard deviation of the delay before the fit, s \[chosen\].
 const DELAY_SD_S: f64 = 0.1;
 /// Inertia that is expected, kg m^2, and its standard deviation \[chosen: passenger cars\]. It counts where the log has no change of speed.
@@ -101,7 +103,7 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     let knot = |(i, &speed_ratio): (usize, &f64)| Knot {
         speed_ratio,
         capacity_n_m_s2: solution.unknowns[i],
-        sd_n_m_s2: Real::hypot(sd[i], bends[i]),
+        sd_n_m_s2: Real::hypot(Real::hypot(sd[i], bends[i]), MODEL * solution.unknowns[i].abs()),
         time_s: per_moment_s * fractions(&some, &knots, i),
     };
     let all: Vec<Knot> = knots.iter().enumerate().map(knot).collect();
@@ -110,7 +112,7 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     Ok(ConverterFit {
         knots: all.into_iter().chain([coupled]).collect(),
         inertia_kg_m2: solution.unknowns[knots.len()],
-        inertia_sd_kg_m2: sd[knots.len()],
+        inertia_sd_kg_m2: Real::hypot(sd[knots.len()], MODEL * solution.unknowns[knots.len()].abs()),
         delay_s,
         // The delay is searched in steps.
         delay_sd_s: Real::hypot(sd[knots.len() + 1], DELAY_STEP_S / 12.0_f64.sqrt()),

@@ -58,6 +58,8 @@ pub struct ShiftQuality {
     pub inertia_half_s: Option<f64>,
     /// Jerk of the car, m/s^3, as [`drivetrain::jerk`] defines it.
     pub jerk_m_s3: Option<f64>,
+    /// Half of its interval of 95 %, m/s^3.
+    pub jerk_half_m_s3: Option<f64>,
 }
 
 /// A shift between two forward gears.

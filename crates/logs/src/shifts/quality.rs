@@ -46,12 +46,26 @@ pub(super) fn quality(
 ) -> ShiftQuality {
     let [inertia_half_s, flare_half_rad_s] = halves(shift, points);
     let flare_rad_s = flare(shift, ratios, points);
+    let jerk_m_s3 = jerk(shift, tracks, output_rad_per_m, |_| true);
     ShiftQuality {
         flare_rad_s,
         flare_half_rad_s: flare_half_rad_s.filter(|_| flare_rad_s.is_some()),
         inertia_half_s,
-        jerk_m_s3: jerk(shift, tracks, output_rad_per_m),
+        jerk_m_s3,
+        jerk_half_m_s3: jerk_m_s3.and_then(|_| jerk_half(shift, tracks, output_rad_per_m)),
     }
+}
+
+/// Half of the interval of 95 % of the jerk, m/s^3, by the jackknife: the jerk without each part of the readings.
+fn jerk_half(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Option<f64> {
+    const PARTS: usize = 6;
+    /// Of Student's distribution with five degrees of freedom.
+    const SIDES: f64 = 2.571;
+    let without = |part: usize| jerk(shift, tracks, output_rad_per_m, move |at| at % PARTS != part);
+    let jerks: Vec<f64> = (0..PARTS).map(without).collect::<Option<_>>()?;
+    let mean = jerks.iter().sum::<f64>() / PARTS as f64;
+    let squares: f64 = jerks.iter().map(|jerk| Real::powi(jerk - mean, 2)).sum();
+    Some(SIDES * (squares * (PARTS as f64 - 1.0) / PARTS as f64).sqrt())
 }
 
 /// Half of the intervals of 95 % of the times of the inertia phase, s, and of the flare, rad/s: by the scatter of the ratio before and after the
@@ -101,8 +115,8 @@ fn flare(shift: &Shift, ratios: &[f64], points: &RatioWatch) -> Option<f64> {
     above.reduce(f64::max).map(|maximum| maximum.max(0.0))
 }
 
-/// The jerk of a shift, by the definition of [`drivetrain::jerk`].
-fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Option<f64> {
+/// The jerk of a shift, by the definition of [`drivetrain::jerk`], from the readings whose number in their order is taken.
+fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>, takes: impl Fn(usize) -> bool) -> Option<f64> {
     /// Time around the shift, s.
     const AROUND_S: f64 = 0.3;
     let track = |role: Role| Some(&tracks[role as usize]).filter(|track| !track.is_empty());
@@ -114,7 +128,10 @@ fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Optio
         _ => return None,
     };
     let around_s = AROUND_S + 0.5 * WINDOW_S;
-    let points = || track.between(shift.start_s() - around_s, shift.end_s() + around_s);
+    let points = || {
+        let all = track.between(shift.start_s() - around_s, shift.end_s() + around_s).enumerate();
+        all.filter(|(at, _)| takes(*at)).map(|(_, point)| point)
+    };
     if acceleration.is_none() {
         return peak_jerk_m_s3(points().map(|(time_s, value)| (time_s, factor * value)));
     }

@@ -254,6 +254,13 @@ fn solenoids_by_the_letter_of_their_element_or_their_number_are_commands() {
     let lettered = ["I_EDS_A", "I_EDS_B", "I_EDS_C", "I_EDS_D", "I_EDS_E"];
     assert_eq!(keys(&lettered), ["a", "b", "c", "d", "e"].map(|name| format!("element_{name}_current")));
     assert_eq!(keys(&["MV1", "MV2", "DR2"]), ["dr2", "mv1", "mv2"].map(|name| format!("element_{name}_current")));
+    let numbered = [["EDS1_I", "EDS2_I", "EDS3_I"], ["EDS_1", "EDS_2", "EDS_3"]];
+    for names in numbered {
+        assert_eq!(keys(&names), ["1", "2", "3"].map(|number| format!("element_eds{number}_current")));
+    }
+    assert_eq!(keys(&["Y1", "Y2", "Y3"]), ["1", "2", "3"].map(|number| format!("element_y{number}_current")));
+    let long = ["Druckregler_1_Strom", "Druckregler_2_Strom", "Druckregler_3_Strom"];
+    assert_eq!(keys(&long), ["1", "2", "3"].map(|number| format!("element_{number}_current")));
     assert_eq!(keys(&["EDS_Line", "MV_TCC", "DR_Main"]), [""; 0]);
 }
 
@@ -263,6 +270,16 @@ fn a_speed_in_two_channels_is_their_sum() {
     let text = suggest(&channels, None);
     let both = "[channel.vehicle_speed]\nnames = [\"VehicleSpeed\", \"VehicleSpeed_frac\"]\ncombine = \"sum\"\n# unit of the log: km/h\n";
     assert!(text.contains(both) && !text.contains("not used"), "{text}");
+    for (whole, fraction, unit) in [
+        ("Vehicle_Speed", "Vehicle_Speed_Fraction", ""),
+        ("Vehicle Speed (km/h)", "Vehicle Speed (fraction)", "km/h"),
+        ("VehSpd_Int", "VehSpd_Fract", "km/h"),
+        ("VSS_kmh", "VSS_decimal", ""),
+    ] {
+        let text = suggest(&[channel(whole, "km/h"), channel(fraction, unit)], None);
+        assert!(text.contains(&format!("names = [\"{whole}\", \"{fraction}\"]\ncombine = \"sum\"")), "{text}");
+        assert!(text.contains(if unit.is_empty() { "\nunit = \"km/h\"" } else { "# unit of the log: km/h" }), "{text}");
+    }
     // Of another unit it is another signal.
     let other = suggest(&[channel("VehicleSpeed_frac", "m/s"), channel("VehicleSpeed", "km/h")], None);
     assert!(!other.contains("sum"), "{other}");

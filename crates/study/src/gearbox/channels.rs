@@ -247,7 +247,8 @@ fn entry_of(entry: &Mapped, car: &Car, tables: &ShiftTables<f64>) -> Result<Entr
         };
         let names = names.iter().map(|name| key_of(name)).collect::<Vec<_>>().join(", ");
         return Err(LogError::map(format!(
-            "the channel map has {}, which is no clutch or brake of this gearbox\nhint: the {what} are {names}",
+            "the channel map has {}, which is no clutch or brake of this gearbox\nhint: rename `[channel.{}]` to the key of its element; the {what} are {names}",
+            entry.key(),
             entry.key()
         )));
     };

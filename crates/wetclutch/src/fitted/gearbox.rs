@@ -46,7 +46,7 @@ pub(super) fn fit(
     let tables = LoggedDrive::tables(file, sensors)?;
     let recorded = record((file, &tables), logs, options, progress, say)?;
     say_reasons("not used", &recorded.skipped, say);
-    let Recorded { shifts, driving, .. } = recorded;
+    let Recorded { shifts, driving, skipped: not_used, .. } = recorded;
     let (fitted_shifts, held_out) = divided(shifts);
     if fitted_shifts.is_empty() {
         return Err(no_shift(file, logs));
@@ -81,6 +81,7 @@ pub(super) fn fit(
         map_changes: found.map_changes(),
         statements: statements.chain([checked.as_ref().map_or_else(nothing_held_out, said_of)]).collect(),
         shifts: found.shifts,
+        not_used,
         kept,
         page: None,
     };
@@ -163,10 +164,11 @@ fn said_of(checked: &HeldOut) -> String {
     /// Scale of the valves' errors below which the speeds may add nothing to what the valves say, as simulated cars show.
     const GOOD_VALVES: f64 = 0.7;
     let [given, fitted] = checked.turbine_rad_s;
+    let few = if given.interval.is_none() { ", too few for intervals" } else { "" };
     let scale = checked.valve_error_scale;
     let [low, high] = checked.valve_error_interval();
     let mut text = format!(
-        "{} shifts held out: error of the turbine speed while both clutches slip {given:.2} rad/s with the given file, \
+        "{} shifts held out{few}: error of the turbine speed while both clutches slip {given:.2} rad/s with the given file, \
          {fitted:.2} rad/s with the fitted one, which is better in {}\n\
          with this file the torques of these shifts by the valve models have {scale:.2} (95 % {low:.2} to {high:.2}) of the error that its bounds of friction and valves allow; `estimate` \
          uses this factor (`error_bounds.valve_error_scale`)",

@@ -94,6 +94,8 @@ pub struct Fitted {
     pub statements: Vec<String>,
     /// How many shifts were fitted.
     pub shifts: usize,
+    /// Shifts that were not used or not fitted, and why.
+    pub not_used: Vec<String>,
     /// Why the given values are kept, if they are.
     pub kept: Option<String>,
     /// The page of the fit, as HTML, if it was asked for.

@@ -55,6 +55,7 @@ pub(super) fn fit(
         channels: found.channels.iter().map(|(channel, errors)| said_of_channel(*channel, errors)).collect(),
         statements: [found.statements(), vec![kinds, said_of(checked.as_ref())]].concat(),
         shifts: found.shifts,
+        not_used: [collected.skipped, found.unusable.clone()].concat(),
         kept,
         page: None,
     };
@@ -117,8 +118,9 @@ fn no_shift(vehicle: &Vehicle, logs: &[LogInput<'_>], kinds: &str) -> Error {
 fn said_of(checked: Option<&HeldOut>) -> String {
     let Some(checked) = checked else { return nothing_held_out() };
     let [given, fitted] = checked.turbine_rad_s;
+    let few = if given.interval.is_none() { ", too few for intervals" } else { "" };
     let mut text = format!(
-        "{} shifts held out: one-step error of the turbine speed {given:.3} rad/s with the given file, {fitted:.3} rad/s with the fitted one",
+        "{} shifts held out{few}: one-step error of the turbine speed {given:.3} rad/s with the given file, {fitted:.3} rad/s with the fitted one",
         checked.shifts
     );
     if let Some([given, fitted]) = checked.pressure_pa.map(|errors| errors.map(|error| error.map(|pa| 1e-3 * pa))) {
