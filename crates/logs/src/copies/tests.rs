@@ -4,10 +4,15 @@ use super::*;
 
 /// The rows in which a speed is withdrawn, of engine and turbine every 10 ms.
 fn found(speeds: impl Fn(u32) -> [f64; 2]) -> Vec<(u32, Role, f64)> {
+    found_every(0.01, speeds)
+}
+
+/// The same in rows so far apart, s.
+fn found_every(step_s: f64, speeds: impl Fn(u32) -> [f64; 2]) -> Vec<(u32, Role, f64)> {
     let mut copies = Copies::new();
     let mut all = Vec::new();
     for row in 0..600 {
-        let (time_s, [engine, turbine]) = (0.01 * f64::from(row), speeds(row));
+        let (time_s, [engine, turbine]) = (step_s * f64::from(row), speeds(row));
         assert_eq!(copies.push(Role::EngineSpeed, [engine, time_s], false), [None; 2]);
         let copy = copies.push(Role::TurbineSpeed, [turbine, time_s], false);
         all.extend(copy.into_iter().flatten().map(|(role, [right, _])| (row, role, right)));
@@ -33,6 +38,18 @@ fn a_channel_that_shows_the_speed_next_to_it_is_found_by_its_digits() {
         });
         assert_eq!(rows.iter().map(|(row, ..)| *row).collect::<Vec<_>>(), (202..300).collect::<Vec<_>>());
         assert!(rows.iter().all(|(_, found, right)| *found == role && *right == apart(199)[which]), "{rows:?}");
+    }
+}
+
+/// Times that are products, or are read from a file, are up to a rounding more than 50 ms apart.
+#[test]
+fn rows_at_20_hz_are_close_enough_whatever_the_last_digits_of_their_times_are() {
+    for from in 200..240 {
+        let rows = found_every(0.05, |row| {
+            let [engine, turbine] = apart(row);
+            [if (from..from + 40).contains(&row) { turbine } else { engine }, turbine]
+        });
+        assert!(rows.len() >= 38 && rows.iter().all(|(_, role, _)| *role == Role::EngineSpeed), "{from}: {rows:?}");
     }
 }
 
