@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use trace::units::Scale;
 use trace::{Quantity, ShownPath as _, Unit};
 
 use crate::{Channel, Log, LogError, OpenOptions, Role, TimeColumn, csv_log, error};
@@ -356,7 +357,7 @@ pub struct Resolved {
     /// The unit as it is used, for messages.
     pub unit_name: String,
     /// What a value in the unit is multiplied by.
-    size: f64,
+    size: Scale,
     /// What is added after that.
     zero: f64,
 }
@@ -387,7 +388,7 @@ impl Resolved {
         };
         let (unit_name, size, zero) =
             conversion(entry, &text, &log.channels()[channels[0]], gearbox).map_err(LogError::map)?;
-        Ok(Self { entry: entry.clone(), channels, unit_name, size, zero })
+        Ok(Self { entry: entry.clone(), channels, unit_name, size: Scale::of(size), zero })
     }
 
     /// A value in the channel's unit, scale and offset applied.
@@ -397,7 +398,7 @@ impl Resolved {
 
     /// A value of [`Self::in_unit`] in the unit of the role.
     pub fn in_si(&self, value: f64) -> f64 {
-        value * self.size + self.zero
+        self.size.of_value(value) + self.zero
     }
 }
 

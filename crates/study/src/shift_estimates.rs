@@ -262,7 +262,7 @@ pub const COLUMNS: &[Column] = &[
         })
     }),
     ("of_vehicle", |s| Cell::Word(if s.of_vehicle { "yes" } else { "no" })),
-    ("end_s", |s| Cell::Number(s.end_s())),
+    ("end_s", |s| number(Some(s.end_s()))),
     ("command_s", |s| number(s.shift.command_s)),
     ("gear_signal_s", |s| number(s.shift.gear_s)),
     ("ratio_begin_s", |s| number(s.shift.inertia_s.map(|inertia_s| inertia_s[0]))),
@@ -298,7 +298,7 @@ pub const COLUMNS: &[Column] = &[
 ];
 
 fn number(value: Option<f64>) -> Cell<'static> {
-    Cell::Number(value.unwrap_or(f64::NAN))
+    Cell::Number(trace::rounded(value.unwrap_or(f64::NAN)))
 }
 
 fn estimated(shift: &ShiftEstimate, value: fn(&EstimatedShift) -> Option<f64>) -> Cell<'static> {

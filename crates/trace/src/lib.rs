@@ -47,7 +47,7 @@ pub use not_in_browser::{MdfWriter, ParquetWriter};
 #[cfg(not(target_family = "wasm"))]
 pub use parquet_file::{ParquetWriter, write_parquet};
 pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
-pub use shown::{ShownPath, is_unprintable, plain_type, printable, toml_number, toml_string};
+pub use shown::{ShownPath, is_unprintable, plain_type, printable, rounded, toml_number, toml_string};
 pub use shown_units::{ShownUnits, quantity};
 pub use table::{ColumnKind, TableFormat, TableWriter};
 pub use table_rows::TableRows;

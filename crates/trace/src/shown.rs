@@ -104,6 +104,22 @@ impl Display for Lossy<'_> {
     }
 }
 
+/// A number of a table of summaries with twelve digits, so that a difference of two times is 0.8 and not 0.8000000000000007; a size below 1e-9, which no
+/// quantity in SI has that is not zero, is zero. One above ten million stays: it is a time on a clock.
+///
+/// ```
+/// assert_eq!([0.8000000000000007, 1413999.9999999995, 5.7e-14, 1715883410.0123].map(trace::rounded), [0.8, 1414000.0, 0.0, 1715883410.0123]);
+/// ```
+pub fn rounded(value: f64) -> f64 {
+    const SMALLEST: f64 = 1e-9;
+    const LARGEST: f64 = 1e7;
+    match value.abs() {
+        size if size < SMALLEST => 0.0,
+        size if size < LARGEST => format!("{value:.11e}").parse().unwrap_or(value),
+        _ => value,
+    }
+}
+
 /// A number with five digits as TOML has it.
 pub fn toml_number(value: f64) -> String {
     const DIGITS: i32 = 5;

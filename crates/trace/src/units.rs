@@ -30,6 +30,40 @@ pub fn to_si(name: &str) -> (String, f64) {
     (name, 1.0)
 }
 
+/// What brings a value in a unit to SI. The size of a unit such as 0.001 is no binary fraction: a value over 1000 is the number as people write it,
+/// 1.019 A for 1019 mA.
+///
+/// ```
+/// use trace::units::Scale;
+///
+/// assert_eq!(Scale::of(1e-3).of_value(1019.0), 1.019);
+/// assert_eq!(Scale::of(1e5).of_value(3.0), 3e5);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    times: f64,
+    over: f64,
+}
+
+impl Scale {
+    /// Of the size of a unit in SI.
+    pub fn of(size: f64) -> Self {
+        let over = size.recip().round();
+        if size < 1.0 && over.recip() == size { Self { times: 1.0, over } } else { Self { times: size, over: 1.0 } }
+    }
+
+    /// The value in SI.
+    #[inline]
+    pub fn of_value(self, value: f64) -> f64 {
+        value * self.times / self.over
+    }
+
+    /// The size of the unit.
+    pub fn size(self) -> f64 {
+        self.of_value(1.0)
+    }
+}
+
 /// What a unit measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
@@ -69,7 +103,7 @@ pub struct Unit {
 impl Unit {
     /// A value of this unit in the unit of the quantity.
     pub fn to_si(&self, value: f64) -> f64 {
-        value * self.size + self.zero
+        Scale::of(self.size).of_value(value) + self.zero
     }
 
     /// The unit with this name. Spaces, brackets and multiplication signs are ignored; capitals count only where two units

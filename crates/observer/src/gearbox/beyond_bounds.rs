@@ -9,7 +9,7 @@
 //! d = sum(w e)/n      s^2 = 1/n + beta      n = sum(w w)
 //! ```
 //!
-//! with the variance `beta` of what all shifts have wrong alike ([`super::systematic`]), times the square of how much wider than usual the bounds
+//! with the variance `beta` of what all shifts have wrong alike, as in [`super::systematic`], times the square of how much wider than usual the bounds
 //! of the elements are: hysteresis, offsets of commands and the curvature of the models are as large as these allow. A quantity is beyond its bound where `d` exceeds it by
 //! [`CERTAIN`] times `s`. The cause that is named is the most likely one of those with a size beyond their bounds, where sizes have the standard
 //! deviation `c` ([`BEYOND`]) beforehand: so a cause that needs an unlikely size is none. By the logarithm of the likelihood that is
@@ -24,7 +24,6 @@ use super::learnt::{
     ACTING, Acting, DELAY_AT, INERTIA_AT, KISS_AT, LAG_AT, LEARNT, STIFFNESS_AT, Shown, TURBINE_AT, edge,
 };
 use super::powertrain::dot;
-use super::systematic::variance_in_common;
 use super::{FrictionElement, GearboxFilter, GearboxState, MAX_ELEMENTS};
 
 /// Hypotheses beside the quantities themselves: torque factors, kiss points, lags and delays of all elements alike.
@@ -38,7 +37,13 @@ const KEPT: f64 = 0.97;
 const SHIFTS: u8 = 2;
 /// Evidence below which nothing follows.
 const LEAST: f64 = 0.05;
-/// Variance of the scale of all torques that the shifts have wrong alike, of 8 % \[chosen\], in that of the stiffness unlearnt.
+/// Variance `beta` of what all shifts have wrong alike, in that of the quantity unlearnt \[chosen: none of thirty drives of cars within usual bounds is
+/// beyond\]: smaller than what is said of a car allows, as the innovation has the whole budget. Of the scale of all torques 8 %.
+const OF_FACTOR: f64 = 0.5;
+const OF_KISS: f64 = 0.15;
+const OF_INERTIA: f64 = 1.0;
+const OF_LAG: f64 = 0.15;
+const OF_DELAY: f64 = 0.8;
 const OF_STIFFNESS: f64 = 0.5;
 /// Standard deviation of a quantity beyond its bound, in that within it \[chosen\].
 const BEYOND: f64 = 4.0;
@@ -191,8 +196,12 @@ fn place(k: usize) -> usize {
 /// Variance of the error that all shifts have in common of what they show of it: of one element by its own bounds, of others by the widest.
 fn in_common<T: Real>(k: usize, widths: &[T; MAX_ELEMENTS]) -> T {
     let variance = match place(k) {
+        0..KISS_AT => OF_FACTOR,
+        KISS_AT..INERTIA_AT => OF_KISS,
         STIFFNESS_AT => OF_STIFFNESS,
-        other => variance_in_common(other),
+        INERTIA_AT..LAG_AT => OF_INERTIA,
+        LAG_AT..DELAY_AT => OF_LAG,
+        _ => OF_DELAY,
     };
     let of_one = ALIKE.into_iter().find(|first| (*first..first + MAX_ELEMENTS).contains(&k));
     let own = of_one.and_then(|first| widths.get(k - first).copied());

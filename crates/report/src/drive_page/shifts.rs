@@ -273,7 +273,7 @@ fn health((worst, fraction): (Health, f64)) -> String {
 pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'a>)> {
     let [offgoing, oncoming] = clutch_names(shift, car);
     let quality = &shift.quality;
-    let number = |name: &str, value: f64| (name.to_owned(), Cell::Number(value));
+    let number = |name: &str, value: f64| (name.to_owned(), Cell::Number(trace::rounded(value)));
     let word = |name: &str, word: &'a str| (name.to_owned(), Cell::Word(word));
     let mut cells = vec![
         ("number".to_owned(), Cell::Whole(shift.number as u64)),

@@ -17,6 +17,7 @@ pub use records::{LONGEST_ROW, RecordError, Records};
 pub use rows::{CsvRows, number};
 pub use writer::{Cell, CsvWriter};
 
+use crate::units::Scale;
 use crate::{Column, Trace, TraceError, Values, WholeFile, Word};
 
 /// Reads a whole comma-separated file, see [`CsvRows`]; a column with other text than numbers holds words.
@@ -36,8 +37,8 @@ pub fn read_csv(path: &Path) -> Result<Trace, TraceError> {
         }
     }
     let column = |(&place, cells): (&usize, Cells)| {
-        let (name, factor) = &rows.columns[place];
-        Column { name: name.clone(), values: cells.into_values(*factor) }
+        let (name, scale) = &rows.columns[place];
+        Column { name: name.clone(), values: cells.into_values(*scale) }
     };
     Ok(Trace { path: Some(path.to_owned()), time_s, columns: places.iter().zip(cells).map(column).collect() })
 }
@@ -92,10 +93,10 @@ impl Cells {
         }
     }
 
-    fn into_values(self, factor: f64) -> Values {
+    fn into_values(self, scale: Scale) -> Values {
         match self.words {
             Some(words) => Values::Words(words.into_iter().map(Word::from).collect()),
-            None => Values::Numbers(self.numbers.into_iter().map(|number| number * factor).collect()),
+            None => Values::Numbers(self.numbers.into_iter().map(|number| scale.of_value(number)).collect()),
         }
     }
 }

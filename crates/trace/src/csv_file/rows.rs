@@ -12,6 +12,7 @@ use super::decimal;
 use super::records::{LONGEST_ROW, RecordError, Records};
 use super::source::{Source, TableSource};
 use crate::error::TIME_BY_MAP;
+use crate::units::Scale;
 use crate::{TableRows, TraceError, signal, text, units};
 
 /// A comma-separated file, or a table in memory, that is read row by row. The first row of a file names the columns; `time_s` (or `time_ms`) must be among
@@ -20,7 +21,7 @@ pub struct CsvRows {
     path: PathBuf,
     source: Source,
     /// Name in SI, and the factor that brings the cells there.
-    pub(super) columns: Vec<(String, f64)>,
+    pub(super) columns: Vec<(String, Scale)>,
     pub(super) time_at: usize,
     time_s: Option<f64>,
     /// Whether a last line without an end may have been cut, and what became of it.
@@ -67,7 +68,8 @@ impl CsvRows {
         if names.is_empty() {
             return Err(TraceError::Table { path: rows.path, message: "the file is empty".to_owned() });
         }
-        rows.columns = names.iter().map(|name| units::to_si(name)).collect();
+        let in_si = |(name, size): (String, f64)| (name, Scale::of(size));
+        rows.columns = names.iter().map(|name| in_si(units::to_si(name))).collect();
         rows.refuse_twins(&names)?;
         rows.time_at = rows.require(signal::TIME)?;
         Ok(rows)
@@ -88,7 +90,7 @@ impl CsvRows {
             }
             let (name, factor) = &mut self.columns[tread];
             signal::WHEEL_SPEED.clone_into(name);
-            *factor /= wheel_radius_m;
+            *factor = Scale::of(factor.size() / wheel_radius_m);
         }
         Ok(self)
     }
@@ -207,7 +209,7 @@ impl CsvRows {
 
     /// What the cells of a column are multiplied by: 1 where the name has its unit in SI.
     pub fn factor(&self, column: usize) -> f64 {
-        self.columns[column].1
+        self.columns[column].1.size()
     }
 
     /// The number in a column of this row, in SI; NaN where the cell is empty.
@@ -218,14 +220,14 @@ impl CsvRows {
     pub fn number(&self, column: usize) -> Result<f64, TraceError> {
         match self.source.number(column) {
             None => Err(self.not_a_number(column)),
-            Some(number) => Ok(number * self.columns[column].1),
+            Some(number) => Ok(self.columns[column].1.of_value(number)),
         }
     }
 
     /// The same, and none where the cell holds something else.
     #[inline]
     pub fn number_or_none(&self, column: usize) -> Option<f64> {
-        self.source.number(column).map(|number| number * self.columns[column].1)
+        self.source.number(column).map(|number| self.columns[column].1.of_value(number))
     }
 
     /// Names of the columns, in SI.
