@@ -197,7 +197,7 @@ impl ElementErrors {
         let others = [
             self.valve_delay() / usual.valve_delay(),
             self.valve_hysteresis_pa / usual.valve_hysteresis_pa,
-            self.command / (COMMAND * self.command_max / COMMAND_ROOM),
+            self.command / (COMMAND * self.command_max),
         ];
         factors.into_iter().chain(others).filter(|width| width.is_finite()).fold(1.0, f64::max)
     }

@@ -100,7 +100,6 @@ pub(super) fn contain_vehicle(check: &Check<'_>, raw: &RawErrorBounds, vehicle: 
     let stated = (bounds.valve_delay_s, &raw.valve_delay_s);
     contain_delay(check, "design.error_bounds.valve_delay_s", stated, &oncoming.valve)?;
     let outside = |key: &str, at: usize, (message, hint): (String, String)| {
-        let message = format!("{message}: the car of this file would be outside its own error bounds");
         Err(check.meaning(format_args!("design.error_bounds.{key}"), at, message, Some(hint)))
     };
     let full = plausible::full_command(&oncoming.valve).min(settings.command_max);
@@ -108,7 +107,7 @@ pub(super) fn contain_vehicle(check: &Check<'_>, raw: &RawErrorBounds, vehicle: 
     let pressure_max_pa = bounds.pressure_max_pa;
     if pressure_max_pa < highest_pa {
         let message = format!(
-            "{pressure_max_pa} Pa is less than the {highest_pa:.0} Pa that the valve of this file gives at its largest command"
+            "{pressure_max_pa} Pa is less than the {highest_pa:.0} Pa that the valve of this file gives at its largest command: the car of this file would be outside its own error bounds"
         );
         let hint = format!("{:.0} with the largest gain of the bounds", highest_pa * bounds.valve_gain_factor[1]);
         return outside("pressure_max_pa", raw.pressure_max_pa.span().start, (message, hint));
@@ -120,7 +119,7 @@ pub(super) fn contain_vehicle(check: &Check<'_>, raw: &RawErrorBounds, vehicle: 
                 return Ok(());
             }
             let message = format!(
-                "{least_pa} to {greatest_pa} does not contain the line pressure of the valve in this file, {own_pa} Pa"
+                "{least_pa} to {greatest_pa} does not contain the line pressure of the valve in this file, {own_pa} Pa: the car of this file would be outside its own error bounds"
             );
             let hint = format!("[{}, {}] contains it", least_pa.min(own_pa), greatest_pa.max(own_pa));
             outside("line_pressure_pa", given.span().start, (message, hint))
