@@ -104,7 +104,13 @@ pub(crate) fn one_clock<'c>(
         // Digits are few at the beginning of a log.
         const RATE: f64 = 0.05;
         let is_rate = |(one, own): (f64, f64)| (one - own).abs() > RATE * own;
-        let is_other = has_name || span_s(other).zip(span_s(time)).is_some_and(is_rate);
+        // `t_Shift [ms]` beside `t_Log [s]` may as well be a duration: a clock goes about as fast as another one.
+        const LIKE_A_CLOCK: std::ops::RangeInclusive<f64> = 0.2..=5.0;
+        let spans = span_s(other).zip(span_s(time));
+        let is_other = match are_of_signals(names, time, other) {
+            true => spans.is_some_and(|(one, own)| LIKE_A_CLOCK.contains(&(one / own))),
+            false => has_name || spans.is_some_and(is_rate),
+        };
         let row = (0..rows.len()).find(|&row| !is_same(row, other)).filter(|_| is_other)?;
         Some((row, other))
     };
@@ -138,11 +144,15 @@ pub(crate) fn may_be_time(names: &[(String, String)], time: usize, other: usize)
         Some(_) => base_name(name) == base,
         None => *name == names[time].0,
     };
-    let has_name =
-        has_name || time_of_signal(&names[time]).is_some_and(|word| time_of_signal(&names[other]) == Some(word));
+    let has_name = has_name || are_of_signals(names, time, other);
     let name = name.to_lowercase();
     let is_named = ["time", "zeit", "stamp"].iter().any(|word| name.contains(word));
     (has_name || is_named).then_some(has_name)
+}
+
+/// Whether two columns are each called the time of a signal, in the same way.
+fn are_of_signals(names: &[(String, String)], time: usize, other: usize) -> bool {
+    time_of_signal(&names[time]).is_some_and(|word| time_of_signal(&names[other]) == Some(word))
 }
 
 /// The word for time before the name of a signal, as in `t_Eng [ms]`: the time of that signal alone.

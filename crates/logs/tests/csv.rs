@@ -166,6 +166,13 @@ fn a_table_with_a_time_for_each_signal_is_refused() {
         let same = format!("{one};N [rpm];{other};M [rpm]\n0.00;1500;0;1400\n0.01;1501;0.010;1401\n");
         assert_eq!(values(&folder, &same, "N").map(|found| found.0), Ok(vec![1500.0, 1501.0]), "{one} {other}");
     }
+    // A duration with such a name is none.
+    for shift_ms in [[200, 200, 200], [300, 301, 302]] {
+        let row = |(i, ms): (usize, u32)| format!("0.0{i};1500;{ms};1400\n");
+        let rows: String = shift_ms.into_iter().enumerate().map(row).collect();
+        let text = format!("t_Log [s];N [rpm];t_Shift [ms];M [rpm]\n{rows}");
+        assert_eq!(values(&folder, &text, "N").map(|found| found.0), Ok(vec![1500.0; 3]), "{text}");
+    }
     let in_ms = "Time [s];N [rpm];Time [ms];M [rpm]\n0.00;1500;0;1400\n0.03;1501;30;1401\n";
     assert_eq!(values(&folder, in_ms, "N").map(|found| found.0), Ok(vec![1500.0, 1501.0]));
     // A signal of one clock ends before that of the other.
