@@ -7,7 +7,7 @@ use drivetrain::Real;
 use crate::weights::NORMAL_95;
 
 /// Shifts of which a mean has an interval.
-const LEAST_SHIFTS: usize = 3;
+const MIN_SHIFTS: usize = 3;
 
 /// A mean error over shifts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +28,7 @@ impl MeanError {
         // Of the logarithm: an error is not below zero.
         let half = student_95(count - 1.0) * std_dev / value;
         let within = || if value > 0.0 { [-half, half].map(|side| value * Real::exp(side)) } else { [value; 2] };
-        let interval = (errors.len() >= LEAST_SHIFTS).then(within);
+        let interval = (errors.len() >= MIN_SHIFTS).then(within);
         (!errors.is_empty()).then_some(Self { value, interval })
     }
 

@@ -367,6 +367,16 @@ fn jerk_is_the_second_derivative_of_the_speed() {
         assert_eq!(gears(&shifts), [(2, 3)]);
         let jerk = shifts[0].quality.jerk_m_s3.unwrap();
         assert!((jerk - 0.8).abs() < 1e-6, "{jerk}");
+        let half = shifts[0].quality.jerk_half_m_s3.unwrap();
+        assert!(half < 1e-6, "{half}");
+    }
+    // Noise of the readings makes it uncertain, and its interval holds the jerk without noise.
+    let roles = [Role::TurbineSpeed, Role::OutputSpeed];
+    for noise_rad_s in [0.05, 0.2, 0.5] {
+        drive.noise_rad_s = noise_rad_s;
+        let quality = found(&gearbox, &roles, &drive.readings(&roles))[0].quality;
+        let (jerk, half) = (quality.jerk_m_s3.unwrap(), quality.jerk_half_m_s3.unwrap());
+        assert!(half > 0.01 && (jerk - 0.8).abs() < half, "{noise_rad_s}: {jerk} +-{half}");
     }
 }
 

@@ -336,37 +336,32 @@ impl EstimatedShift {
         let in_inertia = samples[inertia..end].iter().filter(|sample| phase(sample) == Phase::InertiaPhase);
         // Where a speed did not come, or was refused, the shift may have begun before it was seen.
         let from = begin - samples[..begin].iter().rev().take_while(|sample| is_blind(sample)).count();
-        let of_shift = &samples[from..end];
-        let shaft = of_shift.iter().filter_map(|sample| sample.estimate.shaft_torque_n_m);
-        let measured = |value: fn(&LogSample) -> Option<Reading<f64>>, estimate: fn(&LogSample) -> Ranged| {
-            MeasuredError::of(samples, from..end, value, estimate)
-        };
         Some(Self {
             torque_phase_s: [samples[begin].time_s, samples[inertia].time_s],
             lock_up_s,
             pressure_pa: mean(in_inertia.clone().map(pressure))?,
             torque_n_m: mean(in_inertia.map(torque))?,
-            min_shaft_n_m: shaft.reduce(f64::min),
-            friction_work_j: friction_work(samples, from..end, reduced),
-            pressure_error_pa: measured(|s| s.pressure_pa, pressure),
-            torque_error_n_m: measured(|s| s.torque_n_m, torque),
-            unhealthy: unhealthy(of_shift),
+            ..Self::over(samples, from..end, reduced)?
         })
     }
 
     /// A shift in these samples that the observer did not see, because a speed did not come or was refused; none where most of them came.
     fn unseen(samples: &[LogSample], shift: Range<usize>, reduced: &ReducedShift<f64>) -> Option<Self> {
-        let blind = |samples: &[LogSample]| samples.iter().take_while(|sample| is_blind(sample)).count();
         let within = samples.get(shift.clone())?;
         if 2 * within.iter().filter(|sample| is_blind(sample)).count() <= within.len() {
             return None;
         }
         let from = shift.start - samples[..shift.start].iter().rev().take_while(|sample| is_blind(sample)).count();
-        let to = shift.end + blind(&samples[shift.end..]);
-        let of_shift = &samples[from..to];
+        let to = shift.end + samples[shift.end..].iter().take_while(|sample| is_blind(sample)).count();
+        Self::over(samples, from..to, reduced)
+    }
+
+    /// What is said of a part of the samples whatever its phases are.
+    fn over(samples: &[LogSample], part: Range<usize>, reduced: &ReducedShift<f64>) -> Option<Self> {
+        let of_shift = samples.get(part.clone())?;
         let shaft = of_shift.iter().filter_map(|sample| sample.estimate.shaft_torque_n_m);
         let measured = |value: fn(&LogSample) -> Option<Reading<f64>>, estimate: fn(&LogSample) -> Ranged| {
-            MeasuredError::of(samples, from..to, value, estimate)
+            MeasuredError::of(samples, part.clone(), value, estimate)
         };
         Some(Self {
             torque_phase_s: [f64::NAN; 2],
@@ -374,7 +369,7 @@ impl EstimatedShift {
             pressure_pa: mean(of_shift.iter().map(pressure))?,
             torque_n_m: mean(of_shift.iter().map(torque))?,
             min_shaft_n_m: shaft.reduce(f64::min),
-            friction_work_j: friction_work(samples, from..to, reduced),
+            friction_work_j: friction_work(samples, part.clone(), reduced),
             pressure_error_pa: measured(|s| s.pressure_pa, pressure),
             torque_error_n_m: measured(|s| s.torque_n_m, torque),
             unhealthy: unhealthy(of_shift),

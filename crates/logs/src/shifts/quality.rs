@@ -56,7 +56,8 @@ pub(super) fn quality(
     }
 }
 
-/// Half of the interval of 95 % of the jerk, m/s^3, by the jackknife: the jerk without each part of the readings.
+/// Half of an interval of the jerk, m/s^3, by the jackknife: the jerk without each part of the readings. The largest of noisy values lies above the one
+/// without noise by about as much as it scatters, so it is twice that of 95 % by the scatter.
 fn jerk_half(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Option<f64> {
     const PARTS: usize = 6;
     /// Of Student's distribution with five degrees of freedom.
@@ -65,7 +66,7 @@ fn jerk_half(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> 
     let jerks: Vec<f64> = (0..PARTS).map(without).collect::<Option<_>>()?;
     let mean = jerks.iter().sum::<f64>() / PARTS as f64;
     let squares: f64 = jerks.iter().map(|jerk| Real::powi(jerk - mean, 2)).sum();
-    Some(SIDES * (squares * (PARTS as f64 - 1.0) / PARTS as f64).sqrt())
+    Some(2.0 * SIDES * (squares * (PARTS as f64 - 1.0) / PARTS as f64).sqrt())
 }
 
 /// Half of the intervals of 95 % of the times of the inertia phase, s, and of the flare, rad/s: by the scatter of the ratio before and after the

@@ -75,14 +75,14 @@ impl Controlled {
     }
 
     /// Pressure at which the command must settle for the pressure to follow `wanted_pa`, Pa. The valve's lag is compensated by
-    /// its nominal model, its delay is not. It is at least `least_pa`.
-    pub(super) fn lead(&mut self, calibration: &CarCalibration, wanted_pa: f64, line_pa: f64, least_pa: f64) -> f64 {
+    /// its nominal model, its delay is not. It is at least `min_pa`.
+    pub(super) fn lead(&mut self, calibration: &CarCalibration, wanted_pa: f64, line_pa: f64, min_pa: f64) -> f64 {
         let (c, Some(clutch)) = (calibration, &self.clutch) else { return 0.0 };
         let to_go = wanted_pa - self.modelled_pa;
         let lag_s = clutch.valve.lag(self.modelled_pa, to_go / c.pressure_follow_s);
         let ahead = (lag_s / c.pressure_follow_s - 1.0).max(0.0) * to_go;
         let settled = wanted_pa + ahead.clamp(-c.pressure_lead_pa, c.pressure_lead_pa);
-        self.without_lead(calibration, settled.max(least_pa), line_pa)
+        self.without_lead(calibration, settled.max(min_pa), line_pa)
     }
 
     /// The pressure at which its command is to settle, Pa, within what the valve can give; the model follows.

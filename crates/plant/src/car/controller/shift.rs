@@ -255,8 +255,8 @@ impl ActiveShift {
             self.oncoming.without_lead(c, on_pa, self.line_pa)
         } else {
             // A clutch that has just locked keeps about what it carried.
-            let least_pa = if self.stage == ShiftStage::Lock { self.oncoming_pa - LOCK_FALL_PA } else { 0.0 };
-            self.oncoming.lead(c, on_pa, self.line_pa, least_pa)
+            let min_pa = if self.stage == ShiftStage::Lock { self.oncoming_pa - LOCK_FALL_PA } else { 0.0 };
+            self.oncoming.lead(c, on_pa, self.line_pa, min_pa)
         };
         self.oncoming_pa = on_pa;
         [self.offgoing.lead(c, off_pa, self.line_pa, 0.0), on_pa]
