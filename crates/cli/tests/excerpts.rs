@@ -104,7 +104,9 @@ fn an_error_of_every_kind_of_file_has_its_line() {
     ] {
         let said = checked(name, &text, &[]);
         let lines = marked(&said);
-        assert!(lines.len() >= 2 && lines[0].contains(shown) && lines[1].contains('^'), "{name}: {said}");
+        let is_shown =
+            lines.chunks(2).any(|pair| pair[0].contains(shown) && pair.last().is_some_and(|line| line.contains('^')));
+        assert!(lines.len() >= 2 && is_shown, "{name}: {said}");
         let line = said.split(" --> ").nth(1).and_then(|place| place.split(':').nth(1)).unwrap();
         assert!(said.contains(&format!("{name}:{line}: ")), "{said}");
     }

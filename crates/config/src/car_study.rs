@@ -77,7 +77,7 @@ struct RawCarStudy {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "\"neighbouring\", or a list of shifts such as [\"1-2\", \"2-1\"]")]
+#[serde(untagged, expecting = "invalid type, expected \"neighbouring\" or a list of shifts such as [\"1-2\", \"2-1\"]")]
 enum RawShifts {
     All(String),
     Listed(Vec<String>),
@@ -106,6 +106,10 @@ impl CarStudy {
     /// As [`Self::read`].
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let raw: RawCarStudy = source.parse_as(Kind::CarStudy)?;
+        let check = Check::of(&source);
+        let own = raw.sensors.as_ref().map(|raw| sensors(&check, "sensors", raw, None)).transpose()?;
+        let runs = check.count("runs", &raw.runs, 1.0..=MAX_RUNS)? as u64;
+        let errors = raw.errors.checked(&check)?;
         let beside = |name: &str| source.path.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
         let of_file = |key: &str, word: &Word| (beside(word.get_ref()), key.to_owned(), word.span().start);
         let (path, key, at) = of_file("vehicle", &raw.vehicle);
@@ -117,17 +121,14 @@ impl CarStudy {
             }
             None => None,
         };
-        let check = Check::of(&source);
         let of_drive = drive.as_ref().and_then(|drive| drive.sensors);
-        let own = raw.sensors.as_ref().map(|raw| sensors(&check, "sensors", raw, None)).transpose()?;
-        let runs = check.count("runs", &raw.runs, 1.0..=MAX_RUNS)? as u64;
         Ok(Self {
             name: check.name("name", raw.name.get_ref(), raw.name.span().start)?,
             title: check.title("title", &raw.title)?,
             what: what(&check, &raw, drive, &car)?,
             runs,
             seed: raw.seed,
-            errors: raw.errors.checked(&check)?,
+            errors,
             sensors: own.or(of_drive),
             car,
             source,

@@ -8,6 +8,7 @@ use drivetrain::{Table1, TableError};
 use toml::Spanned;
 use trace::printable;
 
+use crate::error::Shown;
 use crate::source::Layers;
 use crate::{ConfigError, Source};
 
@@ -297,7 +298,7 @@ impl<'a> Check<'a> {
             path,
             line,
             value,
-            allowed: format!("{} to {}", range.start(), range.end()),
+            allowed: format!("{} to {}", Shown(*range.start()), Shown(*range.end())),
             hint: unit_hint(&key, value, range),
             key,
         })

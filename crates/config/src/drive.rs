@@ -56,7 +56,8 @@ impl DriveFile {
             return Err(Check::of(&self.source).meaning("vehicle", 0, "names no vehicle file".to_owned(), Some(hint)));
         };
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
-        CarFile::read(&folder.join(vehicle)).map_err(|error| error.named_by(&self.source, "vehicle", 0))
+        let named_at = self.source.place_of("", "vehicle").unwrap_or(0);
+        CarFile::read(&folder.join(vehicle)).map_err(|error| error.named_by(&self.source, "vehicle", named_at))
     }
 
     /// Checks the text of a drive file.
@@ -182,7 +183,7 @@ struct RawSegment {
 
 /// One number, or the number at the start and that at the end.
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "a number or [from, to]")]
+#[serde(untagged, expecting = "invalid type, expected a number or [from, to]")]
 enum FromTo {
     Constant(f64),
     Ramp([f64; 2]),

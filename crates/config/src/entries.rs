@@ -6,6 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// A key of a table with its value.
+#[derive(Clone)]
 pub(crate) struct Entry {
     /// The tables that it is in.
     pub(crate) tables: String,

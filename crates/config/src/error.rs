@@ -1,5 +1,6 @@
 //! Errors in files.
 
+use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 
 use trace::ShownPath as _;
@@ -29,7 +30,7 @@ pub enum ConfigError {
         message: String,
     },
     /// A number outside its range.
-    #[error("{}:{line}: `{key}` is {value}, expected {allowed}{}", path.shown(), hint_line(hint))]
+    #[error("{}:{line}: `{key}` is {}, expected {allowed}{}", path.shown(), Shown(*value), hint_line(hint))]
     Range {
         /// The file.
         path: PathBuf,
@@ -118,10 +119,20 @@ impl ConfigError {
             Self::Read { source, .. } => source.to_string(),
             Self::Syntax { message, .. } => message.clone(),
             Self::Range { key, value, allowed, hint, .. } => {
-                format!("`{key}` is {value}, expected {allowed}{}", hint_line(hint))
+                format!("`{key}` is {}, expected {allowed}{}", Shown(*value), hint_line(hint))
             }
             Self::Meaning { key, message, hint, .. } => format!("`{key}`: {message}{}", hint_line(hint)),
         }
+    }
+}
+
+/// A number as one writes it: with an exponent if it has very many digits.
+pub(crate) struct Shown(pub(crate) f64);
+
+impl Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.0.abs();
+        if size != 0.0 && !(1e-9..1e15).contains(&size) { write!(f, "{:e}", self.0) } else { write!(f, "{}", self.0) }
     }
 }
 

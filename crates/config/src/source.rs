@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeString, DeTable, DeValue};
 use trace::text_file::{LARGEST_LIST, LARGEST_TEXT, read_text_of};
 
 use crate::ConfigError;
+use crate::entries::entries_of;
 use crate::near::is_near;
 use crate::tree::Tree;
 
@@ -176,38 +177,43 @@ impl Source {
     /// # Errors
     /// The text is not TOML, or neither a vehicle nor an experiment nor a study.
     pub fn kind(&self) -> Result<Kind, ConfigError> {
-        let tables: toml::Table = self.parse()?;
-        let has = |key| tables.contains_key(key);
-        let of_a_vehicle = |(key, value): (&String, &toml::Value)| value.is_table() && VEHICLE_TABLES.contains(&&**key);
+        let tables = self.table()?.into_inner();
+        let has = |key: &str| tables.contains_key(key);
+        let names = || tables.keys().map(|key| &**key.get_ref());
+        let of_a_vehicle = |(key, value): (&Spanned<DeString<'_>>, &Spanned<DeValue<'_>>)| {
+            value.get_ref().is_table() && VEHICLE_TABLES.contains(&&**key.get_ref())
+        };
         // No other kind has these, and `shifts`, which such a file has, is no `shift`.
         if has("mean") || has("covariance") {
             return Ok(Kind::Learnt);
         }
-        if let Some((key, known)) = misspelt(tables.keys().map(String::as_str), &KINDS_KEYS) {
+        if let Some((key, known)) = misspelt(names(), &KINDS_KEYS) {
             return Err(self.unknown_key(key, known));
         }
         // The shifts of a study of cars are a text or a list; the [shift] of an experiment is a table.
-        if has("runs") && tables.get("shift").is_some_and(|shift| !shift.is_table()) {
+        if has("runs") && tables.get("shift").is_some_and(|shift| !shift.get_ref().is_table()) {
             return Err(self.unknown_key("shift", "shifts"));
         }
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
             (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
             (false, false, false) if has("runs") && has("vehicle") => Ok(Kind::CarStudy),
-            (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
+            (false, false, false) if tables.get("gearbox").is_some_and(|gearbox| !gearbox.get_ref().is_table()) => {
+                Ok(Kind::Car)
+            }
             (false, true, false) => Ok(Kind::Experiment),
             (false, false, true) => Ok(Kind::Study),
             (false, false, false) if has("gear") => Ok(Kind::Gearbox),
             (false, false, false) if has("sensors") => Ok(Kind::Sensors),
             (false, false, false) if !tables.is_empty() && tables.iter().all(of_a_vehicle) => Ok(Kind::Overlay),
             _ if has("channel") => Ok(Kind::ChannelMap),
-            _ => Err(self.of_no_kind(&tables)),
+            _ => Err(self.of_no_kind(names())),
         }
     }
 
     /// What is wrong with a file that is none of those that are known.
-    fn of_no_kind(&self, tables: &toml::Table) -> ConfigError {
-        if let Some((key, known)) = misspelt(tables.keys().map(String::as_str), &VEHICLE_TABLES) {
+    fn of_no_kind<'t>(&self, tables: impl Iterator<Item = &'t str>) -> ConfigError {
+        if let Some((key, known)) = misspelt(tables, &VEHICLE_TABLES) {
             return self.unknown_key(key, known);
         }
         let message = "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
@@ -225,6 +231,15 @@ impl Source {
         let line = 1 + self.text.lines().position(begins).unwrap_or(0);
         let message = format!("unknown key `{}`\nhint: did you mean `{known}`?", trace::printable(key));
         ConfigError::Syntax { path: self.path.clone(), line, message }
+    }
+
+    /// Where the value of a key in a table begins; the tables of a list are `shaft[0]`, `shaft[1]`.
+    pub(crate) fn place_of(&self, table: &str, key: &str) -> Option<usize> {
+        let entries = entries_of(self.table().ok()?.get_ref());
+        entries
+            .iter()
+            .find(|entry| entry.tables == table && entry.name(&self.text) == key)
+            .map(|entry| entry.value.start)
     }
 
     /// Reads the text into raw types.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde::Deserialize;
 use serde::de::value::SeqDeserializer;
 use serde::de::{
-    self, DeserializeOwned, DeserializeSeed, Deserializer, IntoDeserializer, MapAccess, Unexpected, Visitor,
+    self, DeserializeOwned, DeserializeSeed, Deserializer, Expected, IntoDeserializer, MapAccess, Unexpected, Visitor,
 };
 use serde_spanned::de::{SpannedDeserializer, is_spanned};
 use toml::Spanned;
@@ -170,7 +170,30 @@ impl Node {
     }
 }
 
+/// A word that must be one of these.
+struct OneOf(&'static [&'static str]);
+
+impl Expected for OneOf {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "one of {}", self.0.iter().map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", "))
+    }
+}
+
 impl Value {
+    /// What the value is, for an error.
+    fn unexpected(&self) -> Unexpected<'_> {
+        match self {
+            Self::Float(number) => Unexpected::Float(*number),
+            Self::Integer(number) => Unexpected::Signed(*number),
+            Self::Large(number) => Unexpected::Unsigned(*number),
+            Self::Switch(on) => Unexpected::Bool(*on),
+            Self::Text(text) => Unexpected::Str(text),
+            Self::Time => Unexpected::Other("date or time"),
+            Self::List(_) => Unexpected::Seq,
+            Self::Table(_) => Unexpected::Map,
+        }
+    }
+
     /// The value of the key `name` of a table.
     fn name(&self) -> Option<&str> {
         let Self::Table(table) = self else { return None };
@@ -310,7 +333,7 @@ impl<'de> Deserializer<'de> for &'de Node {
             Value::Large(number) => visitor.visit_u64(*number),
             Value::Switch(on) => visitor.visit_bool(*on),
             Value::Text(text) => visitor.visit_str(text),
-            Value::Time => Err(de::Error::invalid_type(Unexpected::Other("date or time"), &visitor)),
+            Value::Time => Err(de::Error::invalid_type(self.value.unexpected(), &visitor)),
             Value::List(list) => visitor.visit_seq(SeqDeserializer::new(list.iter())),
             Value::Table(table) => visitor.visit_map(Entries::Table(table.iter(), None)),
         };
@@ -342,12 +365,12 @@ impl<'de> Deserializer<'de> for &'de Node {
     fn deserialize_enum<V: Visitor<'de>>(
         self,
         _: &'static str,
-        _: &'static [&'static str],
+        words: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Wrong> {
         match &self.value {
             Value::Text(word) => visitor.visit_enum((&**word).into_deserializer()),
-            _ => self.deserialize_any(visitor),
+            other => Err(de::Error::invalid_type(other.unexpected(), &OneOf(words))),
         }
     }
 

@@ -331,7 +331,10 @@ fn wrong_vehicle_files_get_their_line_and_a_hint() {
         ("[vehicle]\nmass_kg = nan\n", ["car.toml:4", "vehicle.mass_kg", "expected 200 to 60000"]),
         ("[hydraulics]\nline_pressure_pa = 16.0\n", ["car.toml:4", "is 16", "16 bar is 1600000 Pa"]),
         ("[hydraulics]\nline_pressure_pa = 1.05e5\n", ["car.toml:4", "return spring of B", ""]),
-        ("[clutch.K1]\ndrag_n_m = 1.0\n", ["car.toml:3", "no clutch or brake \"K1\"", "hint: it has A, B, C, D, E"]),
+        (
+            "[clutch.K1]\ndrag_n_m = 1.0\n",
+            ["car.toml:3", "no clutch or brake \"K1\"", "hint: its clutches and brakes are A, B, C, D, E"],
+        ),
         ("[friction]\nstatic_factor = 0.9\n", ["car.toml:4", "is 0.9, less than", "neither stick nor slip"]),
         ("[friction]\nfactor = [1.0]\n", ["car.toml:4", "friction.factor", "5 breakpoints"]),
         (

@@ -1,5 +1,6 @@
 //! All errors of a file, of any kind.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use config::{
@@ -22,7 +23,26 @@ pub fn check(path: &Path) -> Result<Vec<Error>, Error> {
 
 /// All errors of a file and of those that it names.
 pub fn errors_of(source: &Source) -> Vec<ConfigError> {
-    all_errors(source, &|source| read(source.kind()?, source))
+    let mut errors = all_errors(source, &|source| read(source.kind()?, source));
+    // A wrong gearbox file, or none, ends the reading of the car that names it.
+    let is_of_gearbox = |error: &ConfigError| match error {
+        ConfigError::Meaning { key, .. } if key == "gearbox" => true,
+        error => error.path() != source.path,
+    };
+    if matches!(source.kind(), Ok(Kind::Car)) && errors.iter().any(is_of_gearbox) {
+        errors.extend(errors_in_any_gearbox(source));
+        let mut said = HashSet::new();
+        errors.retain(|error| said.insert(error.to_string()));
+    }
+    errors
+}
+
+/// The errors of a car's file that it has with any gearbox: keys, types and ranges.
+fn errors_in_any_gearbox(source: &Source) -> Vec<ConfigError> {
+    let Ok(CarFile { gearbox_source, .. }) = CarFile::eight_speed() else { return Vec::new() };
+    let errors = all_errors(source, &|draft| CarFile::from_sources(draft, gearbox_source.clone()).map(drop));
+    let is_of_any = |error: &ConfigError| matches!(error, ConfigError::Syntax { .. } | ConfigError::Range { .. });
+    errors.into_iter().filter(is_of_any).collect()
 }
 
 /// All errors of the text of a file, and of the text of its gearbox file where it is one of a car whose gearbox file is given; `name` is what

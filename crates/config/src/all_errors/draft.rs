@@ -1,6 +1,6 @@
 //! The text of a file that is mended, so that its reader goes on.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use toml::de::DeTable;
@@ -10,22 +10,47 @@ use crate::entries::{Entry, entries_of};
 
 /// What is put in place of what is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Guess {
-    /// One, or the nearest number within the range.
+pub(super) struct Guess {
+    pub(super) number: Number,
+    /// Whether a key with a number out of its range is left out, so that the reader takes what a file has without it.
+    pub(super) leaves_out: bool,
+}
+
+/// The number that is put in place of a wrong one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Number {
+    /// One, or the nearest within the range.
     Near,
     /// Two, or the middle of the range.
     Middle,
-    /// What a file has that leaves the key out; the same as the nearest where it must have it.
-    Default,
 }
+
+impl Number {
+    fn of(self, [near, middle]: [f64; 2]) -> f64 {
+        match self {
+            Self::Near => near,
+            Self::Middle => middle,
+        }
+    }
+
+    /// Another number within, of none of the guesses.
+    fn another([near, middle]: [f64; 2]) -> f64 {
+        let beyond = middle + 0.5 * (middle - near);
+        if middle.fract() == 0.0 { beyond.floor() } else { beyond }
+    }
+}
+
+/// Keys that make up what other keys name.
+const NAMING: [&str; 8] = ["name", "kind", "level", "gearbox", "shaft", "element", "gear", "channel"];
 
 /// A text that is mended.
 pub(super) struct Draft {
     pub(super) text: String,
     /// Lines that are not in the file, from the first to the last, counted from 1.
     added: Vec<usize>,
-    /// Places with values that are not those of the file: lines, with the key of a number.
-    guessed: HashSet<(usize, String)>,
+    /// Places with values that are not those of the file: lines, with the key in its table, or none of a value of another type; and the nearest
+    /// and the middle one of a number within its range.
+    guessed: HashMap<(usize, String), Option<[f64; 2]>>,
     /// Keys that were taken out, as a reader names them.
     taken: HashSet<String>,
     guess: Guess,
@@ -33,7 +58,7 @@ pub(super) struct Draft {
 
 impl Draft {
     pub(super) fn of(text: &str, guess: Guess) -> Self {
-        Self { text: text.to_owned(), added: Vec::new(), guessed: HashSet::new(), taken: HashSet::new(), guess }
+        Self { text: text.to_owned(), added: Vec::new(), guessed: HashMap::new(), taken: HashSet::new(), guess }
     }
 
     /// Whether all values are those of the file.
@@ -41,9 +66,14 @@ impl Draft {
         self.added.is_empty() && self.guessed.is_empty() && self.taken.is_empty()
     }
 
-    /// Whether a line is not in the file.
-    pub(super) fn is_added(&self, line: usize) -> bool {
-        self.added.contains(&line)
+    /// Whether the values differ from those of the file in numbers alone.
+    pub(super) fn differs_in_numbers(&self) -> bool {
+        self.taken.is_empty() && self.guessed.values().all(Option::is_some)
+    }
+
+    /// Whether all that other keys name is that of the file.
+    pub(super) fn has_its_names(&self) -> bool {
+        NAMING.iter().all(|key| !self.taken.contains(*key) && !self.guessed.keys().any(|(_, of)| of == key))
     }
 
     /// The line of the file that is this line of the draft.
@@ -54,29 +84,43 @@ impl Draft {
     /// Whether what is wrong was put in.
     pub(super) fn is_guessed(&self, line: usize, wrong: &Wrong) -> bool {
         let key = match wrong {
-            Wrong::Range { key, .. } => key.as_str(),
+            Wrong::Range { key, .. }
+            | Wrong::Value { key }
+            | Wrong::Length { key, .. }
+            | Wrong::Name { key, .. }
+            | Wrong::Meaning { key } => in_table(key),
             // A key that is missing in a table that was put in, or that was taken out.
             Wrong::Missing { key, .. } => return self.added.contains(&line) || self.taken.contains(key),
             Wrong::Unknown { .. } => return self.added.contains(&line),
             _ => "",
         };
         // A value of another type was replaced, whatever its key is called.
-        self.added.contains(&line) || [key, ""].iter().any(|key| self.guessed.contains(&(line, (*key).to_owned())))
+        self.added.contains(&line) || [key, ""].iter().any(|key| self.guessed.contains_key(&(line, (*key).to_owned())))
     }
 
-    /// Mends what is wrong at a line, so that a reader goes on; whether it did.
-    pub(super) fn mend(&mut self, line: usize, wrong: &Wrong) -> bool {
+    /// Mends what is wrong at a line, so that a reader goes on; whether it did. A place that is still wrong is mended in another way.
+    pub(super) fn mend(&mut self, line: usize, wrong: &Wrong, attempts: usize) -> bool {
         match wrong {
             Wrong::Unknown { key, .. } => self.take_out(line, key),
             Wrong::Missing { table, key } => self.put_in(line, table.as_deref(), key),
-            Wrong::Type(expected) => self.replace(line, expected),
-            Wrong::Range { key, .. } if self.guess == Guess::Default && !self.is_guessed(line, wrong) => {
+            Wrong::Type { found, expected } => self.replace(line, found, expected),
+            Wrong::Range { key, .. } if self.guess.leaves_out && !self.is_guessed(line, wrong) => {
                 self.leave_out(line, key)
             }
-            Wrong::Range { key, within: [near, middle] } => {
-                self.put_within(line, key, if self.guess == Guess::Middle { *middle } else { *near })
+            Wrong::Range { key, within } => self.put_number(line, key, self.guess.number.of(*within), *within),
+            Wrong::Name { key, name, known } => {
+                self.rename(line, key, name, known, attempts) || self.take_out(line, name) || self.leave_out(line, key)
             }
-            Wrong::Value { key } => self.leave_out(line, key),
+            Wrong::Length { key, wanted } => self.put_list(line, key, *wanted),
+            Wrong::Value { key } | Wrong::Meaning { key } => {
+                match self.guessed.get(&(line, in_table(key).to_owned())).copied().flatten() {
+                    // Another number may go with what is beside it.
+                    Some(within) if attempts == 0 => {
+                        self.put_number(line, key, Number::another(within), within) || self.leave_out(line, key)
+                    }
+                    _ => self.leave_out(line, key),
+                }
+            }
             Wrong::Kind | Wrong::Other => false,
         }
     }
@@ -159,10 +203,48 @@ impl Draft {
 
     /// Takes out a key whose value is wrong, or the list with such a value.
     fn leave_out(&mut self, line: usize, key: &str) -> bool {
-        let name = key.rsplit('.').next().unwrap_or(key);
-        let name = name.split('[').next().unwrap_or(name);
+        let name = in_table(key);
         self.taken.insert(name.to_owned());
-        self.take_out(line, name)
+        self.take_out(line, name) || self.take_out_table(line)
+    }
+
+    /// Takes out the table with a header of its own that a line is in.
+    fn take_out_table(&mut self, line: usize) -> bool {
+        let lines: Vec<&str> = self.text.lines().take(line).collect();
+        let Some(at) = lines.iter().rposition(|line| header(line).is_some()) else { return false };
+        let name = header(lines[at]).and_then(|name| name.rsplit('.').next().map(str::to_owned)).unwrap_or_default();
+        self.taken.insert(name);
+        let first = self.begin(at + 1);
+        self.blank(first..self.end_of_table(first))
+    }
+
+    /// The key on a line whose value, or one in whose list, a reader finds to be of another type.
+    fn of_type(&self, line: usize, found: &str) -> Option<(Entry, Range<usize>)> {
+        let text = |place: &Range<usize>| self.text.get(place.clone()).unwrap_or_default();
+        let is_found = |place: &Range<usize>| match found {
+            "a table" => text(place).starts_with('{'),
+            "a list" => text(place).starts_with('['),
+            found => {
+                let bare = |text: &str| text.trim_matches(['"', '\'', '`']).to_owned();
+                let found = bare(found.split_once('`').or(found.split_once('"')).map_or(found, |(_, value)| value));
+                let number = |text: &str| text.parse::<f64>().ok();
+                bare(text(place)) == found || number(&found).is_some_and(|found| number(text(place)) == Some(found))
+            }
+        };
+        let on_line: Vec<Entry> =
+            self.entries().into_iter().filter(|entry| self.line(entry.value.start) == line).collect();
+        let places = on_line
+            .iter()
+            .flat_map(|entry| [&entry.value].into_iter().chain(&entry.items).map(move |place| (entry, place.clone())));
+        let mut leaves = on_line.iter().filter(|entry| !entry.is_table);
+        let only = match (leaves.next(), leaves.next()) {
+            (None, _) => on_line.first(),
+            (leaf, None) => leaf,
+            _ => None,
+        };
+        let mut places = places;
+        let named = places.find(|(_, place)| is_found(place));
+        named.or(only.map(|entry| (entry, entry.value.clone()))).map(|(entry, place)| (entry.clone(), place))
     }
 
     /// Takes a key out, with its value.
@@ -188,12 +270,6 @@ impl Draft {
 
     /// The end of a table that begins with a line in brackets, with the tables in it.
     fn end_of_table(&self, begin: usize) -> usize {
-        let header = |line: &str| {
-            let name = line.trim_start().strip_prefix('[')?;
-            let name = name.trim_start_matches('[').split(']').next()?.trim();
-            (!name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || "._-\"' ".contains(c)))
-                .then(|| name.to_owned())
-        };
         let mut end = begin;
         let mut own: Option<String> = None;
         for line in self.text.get(begin..).unwrap_or_default().split_inclusive('\n') {
@@ -239,7 +315,7 @@ impl Draft {
                 let comma = at + 1 + format!(" {key} = {value}").len();
                 self.blank(comma..comma + 1);
             }
-            self.guessed.insert((line, String::new()));
+            self.guessed.insert((line, String::new()), None);
             return true;
         }
         if let Some(table) = table {
@@ -258,66 +334,118 @@ impl Draft {
         for added in self.added.iter_mut().filter(|added| **added >= line) {
             *added += 1;
         }
-        let moved = |(at, key): (usize, String)| (if at >= line { at + 1 } else { at }, key);
+        let moved = |((at, key), within)| ((if at >= line { at + 1 } else { at }, key), within);
         self.guessed = self.guessed.drain().map(moved).collect();
         self.added.push(line);
         true
     }
 
     /// Replaces the value on a line by one of the expected type.
-    fn replace(&mut self, line: usize, expected: &str) -> bool {
-        let on_line = self.entries().into_iter().filter(|entry| self.line(entry.value.start) == line);
-        let leaves: Vec<Range<usize>> = on_line.filter(|entry| !entry.is_table).map(|entry| entry.value).collect();
-        let [value] = leaves.as_slice() else { return false };
-        let old = self.text.get(value.clone()).unwrap_or_default();
-        let Some(new) = guess(expected, old) else { return false };
-        self.put(value.clone(), &new, (line, String::new()))
+    fn replace(&mut self, line: usize, found: &str, expected: &str) -> bool {
+        let Some((entry, place)) = self.of_type(line, found) else { return false };
+        let old = self.text.get(place.clone()).unwrap_or_default();
+        match guess(expected, old, self.guess.number) {
+            Some(new) => {
+                let within = new.parse::<f64>().ok().map(|_| [1.0, 2.0]);
+                self.put(place, &new, (line, String::new()), within)
+            }
+            None => {
+                let name = self.name(&entry).to_owned();
+                self.leave_out(line, &name)
+            }
+        }
+    }
+
+    /// Replaces a name of what does not exist by one of those that do.
+    fn rename(&mut self, line: usize, key: &str, name: &str, known: &[String], attempts: usize) -> bool {
+        let from = match self.guess.number {
+            Number::Near => 0,
+            Number::Middle => 1,
+        };
+        let Some(new) = known.get((from + attempts) % known.len().max(1)) else { return false };
+        let Some(entry) = self.entry(line, in_table(key)) else { return false };
+        let is_name = |place: &&Range<usize>| {
+            let text = self.text.get((*place).clone()).unwrap_or_default();
+            text.trim_matches(['"', '\'']) == name
+        };
+        let Some(place) = entry.items.iter().chain([&entry.value]).find(is_name).cloned() else { return false };
+        self.put(place, &format!("\"{new}\""), (line, in_table(key).to_owned()), None)
     }
 
     /// Replaces a number by one within its range.
-    fn put_within(&mut self, line: usize, key: &str, within: f64) -> bool {
+    fn put_number(&mut self, line: usize, key: &str, number: f64, within: [f64; 2]) -> bool {
         let last = key.rsplit('.').next().unwrap_or(key);
         let (name, item) = match last.strip_suffix(']').and_then(|last| last.split_once('[')) {
             Some((name, item)) => (name, item.parse::<usize>().ok()),
             None => (last, None),
         };
         let Some(entry) = self.entry(line, name) else { return false };
-        let place = item.map_or(Some(&entry.value), |item| entry.items.get(item));
+        let place = match item {
+            Some(item) => entry.items.get(item),
+            None => Some(&entry.value).filter(|_| entry.items.is_empty()),
+        };
         let Some(place) = place.cloned() else { return false };
-        self.put(place, &format!("{within:?}"), (line, key.to_owned()))
+        self.put(place, &format!("{number:?}"), (line, name.to_owned()), Some(within))
     }
 
-    fn put(&mut self, place: Range<usize>, new: &str, guessed: (usize, String)) -> bool {
+    /// Replaces a list of numbers by one of this length.
+    fn put_list(&mut self, line: usize, key: &str, length: usize) -> bool {
+        let Some(entry) = self.entry(line, in_table(key)) else { return false };
+        let number = self.guess.number.of([1.0, 2.0]);
+        let list = format!("[{}]", vec![format!("{number:?}"); length].join(", "));
+        self.put(entry.value, &list, (line, in_table(key).to_owned()), Some([1.0, 2.0]))
+    }
+
+    fn put(&mut self, place: Range<usize>, new: &str, guessed: (usize, String), within: Option<[f64; 2]>) -> bool {
         let Some(old) = self.text.get(place.clone()) else { return false };
         // Lines stay where they are.
         let lines = "\n".repeat(old.matches('\n').count());
         let new = if lines.is_empty() { new.to_owned() } else { format!("{new} #{lines}") };
         self.text.replace_range(place, &new);
-        self.guessed.insert(guessed);
+        self.guessed.insert(guessed, within);
         true
     }
 }
 
+/// The name of the table whose header a line is.
+fn header(line: &str) -> Option<String> {
+    let name = line.trim_start().strip_prefix('[')?;
+    let name = name.trim_start_matches('[').split(']').next()?.trim();
+    (!name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || "._-\"' ".contains(c))).then(|| name.to_owned())
+}
+
+/// A key without the tables that it is in, and without the place in its list.
+fn in_table(key: &str) -> &str {
+    let name = key.rsplit('.').next().unwrap_or(key);
+    name.split('[').next().unwrap_or(name)
+}
+
 /// A value for a key that is missing: most are numbers.
 fn first_guess(key: &str, guess: Guess) -> &'static str {
-    match (key, guess) {
+    match (key, guess.number) {
         ("name" | "title", _) => "\"x\"",
-        (_, Guess::Near | Guess::Default) => "1.0",
-        (_, Guess::Middle) => "2.0",
+        (_, Number::Near) => "1.0",
+        (_, Number::Middle) => "2.0",
     }
 }
 
 /// A value of the type that a reader expects; none if it is not known, or the same again.
-fn guess(expected: &str, old: &str) -> Option<String> {
+fn guess(expected: &str, old: &str, number: Number) -> Option<String> {
     let has = |word: &str| expected.contains(word);
-    let new = match expected.split('`').nth(1).filter(|_| expected.starts_with("one of") || expected.starts_with('`')) {
+    if let Some(word) = expected.strip_prefix('"').and_then(|word| word.split('"').next()) {
+        return Some(format!("\"{word}\"")).filter(|new| new != old);
+    }
+    let mut words = expected.split('`').skip(1).step_by(2);
+    let first = words.next();
+    let word = if number == Number::Near { first } else { words.next().or(first) };
+    let new = match word.filter(|_| expected.starts_with("one of") || expected.starts_with('`')) {
         Some(word) => format!("\"{word}\""),
         None if has("text") || has("string") => "\"x\"".to_owned(),
         None if has("true or false") => "true".to_owned(),
         None if has("list") || has("array") || has("tuple") => "[1.0, 2.0]".to_owned(),
         None if has("table") || has("map") => "{}".to_owned(),
-        None if has("whole number") => "1".to_owned(),
-        None if has("number") => "1.0".to_owned(),
+        None if has("whole number") => format!("{}", number.of([1.0, 2.0])),
+        None if has("number") => format!("{:?}", number.of([1.0, 2.0])),
         None => return None,
     };
     (new != old).then_some(new)

@@ -2,7 +2,7 @@
 
 use crate::ConfigError;
 
-use super::draft::{Draft, Guess};
+use super::draft::{Draft, Guess, Number};
 use super::wrong::Wrong;
 use crate::entries::Entry;
 use crate::near::is_near;
@@ -36,7 +36,7 @@ impl Misspelt {
                 let is_there = entries.iter().any(|other| other.tables == entry.tables && draft.name(other) == meant);
                 Some(misspelt(&entry, meant, !is_there))
             }
-            Wrong::Missing { .. } if draft.is_added(line) => None,
+            Wrong::Missing { .. } if draft.is_guessed(line, wrong) => None,
             Wrong::Missing { table, key } => {
                 let tables = table.clone().map_or_else(|| draft.tables_at(&entries, line), |table| vec![table]);
                 tables.iter().find_map(|tables| {
@@ -74,7 +74,8 @@ impl Misspelt {
 
     /// The text with the key that is meant; none if the key is not there.
     pub(super) fn corrected(&self, text: &str) -> Option<String> {
-        let place = Draft::of(text, Guess::Near).entry(self.line, &self.written)?.key;
+        let place =
+            Draft::of(text, Guess { number: Number::Near, leaves_out: false }).entry(self.line, &self.written)?.key;
         let mut text = text.to_owned();
         text.get(place.clone())?;
         text.replace_range(place, &self.meant);

@@ -1,8 +1,8 @@
 //! All errors of a file, where its reader ends at the first one.
 //!
 //! The reader gets a draft of the text in which what it has refused is mended, again and again: an unknown key is taken out, a missing one is put
-//! in, and a value of another type or outside its range is replaced. What is put in is never reported. What a value means beside others is
-//! reported as long as all of them are those of the file.
+//! in, and a value of another type, outside its range or with a name of nothing is replaced. What is put in is never reported. What a value means
+//! beside others is reported if it does not follow from what was put in.
 //!
 //! A key that is misspelt is corrected in the text itself, and all begins anew: a reader may take a file without this key for another one, and what
 //! it then misses is no error of the file.
@@ -14,7 +14,7 @@ mod wrong;
 use std::path::PathBuf;
 
 use crate::{ConfigError, Source};
-use draft::{Draft, Guess};
+use draft::{Draft, Guess, Number};
 use misspelt::Misspelt;
 use wrong::Wrong;
 
@@ -39,32 +39,53 @@ pub fn all_errors(source: &Source, read: &Reader<'_>) -> Vec<ConfigError> {
 /// The same, of none of the files that were read `before`.
 fn errors_of(source: &Source, read: &Reader<'_>, before: &mut Vec<PathBuf>) -> Vec<ConfigError> {
     before.push(source.path.clone());
-    let (mut errors, is_near_whole) = errors_with(Guess::Near, source, read);
-    let first = errors.first().map(ToString::to_string);
-    if errors.len() > 1 {
-        let (others, is_whole) = errors_with(Guess::Middle, source, read);
-        errors.retain(|error| is_in_both(error, &others, is_whole));
-    }
-    if !errors.is_empty() && !is_near_whole {
-        let (others, is_whole) = errors_with(Guess::Default, source, read);
-        if is_whole {
+    let mut found = found_with(false, source, read);
+    if !found.errors.is_empty() && !found.is_whole {
+        let others = found_with(true, source, read);
+        if others.is_whole {
             // The reader has come to the end with what a file has that leaves the keys out.
-            errors.retain(|error| is_in_both(error, &others, is_whole) || Some(error.to_string()) == first);
-            errors.extend(others);
+            let first = found.errors.first().map(ToString::to_string);
+            found.errors.retain(|error| is_in_both(error, &others) || Some(error.to_string()) == first);
         }
+        found.errors.extend(others.errors);
     }
+    let mut errors = found.errors;
     errors.sort_by_key(|error| (!Wrong::of(error).is_unknown_key(), error.line().is_none(), error.line()));
     errors.dedup_by(|one, other| one.to_string() == other.to_string());
     errors.into_iter().flat_map(|error| with_others_of_its_file(error, source, read, before)).collect()
 }
 
-/// Whether an error with one guess is one with another, with which the reader came to the end or not.
-fn is_in_both(error: &ConfigError, others: &[ConfigError], is_whole: bool) -> bool {
+/// What the drafts of a file have shown.
+struct Shown {
+    errors: Vec<ConfigError>,
+    /// Those of them that may follow from what was put in.
+    unsure: Vec<String>,
+    /// Whether the reader came to the end.
+    is_whole: bool,
+}
+
+/// What is found with both guesses of a number.
+fn found_with(leaves_out: bool, source: &Source, read: &Reader<'_>) -> Shown {
+    let mut near = errors_with(Guess { number: Number::Near, leaves_out }, source, read);
+    if near.errors.len() > 1 {
+        let middle = errors_with(Guess { number: Number::Middle, leaves_out }, source, read);
+        let is_of_middle = |error: &String| middle.errors.iter().any(|other| other.to_string() == *error);
+        let Shown { errors, unsure, .. } = &mut near;
+        errors.retain(|error| {
+            let text = error.to_string();
+            is_in_both(error, &middle) && (!unsure.contains(&text) || is_of_middle(&text))
+        });
+    }
+    near
+}
+
+/// Whether an error with one guess is one with another.
+fn is_in_both(error: &ConfigError, others: &Shown) -> bool {
     let ConfigError::Range { line, key, .. } = error else { return true };
     let is_same_place =
         |other: &&ConfigError| matches!(other, ConfigError::Range { line: at, key: of, .. } if (at, of) == (line, key));
-    let other = others.iter().find(is_same_place);
-    other.map_or(!is_whole, |other| other.to_string() == error.to_string())
+    let other = others.errors.iter().find(is_same_place);
+    other.map_or(!others.is_whole, |other| other.to_string() == error.to_string())
 }
 
 /// The errors of the file that an error is of, where another file names it.
@@ -88,15 +109,15 @@ fn with_others_of_its_file(
     if errors.is_empty() || is_other_kind { vec![error] } else { errors }
 }
 
-/// The errors with one guess, and whether the reader came to the end.
-fn errors_with(guess: Guess, source: &Source, read: &Reader<'_>) -> (Vec<ConfigError>, bool) {
+/// The errors with one guess.
+fn errors_with(guess: Guess, source: &Source, read: &Reader<'_>) -> Shown {
     let mut source = source.clone();
     let mut errors = Vec::new();
     for _ in 0..READINGS {
         match search(guess, &source, read) {
-            Found::Errors { found, is_whole } => {
-                errors.extend(found);
-                return (errors, is_whole);
+            Found::Errors(shown) => {
+                errors.extend(shown.errors);
+                return Shown { errors, ..shown };
             }
             Found::Misspelt { key, error } => {
                 errors.push(error);
@@ -105,30 +126,31 @@ fn errors_with(guess: Guess, source: &Source, read: &Reader<'_>) -> (Vec<ConfigE
             }
         }
     }
-    (errors, false)
+    Shown { errors, unsure: Vec::new(), is_whole: false }
 }
 
 /// What is found in a text.
 enum Found {
     /// A key that is to be corrected before all else, with the error that names it.
     Misspelt { key: Misspelt, error: ConfigError },
-    /// The errors of a text without such a key, and whether the reader came to the end.
-    Errors { found: Vec<ConfigError>, is_whole: bool },
+    /// The errors of a text without such a key.
+    Errors(Shown),
 }
 
 /// Reads the drafts of a text.
 fn search(guess: Guess, source: &Source, read: &Reader<'_>) -> Found {
     let mut draft = Draft::of(&source.text, guess);
-    let mut found: Vec<ConfigError> = Vec::new();
+    let mut shown = Shown { errors: Vec::new(), unsure: Vec::new(), is_whole: false };
     let mut mended: Vec<String> = Vec::new();
     for _ in 0..READINGS {
         let Err(error) = read(Source { path: source.path.clone(), text: draft.text.clone() }) else {
-            return Found::Errors { found, is_whole: true };
+            shown.is_whole = true;
+            break;
         };
         let place = error.line().filter(|_| error.path() == source.path);
         let Some(line) = place else {
             // The error of another file, which this one names.
-            found.push(error);
+            shown.errors.push(error);
             break;
         };
         let wrong = Wrong::of(&error);
@@ -136,16 +158,25 @@ fn search(guess: Guess, source: &Source, read: &Reader<'_>) -> Found {
             let error = key.named_by(error);
             return Found::Misspelt { key, error };
         }
-        let is_own = !draft.is_guessed(line, &wrong);
-        if is_own && (draft.is_unchanged() || !matches!(wrong, Wrong::Other)) {
-            found.push(error.with_line(draft.line_of_file(line)));
+        let (is_of_file, is_sure) = match wrong {
+            _ if draft.is_unchanged() => (true, true),
+            Wrong::Name { .. } => (draft.has_its_names(), true),
+            Wrong::Length { .. } | Wrong::Meaning { .. } | Wrong::Other => (draft.differs_in_numbers(), false),
+            _ => (true, true),
+        };
+        if is_of_file && !draft.is_guessed(line, &wrong) {
+            let error = error.with_line(draft.line_of_file(line));
+            if !is_sure {
+                shown.unsure.push(error.to_string());
+            }
+            shown.errors.push(error);
         }
         let attempt = format!("{line} {wrong:?}");
         let attempts = mended.iter().filter(|other| **other == attempt).count();
-        if attempts >= MENDED_MAX || !draft.mend(line, &wrong) {
+        if attempts >= MENDED_MAX || !draft.mend(line, &wrong, attempts) {
             break;
         }
         mended.push(attempt);
     }
-    Found::Errors { found, is_whole: false }
+    Found::Errors(shown)
 }

@@ -9,14 +9,20 @@ pub(super) enum Wrong {
     Unknown { key: String, known: Vec<String> },
     /// A key that is missing, of the table with this name where it is known.
     Missing { table: Option<String>, key: String },
-    /// A value of another type, or a word that is none of those that are possible: what is expected.
-    Type(String),
+    /// A value of another type, or a word that is none of those that are possible, and what is expected.
+    Type { found: String, expected: String },
     /// A number outside its range: its key, and the nearest number and the middle one within.
     Range { key: String, within: [f64; 2] },
     /// A value that is wrong by itself, as an interval that does not contain what it must: its key.
     Value { key: String },
+    /// A name in quotes of something that does not exist, and the names of what does.
+    Name { key: String, name: String, known: Vec<String> },
     /// The whole file, which is of another kind.
     Kind,
+    /// A list that is not as long as another one.
+    Length { key: String, wanted: usize },
+    /// What this key means beside others.
+    Meaning { key: String },
     /// Anything else.
     Other,
 }
@@ -36,7 +42,10 @@ impl Wrong {
                 match ends[..] {
                     [low, high] if low <= high => {
                         let near = if value.is_nan() { low } else { value.clamp(low, high) };
-                        Self::Range { key: key.clone(), within: [near, low + 0.5 * (high - low)] }
+                        let middle = low + 0.5 * (high - low);
+                        let are_whole = high - low >= 4.0 && low.fract() == 0.0 && high.fract() == 0.0;
+                        let middle = if are_whole { middle.floor() } else { middle };
+                        Self::Range { key: key.clone(), within: [near, middle] }
                     }
                     _ => Self::Other,
                 }
@@ -52,6 +61,14 @@ impl Wrong {
                 None => Self::Missing { table: None, key: key.clone() },
             },
             ConfigError::Meaning { key, message, .. } if is_of_value_alone(message) => Self::Value { key: key.clone() },
+            ConfigError::Meaning { key, message, hint, .. } => {
+                let key = key.clone();
+                match (of_name(message, hint.as_deref()), length(message)) {
+                    (Some((name, known)), _) => Self::Name { key, name, known },
+                    (_, Some(wanted)) => Self::Length { key, wanted },
+                    _ => Self::Meaning { key },
+                }
+            }
             ConfigError::Syntax { message, .. } => match message {
                 // A channel map has roles as keys.
                 message
@@ -77,7 +94,10 @@ impl Wrong {
                     let is_type = ["invalid type", "invalid length", "unknown variant", "invalid value"];
                     let expected = message.lines().next().and_then(|first| first.split_once("expected "));
                     match expected.filter(|_| is_type.iter().any(|begin| message.starts_with(begin))) {
-                        Some((_, expected)) => Self::Type(expected.to_owned()),
+                        Some((found, expected)) => {
+                            let found = found.split_once(": ").map_or("", |(_, found)| found).trim_end_matches(", ");
+                            Self::Type { found: found.to_owned(), expected: expected.to_owned() }
+                        }
                         None => Self::Other,
                     }
                 }
@@ -89,6 +109,35 @@ impl Wrong {
 
 /// Whether an error follows from the value alone, whatever others are.
 fn is_of_value_alone(message: &str) -> bool {
-    let parts = [" does not contain ", "has no such command", " must be two numbers"];
+    let parts = [
+        " does not contain ",
+        "has no such command",
+        " must be two numbers",
+        "above the breakpoint before it",
+        "expected an integer",
+        "a table needs at least",
+        "must begin with `car.`",
+        "is not between",
+        "No such file",
+        " of the factor is refused",
+        "a name must not",
+        "a title must not",
+        "cannot be the name of a file",
+    ];
     message.starts_with("expected [") || parts.iter().any(|part| message.contains(part))
+}
+
+/// How long a list must be that is not as long as its axis.
+fn length(message: &str) -> Option<usize> {
+    let (axis, _) = message.split_once(" breakpoints, but the table has ")?;
+    axis.rsplit(' ').next()?.parse().ok()
+}
+
+/// The name of what does not exist, and those that the hint lists.
+fn of_name(message: &str, hint: Option<&str>) -> Option<(String, Vec<String>)> {
+    let of_table = || message.split_once("[clutch.")?.1.split(']').next();
+    let name = message.split('"').nth(1).or_else(of_table)?;
+    let (_, known) = hint?.split_once("s are ")?;
+    (message.starts_with("there is no ") || message.contains(" has no "))
+        .then(|| (name.to_owned(), known.split(", ").map(str::to_owned).collect()))
 }

@@ -94,6 +94,8 @@ fn meaning(check: &Check<'_>, spans: &Spans, finding: &Finding) -> ConfigError {
         Part::Gear(at) => ("gear", at),
         Part::Mass(at) => ("shift_mass", at),
     };
-    let (offset, part) = spans.part(list, at);
+    let (start, part) = spans.part(list, at);
+    // The place of the key, or that of its part if the part has no such key.
+    let offset = check.layers.source.place_of(&format!("{list}[{at}]"), key).unwrap_or(start);
     check.meaning(format!("{part}.{key}"), offset, finding.to_string(), finding.fault.hint())
 }

@@ -83,7 +83,7 @@ impl CarFile {
         let raw: RawCar = layers
             .parse()
             .map_err(|error| source.unless_other(Kind::Car, incomplete_table(&source).unwrap_or(error)))?;
-        let own = source.parse::<toml::Table>()?.contains_key("gearbox");
+        let own = source.table()?.get_ref().contains_key("gearbox");
         if !own {
             let hint = "gearbox = \"../gearboxes/8hp.toml\", a path from the folder of this file".to_owned();
             let check = Check::of(&source);
@@ -368,7 +368,7 @@ fn known_clutches(check: &Check<'_>, raw: &RawCar, gearbox: &Gearbox) -> Result<
     let message = format!("the gearbox has no clutch or brake \"{}\"", name.get_ref());
     let hint = match gearbox.has_ratios_alone() {
         true => "its file has ratios alone; with level = \"shares\" or \"stick-diagram\" it has elements".to_owned(),
-        false => format!("it has {names}"),
+        false => format!("its clutches and brakes are {names}"),
     };
     Err(check.meaning("clutch", name.span().start, message, Some(hint)))
 }

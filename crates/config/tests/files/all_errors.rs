@@ -319,3 +319,70 @@ fn all_errors_of_a_file_that_another_one_names_are_said() {
     let found = errors_of(path.to_str().unwrap(), &circle);
     assert!(found.len() == 1 && found[0].contains("other.toml:1: this looks like"), "{found:#?}");
 }
+
+/// A shipped file with values exchanged, and the errors that it must have: no more, no fewer.
+fn has_all(path: &str, changes: &[(&str, &str)], more: &str, wanted: &[&str]) {
+    let path = format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"));
+    let text = changed(&std::fs::read_to_string(&path).unwrap(), changes) + more;
+    let found = errors_of(&path, &text);
+    for part in wanted {
+        assert!(found.iter().any(|error| error.contains(part)), "{part}: {found:#?}");
+    }
+    assert_eq!(found.len(), wanted.len(), "{found:#?}");
+}
+
+#[test]
+fn errors_behind_a_value_that_is_wrong_beside_others_are_named() {
+    let car = "vehicles/eight_speed.toml";
+    let far = [("mass_kg = 1500", "mass_kg = -1"), ("final_ratio = 3.0", "final_ratio = 900")];
+    let of_far = ["`vehicle.mass_kg` is -1", "`driveline.final_ratio` is 900"];
+    let with = |change: (&'static str, &'static str)| [far[0], change, far[1]];
+    let and = |part: &'static str| [of_far[0], of_far[1], part];
+    has_all(
+        car,
+        &with(("slip_rad_s = [", "slip_rad_s = [90, ")),
+        "",
+        &and("`friction.slip_rad_s`: breakpoint 2 is not above"),
+    );
+    has_all(
+        car,
+        &with(("temperature_degc = 80", "temperature_degc = 2020-01-01")),
+        "",
+        &and("date or time, expected a number"),
+    );
+    has_all(car, &far, "\n[clutch.Z]\ndrag_n_m = 3\n", &and("no clutch or brake \"Z\""));
+    let lock_up = "\n[lock_up]\ncapacity_n_m = -5\nfirst_gear = \"77\"\non_input_rad_s = 1e9\noff_input_rad_s = 110\nramp_s = 99\n";
+    let of_lock_up = ["capacity_n_m` is -5", "no gear \"77\"", "on_input_rad_s` is 1000000000", "ramp_s` is 99"];
+    has_all(car, &far, lock_up, &[&of_lock_up[..], &of_far].concat());
+    let clutches = "\n[clutch.C]\ndrag_n_m = -5\nsteel_mass_kg = 900\n[clutch.A]\nstatic_friction = 9\n";
+    let of_clutches = ["C.drag_n_m` is -5", "C.steel_mass_kg` is 900", "A.static_friction` is 9"];
+    has_all(car, &far, clutches, &[&of_clutches[..], &of_far].concat());
+    let number = [("ring_teeth = 96", "ring_teeth = -5"), ("inertia_kg_m2 = 0.004", "inertia_kg_m2 = -4")];
+    has_all("gearboxes/8hp.toml", &number, "", &["`planetary_set.ring_teeth` is -5", "sun12.inertia_kg_m2` is -4"]);
+    let names = [
+        ("input = \"in\"", "input = \"nix\""),
+        ("output = \"out\"", "output = \"zz\""),
+        ("output = \"sun12\"", "output = \"s12\""),
+        ("line_pressure_pa = 1.6e6", "line_pressure_pa = 1.6"),
+    ];
+    has_all("gearboxes/8hp.toml", &names, "", &["shaft \"nix\"", "shaft \"zz\"", "shaft \"s12\"", "is 1.6, expected"]);
+    let kind = [("kind = \"brake\"", "kind = 5"), ("inertia_kg_m2 = 0.004", "inertia_kg_m2 = -4")];
+    let words = "the number `5`, expected one of `clutch`, `brake`, `one-way-clutch`, `dog`";
+    has_all("gearboxes/8hp.toml", &kind, "", &[words, "sun12.inertia_kg_m2` is -4"]);
+    let grade = [("grade_rad = 0.02", "grade_rad = [1, 2, 3]"), ("time_in_gear_s = 1.0", "time_in_gear_s = -1")];
+    has_all("drives/city.toml", &grade, "", &["expected a number or [from, to]", "time_in_gear_s` is -1"]);
+}
+
+#[test]
+fn what_is_said_of_a_wrong_value_does_not_follow_from_a_guess() {
+    let far = ("valve_delay_s = [0.0, 0.03]", "valve_delay_s = [0.5, 0.6]");
+    has_all("vehicles/two_speed_at.toml", &[far], "", &["valve_delay_s[1]` is 0.6, expected 0 to 0.5"]);
+    for duration in ["1e300", "-inf", "-7777"] {
+        let far = format!("duration_s = {duration} #");
+        let changes = [("duration_s = ", far.as_str()), ("position = [", "position = [7, ")];
+        let wanted = ["duration_s` is ", "position[0]` is 7"];
+        has_all("experiments/e1.toml", &changes, "", &wanted);
+    }
+    let huge = [("mass_kg = 1500", "mass_kg = 1e300")];
+    has_all("vehicles/eight_speed.toml", &huge, "", &["`vehicle.mass_kg` is 1e300, expected 200 to 60000"]);
+}

@@ -234,7 +234,7 @@ fn what_a_budget_leaves_out_of_valve_and_stroke_has_defaults_and_what_it_holds_i
             "preload_pressure_pa = [40e3, 70e3]",
             "is above `kiss_pressure_pa`, [54000.0, 66000.0] Pa\nhint: the return spring",
         ),
-        ("leak_m3_s_pa = 1e-12", "fill.leak_m3_s_pa` is 0.000000000001, expected 0.000000000002 to"),
+        ("leak_m3_s_pa = 1e-12", "fill.leak_m3_s_pa` is 1e-12, expected 2e-12 to"),
         ("volume_m3 = [1, 2]", "unknown field `volume_m3`"),
     ] {
         let error = with_budget("", fill).unwrap_err();
