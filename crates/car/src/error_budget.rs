@@ -44,6 +44,8 @@ pub const BACKLASH_RAD: f64 = 0.03;
 const COMMAND: f64 = 0.01;
 /// Room above the largest command that a valve needs for line pressure: controllers saturate their valves \[chosen\].
 const COMMAND_ROOM: f64 = 1.2;
+/// Largest duty cycle, %.
+const FULL_DUTY: f64 = 100.0;
 /// Maximum age of a command in a log, s. It counts up to the time between two readings of the command, however long that is.
 const LOGGED_COMMAND_AGE_S: f64 = 10.0;
 
@@ -183,23 +185,23 @@ impl ElementErrors {
         half_width(self.valve_lag_factor)
     }
 
-    /// How many times as wide as the default the widest of its bounds is; at least one.
-    pub fn width(&self) -> f64 {
+    /// How many times as wide as the default its bounds are, at least one: the wider of friction and gain, of hysteresis and command, and of lag and
+    /// delay.
+    pub fn widths(&self) -> [f64; 3] {
         let usual = Self::NO_ELEMENT;
         // The largest factor by which a value may be off, in either direction.
         let off = |[minimum, maximum]: [f64; 2]| maximum.max(minimum.recip()) - 1.0;
-        let of_factors = [
-            (self.friction_factor, usual.friction_factor),
-            (self.valve_gain_factor, usual.valve_gain_factor),
-            (self.valve_lag_factor, usual.valve_lag_factor),
+        let room = if self.command_max == FULL_DUTY { 1.0 } else { COMMAND_ROOM };
+        let of_torque = [
+            off(self.friction_factor) / off(usual.friction_factor),
+            off(self.valve_gain_factor) / off(usual.valve_gain_factor),
         ];
-        let factors = of_factors.map(|(own, usual)| off(own) / off(usual));
-        let others = [
-            self.valve_delay() / usual.valve_delay(),
-            self.valve_hysteresis_pa / usual.valve_hysteresis_pa,
-            self.command / (COMMAND * self.command_max),
-        ];
-        factors.into_iter().chain(others).filter(|width| width.is_finite()).fold(1.0, f64::max)
+        let of_offset =
+            [self.valve_hysteresis_pa / usual.valve_hysteresis_pa, room * self.command / (COMMAND * self.command_max)];
+        let of_timing =
+            [off(self.valve_lag_factor) / off(usual.valve_lag_factor), self.valve_delay() / usual.valve_delay()];
+        [of_torque, of_offset, of_timing]
+            .map(|widths| widths.into_iter().filter(|width| width.is_finite()).fold(1.0, f64::max))
     }
 
     /// What an error of the reading of the command does to the pressure of the valve at this pressure, Pa.
@@ -224,7 +226,7 @@ pub fn command_limits(valve: &ClutchValve<f64>, line_pressure_pa: f64, gain_fact
             let needed = valve.command_for(0.0).max(valve.command_for(highest_pa));
             [needed, COMMAND_ROOM * needed]
         }
-        CommandKind::DutyCycle => [100.0; 2],
+        CommandKind::DutyCycle => [FULL_DUTY; 2],
     }
 }
 

@@ -60,7 +60,7 @@ layout! {
         valve, lag_factor, gain_factor, delay_s, hysteresis_pa, command, command_age_s, line_pressure_pa, pressure_max_pa, fill,
         friction_factor, drag_n_m, slip_rad_s,
     }
-    ElementUncertainty { torque_fraction, slow_part, valve_gain, kiss_point_pa, valve_lag_fraction, valve_delay_s, pressure_pa, drag_n_m, width }
+    ElementUncertainty { torque_fraction, slow_part, valve_gain, kiss_point_pa, valve_lag_fraction, valve_delay_s, pressure_pa, drag_n_m, widths }
     FrictionElement { clutch, valve, limits, piston, budget, uncertainty }
     GearRow { ratio, inertia_kg_m2, holding }
     ShiftClutch { element, alpha, ratio }

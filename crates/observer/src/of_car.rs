@@ -296,7 +296,7 @@ pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncerta
         valve_delay_s: scale * std_dev_of(errors.valve_delay()),
         pressure_pa: scale * PRESSURE_PA,
         drag_n_m: 0.0,
-        width: errors.width(),
+        widths: errors.widths(),
     }
 }
 

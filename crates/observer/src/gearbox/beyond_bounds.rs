@@ -9,8 +9,9 @@
 //! d = sum(w e)/n      s^2 = 1/n + beta      n = sum(w w)
 //! ```
 //!
-//! with the variance `beta` of what all shifts have wrong alike, as in [`super::systematic`], times the square of how much wider than usual the bounds
-//! of the elements are: hysteresis, offsets of commands and the curvature of the models are as large as these allow. A quantity is beyond its bound where `d` exceeds it by
+//! with the variance `beta` of what all shifts have wrong alike, as in [`super::systematic`], times the square of how much wider than usual those
+//! bounds of the elements are that it follows from: hysteresis, offsets of commands and the curvature of the models are as large as these allow. A
+//! quantity is beyond its bound where `d` exceeds it by
 //! [`CERTAIN`] times `s`. The cause that is named is the most likely one of those with a size beyond their bounds, where sizes have the standard
 //! deviation `c` ([`BEYOND`]) beforehand: so a cause that needs an unlikely size is none. By the logarithm of the likelihood that is
 //!
@@ -45,8 +46,15 @@ const OF_INERTIA: f64 = 1.0;
 const OF_LAG: f64 = 0.15;
 const OF_DELAY: f64 = 0.8;
 const OF_STIFFNESS: f64 = 0.5;
+/// What wider bounds of command or hysteresis add to it, per variance of such an offset within usual bounds: uniform up to 12 mA, which are 13 kPa of
+/// a usual valve and 13 ms of a ramp of 1 MPa/s, where the kiss point has 9.5 kPa and the delay 7.5 ms.
+const KISS_BY_OFFSET: f64 = 0.65;
+const DELAY_BY_OFFSET: f64 = 1.0;
 /// Standard deviation of a quantity beyond its bound, in that within it \[chosen\].
 const BEYOND: f64 = 4.0;
+
+/// How many times as wide as usual the bounds of each element are ([`super::ElementUncertainty::widths`]).
+pub(super) type Widths<T> = [[T; 3]; MAX_ELEMENTS];
 
 /// A quantity of the car.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,7 +125,7 @@ impl<T: Real> Evidence<T> {
 
     /// Takes what a shift has shown of elements whose bounds have these widths, with a wheel speed or without. Without one the load of the road and
     /// the stiffness of the drive shafts look alike.
-    pub(super) fn take(&mut self, acting: &Acting<T>, shown: &Shown<T>, widths: &[T; MAX_ELEMENTS], has_wheels: bool) {
+    pub(super) fn take(&mut self, acting: &Acting<T>, shown: &Shown<T>, widths: &Widths<T>, has_wheels: bool) {
         let mut add = |at: usize, column: &[T; ACTING]| {
             let w = shown.per_quantity(column);
             let square_now = dot(&w, &w);
@@ -151,7 +159,7 @@ impl<T: Real> Evidence<T> {
     }
 
     /// The most likely one of the quantities beyond their bounds, if one is for certain.
-    fn beyond(&self, widths: &[T; MAX_ELEMENTS]) -> Option<usize> {
+    fn beyond(&self, widths: &Widths<T>) -> Option<usize> {
         let (mut is_certain, mut found) = (false, (None, T::zero()));
         let sums = self.products.iter().zip(&self.squares).zip(&self.shifts).enumerate();
         for (k, ((product, n), shifts)) in sums.filter(|(_, ((_, n), _))| **n > T::of(LEAST)) {
@@ -168,7 +176,7 @@ impl<T: Real> Evidence<T> {
 
     /// Size of a quantity by the shifts alone and its variance, in the standard deviation unlearnt, and the part of the size that is left with
     /// what sizes beyond a bound are likely.
-    fn by_shifts(&self, k: usize, widths: &[T; MAX_ELEMENTS]) -> [T; 3] {
+    fn by_shifts(&self, k: usize, widths: &Widths<T>) -> [T; 3] {
         let k = k.min(HYPOTHESES - 1);
         let (n, beyond) = (self.squares[k], T::of(BEYOND * BEYOND));
         let variance = n.recip() + in_common(k, widths);
@@ -176,13 +184,13 @@ impl<T: Real> Evidence<T> {
     }
 
     /// Size of a quantity beyond its bound and its standard deviation, in that unlearnt.
-    fn size(&self, k: usize, widths: &[T; MAX_ELEMENTS]) -> [T; 2] {
+    fn size(&self, k: usize, widths: &Widths<T>) -> [T; 2] {
         let [size, variance, weight] = self.by_shifts(k, widths);
         [weight * size, (weight * variance).sqrt()]
     }
 
     /// `L` of a quantity.
-    fn likelihood(&self, k: usize, widths: &[T; MAX_ELEMENTS]) -> T {
+    fn likelihood(&self, k: usize, widths: &Widths<T>) -> T {
         let [size, variance, weight] = self.by_shifts(k, widths);
         T::of(0.5) * (weight * size * size / variance + (T::one() - weight).ln())
     }
@@ -194,7 +202,7 @@ fn place(k: usize) -> usize {
 }
 
 /// Variance of the error that all shifts have in common of what they show of it: of one element by its own bounds, of others by the widest.
-fn in_common<T: Real>(k: usize, widths: &[T; MAX_ELEMENTS]) -> T {
+fn in_common<T: Real>(k: usize, widths: &Widths<T>) -> T {
     let variance = match place(k) {
         0..KISS_AT => OF_FACTOR,
         KISS_AT..INERTIA_AT => OF_KISS,
@@ -205,14 +213,24 @@ fn in_common<T: Real>(k: usize, widths: &[T; MAX_ELEMENTS]) -> T {
     };
     let of_one = ALIKE.into_iter().find(|first| (*first..first + MAX_ELEMENTS).contains(&k));
     let own = of_one.and_then(|first| widths.get(k - first).copied());
-    let width = own.unwrap_or_else(|| widths.iter().copied().fold(T::one(), T::max));
-    T::of(variance) * width * width
+    let larger = |one: [T; 3], other: [T; 3]| core::array::from_fn(|i| one[i].max(other[i]));
+    let [torque, offset, timing] = own.unwrap_or_else(|| widths.iter().copied().fold([T::one(); 3], larger));
+    // A torque that is off moves no pressure in time.
+    let width = if place(k) >= LAG_AT { offset.max(timing) } else { torque.max(offset).max(timing) };
+    let by_offset = match place(k) {
+        KISS_AT..INERTIA_AT => KISS_BY_OFFSET,
+        DELAY_AT.. => DELAY_BY_OFFSET,
+        _ => 0.0,
+    };
+    T::of(variance) * width * width + T::of(by_offset) * (offset * offset - T::one())
 }
 
 impl<T: Real> GearboxFilter<'_, T> {
     /// The widths of the bounds of all elements.
-    pub(super) fn widths(&self) -> [T; MAX_ELEMENTS] {
-        core::array::from_fn(|at| self.tables.elements.get(at).map_or(T::one(), |element| element.uncertainty.width))
+    pub(super) fn widths(&self) -> Widths<T> {
+        core::array::from_fn(|at| {
+            self.tables.elements.get(at).map_or([T::one(); 3], |element| element.uncertainty.widths)
+        })
     }
 
     /// The quantity of the car that is beyond the bound of its error by the shifts of this drive, if one is: then the guaranteed ranges do not

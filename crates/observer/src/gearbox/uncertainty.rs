@@ -54,8 +54,8 @@ pub struct ElementUncertainty<T> {
     pub pressure_pa: T,
     /// Torque of the plates that no model has, of a clutch that slips or is open: its drag, N m.
     pub drag_n_m: T,
-    /// How many times as wide as usual the bounds of its errors are, by the widest of them.
-    pub width: T,
+    /// How many times as wide as usual the bounds of its errors are: the wider of friction and gain, of hysteresis and command, of lag and delay.
+    pub widths: [T; 3],
 }
 
 impl<T: Real> ShiftUncertainty<T> {
@@ -98,7 +98,7 @@ impl<T: Real> ElementUncertainty<T> {
             valve_delay_s: to(self.valve_delay_s),
             pressure_pa: to(self.pressure_pa),
             drag_n_m: to(self.drag_n_m),
-            width: to(self.width),
+            widths: self.widths.map(to),
         }
     }
 }

@@ -157,6 +157,25 @@ fn of_a_car_at_the_end_of_wide_bounds_nothing_is_said() {
     assert!(late.of_all(|clutch| valve(clutch, 1.0, 1.0, Some(0.12))).is_none(), "delay 120 ms");
     let slow = Driven::new(stating(&|bounds| bounds.valve_lag_factor = Some([1.0, 2.5])));
     assert!(slow.of_all(|clutch| valve(clutch, 2.5, 1.0, None)).is_none(), "lag 2.5 times");
+    let slow = Driven::new(stating(&|bounds| bounds.valve_lag_factor = Some([0.3, 2.5])));
+    for at in 0..slow.known.clutches.len() {
+        let mut truth = slow.known.clone();
+        truth.clutches[at].iter_mut().for_each(|clutch| valve(clutch, 2.5, 1.0, None));
+        let found = slow.found(truth, 0.0, 1);
+        show(&format!("lag 2.5 times, element {at}"), &found);
+        assert!(found.is_none(), "lag of one valve");
+    }
+    let current = stating(&|bounds| bounds.command = Some(0.06));
+    for offset in [-0.06, -0.05, 0.05, 0.06] {
+        let found = Driven::new(current.clone()).found(current.clone(), offset, 1);
+        show(&format!("offset {offset}"), &found);
+        assert!(found.is_none(), "offset of all currents within 60 mA");
+    }
+    // A delay is found where only the gain is stated wide.
+    let late = Driven::new(stating(&|bounds| bounds.valve_gain_factor = Some([0.7, 1.3])));
+    let found = late.of_all(|clutch| valve(clutch, 1.0, 1.0, Some(0.08)));
+    show("delay 80 ms, gain wide", &found);
+    assert!(found.is_some());
 }
 
 /// The load of the road is then known by the output speed alone.

@@ -17,7 +17,7 @@ const UNCERTAINTY: ElementUncertainty<f64> = ElementUncertainty {
     valve_lag_fraction: 0.3,
     valve_delay_s: 9e-3,
     pressure_pa: 7e3,
-    width: 1.0,
+    widths: [1.0; 3],
 };
 
 fn element() -> FrictionElement<f64> {
