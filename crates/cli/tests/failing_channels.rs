@@ -214,6 +214,15 @@ fn a_shift_in_which_a_speed_fails_keeps_its_friction_work_and_says_what_failed()
         assert!(least_j < work_j && work_j < greatest_j, "{least_j} {work_j} {greatest_j}");
         assert!(!["", "good"].contains(&&*health), "{shifts}");
     }
+    // From within the shift to the end of the log.
+    for (speed, from_s) in [("turbine", 7.75), ("turbine", 8.1), ("output", 7.75), ("output", 8.25)] {
+        let log = case.with(&format!("{speed}_speed_rad_s"), [from_s, f64::INFINITY], "0");
+        let (note, _, shifts) = case.estimate(&log, &[]);
+        assert_eq!(shifts.lines().count(), clean.lines().count(), "{speed} {from_s}: {note}");
+        let ([_, least_j, greatest_j], health) = work_of_first(&shifts);
+        assert!(least_j < work_j && work_j < greatest_j, "{least_j} {work_j} {greatest_j}");
+        assert!(!["", "good"].contains(&&*health), "{shifts}");
+    }
 }
 
 #[test]

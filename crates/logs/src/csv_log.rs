@@ -7,6 +7,7 @@ use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use trace::csv_file::{LONGEST_ROW, number};
+use trace::units::Scale;
 use trace::{RecordError, Records, Unit};
 
 use crate::columns::{Batch, Stream};
@@ -40,7 +41,7 @@ pub(crate) struct CsvLog {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum TimeForm {
     /// Numbers of a unit of this size, s.
-    Numbers(f64),
+    Numbers(Scale),
     Stamps(StampForm),
     /// A time of the day in several columns.
     Parts(ClockParts),
@@ -91,12 +92,12 @@ impl CsvLog {
         let time = match (stamp(column), parts) {
             (_, Some(parts)) => (column, TimeForm::Parts(parts)),
             (Some(form), None) => (column, TimeForm::Stamps(form)),
-            (None, None) => (column, TimeForm::Numbers(time_unit(path, &names[column], time, &mut notes)?)),
+            (None, None) => (column, TimeForm::Numbers(Scale::of(time_unit(path, &names[column], time, &mut notes)?))),
         };
         // The last line of the head may be cut.
         let whole = beginning.lines().count().saturating_sub(usize::from(!beginning.ends_with('\n')));
         let lines = beginning.lines().enumerate().take(whole).skip(dialect.first);
-        let size_s = if let TimeForm::Numbers(size) = time.1 { size } else { 1.0 };
+        let size_s = if let TimeForm::Numbers(scale) = time.1 { scale.size() } else { 1.0 };
         let rows = lines.map(|(line, text)| (line, cells(text, dialect.delimiter)));
         if parts.is_none() {
             one_clock(path, &names, (column, size_s), "line", rows)?;
@@ -229,7 +230,9 @@ impl Rows<'_> {
     fn time_s(&mut self) -> Option<f64> {
         let (column, form) = self.log.time;
         match form {
-            TimeForm::Numbers(size) => self.number(column).map(|time| time * size).filter(|time_s| time_s.is_finite()),
+            TimeForm::Numbers(scale) => {
+                self.number(column).map(|time| scale.of_value(time)).filter(|time_s| time_s.is_finite())
+            }
             TimeForm::Parts(parts) => {
                 let time_s = parts.seconds(|column| self.number(column))?;
                 Some(self.midnight.unwrap(time_s))

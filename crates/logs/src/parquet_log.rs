@@ -26,6 +26,7 @@ use crate::time_column::{is_time_name, time_column, time_unit};
 use crate::{Channel, LogError, TimeColumn, error};
 use pages::CheckedPages;
 use trace::Unit;
+use trace::units::Scale;
 
 /// Rows that are decoded at once: their columns stay in the second cache. Of many columns fewer, but so many, are.
 const BATCH: usize = 8192;
@@ -38,7 +39,7 @@ pub(crate) struct ParquetLog {
     path: PathBuf,
     reader: SerializedFileReader<File>,
     /// Column and size in s of the time.
-    time: (usize, f64),
+    time: (usize, Scale),
     time_form: Form,
     /// Whether the time is that of the day.
     is_of_day: bool,
@@ -101,7 +102,7 @@ impl ParquetLog {
             group: String::new(),
         });
         let channels = channels.collect();
-        let time = (time, size_s);
+        let time = (time, Scale::of(size_s));
         Ok((Self { path: path.to_owned(), reader, time, time_form, is_of_day, columns, notes }, channels))
     }
 
@@ -311,7 +312,7 @@ impl Groups<'_> {
         let end = first + rows;
         numbers(&mut open.time, self.log.time_form, rows, &mut block.times_s)?;
         for time_s in &mut block.times_s[first..] {
-            *time_s *= self.log.time.1;
+            *time_s = self.log.time.1.of_value(*time_s);
             if self.log.is_of_day && time_s.is_finite() {
                 *time_s = self.midnight.unwrap(*time_s);
             }

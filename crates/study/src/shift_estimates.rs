@@ -9,7 +9,7 @@ use std::ops::Range;
 use car::Vehicle;
 use drivetrain::ReducedShift;
 use logs::shifts::Held;
-use logs::{Load, Shift};
+use logs::{Direction, Load, Shift, ShiftQuality};
 use observer::{ChannelHealth, Channels, Estimate, Health, Input, Phase, Reading};
 use trace::Cell;
 
@@ -208,6 +208,36 @@ pub fn is_of_vehicle(shift: &Shift, ratios: &[f64], vehicle: &Vehicle) -> bool {
     let of = |gear: u32| usize::try_from(gear).ok().and_then(|gear| ratios.get(gear.checked_sub(1)?));
     let same = |ratio: Option<&f64>, own: f64| ratio.is_some_and(|ratio| (ratio / own - 1.0).abs() < SAME_RATIO);
     same(of(shift.from), vehicle.shift.ratio_offgoing()) && same(of(shift.to), vehicle.shift.ratio_oncoming())
+}
+
+/// The shift of a vehicle file at the end of the samples that its observer has seen after this time, where the speeds do not show it because one of
+/// them was lost to the end.
+pub fn seen_by_observer_alone(
+    recent: &RecentSamples,
+    after_s: f64,
+    ratios: &[f64],
+    vehicle: &Vehicle,
+) -> Option<Shift> {
+    let samples = recent.between([f64::NEG_INFINITY, f64::INFINITY]);
+    samples.last().filter(|sample| is_blind(sample))?;
+    let is_in = |sample: &LogSample| sample.estimate.phase == Phase::InertiaPhase;
+    let last = samples.iter().rposition(is_in)?;
+    let first = last - samples[..last].iter().rev().take_while(|sample| is_in(sample)).count();
+    let inertia_s = [samples[first].time_s, samples.get(last + 1).unwrap_or(&samples[last]).time_s];
+    let gears = |from, to| Shift {
+        from,
+        to,
+        direction: Direction::Up,
+        load: Load::Unknown,
+        command_s: None,
+        inertia_s: Some(inertia_s),
+        gear_s: None,
+        quality: ShiftQuality::default(),
+    };
+    let last_gear = u32::try_from(ratios.len()).ok()?;
+    let mut upshifts = (2..=last_gear).map(|to| gears(to - 1, to));
+    let shift = upshifts.find(|shift| is_of_vehicle(shift, ratios, vehicle))?;
+    (inertia_s[0] > after_s).then_some(shift)
 }
 
 impl ShiftEstimate {

@@ -31,13 +31,14 @@ pub fn to_si(name: &str) -> (String, f64) {
 }
 
 /// What brings a value in a unit to SI. The size of a unit such as 0.001 is no binary fraction: a value over 1000 is the number as people write it,
-/// 1.019 A for 1019 mA.
+/// 1.019 A for 1019 mA. Nor is 1.1, and 1.1 bar are 110000 Pa: times a whole number of ten or more, what is as near to a thousandth as its last digit is this
+/// thousandth.
 ///
 /// ```
 /// use trace::units::Scale;
 ///
 /// assert_eq!(Scale::of(1e-3).of_value(1019.0), 1.019);
-/// assert_eq!(Scale::of(1e5).of_value(3.0), 3e5);
+/// assert_eq!(Scale::of(1e5).of_value(1.1), 1.1e5);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
@@ -55,7 +56,12 @@ impl Scale {
     /// The value in SI.
     #[inline]
     pub fn of_value(self, value: f64) -> f64 {
-        value * self.times / self.over
+        let si = value * self.times / self.over;
+        if self.times < 10.0 || self.times.fract() != 0.0 {
+            return si;
+        }
+        let near = (si * 1e3).round() / 1e3;
+        if (near - si).abs() <= 2.0 * f64::EPSILON * si.abs() { near } else { si }
     }
 
     /// The size of the unit.

@@ -8,6 +8,7 @@ use can_dbc::{
     SignalExtendedValueType, ValDescription, ValueDescription, ValueType,
 };
 use trace::text_file::LARGEST_LIST;
+use trace::units::Scale;
 
 use super::bits::{Bits, Number};
 use super::frame::{Frame, PAYLOAD};
@@ -48,7 +49,7 @@ struct Signal {
     channel: usize,
     bits: Bits,
     number: Number,
-    factor: f64,
+    factor: Scale,
     offset: f64,
     /// Raw values that the DBC names as none, in their order.
     missing: Vec<u64>,
@@ -190,7 +191,7 @@ impl Signal {
             channel,
             bits: Bits { start, size, big_endian: signal.byte_order == ByteOrder::BigEndian },
             number,
-            factor,
+            factor: Scale::of(factor),
             offset,
             missing: named.missing(names),
             can_saturate: number == Number::Unsigned && size >= 8 && !named.ends_at_all_bits(),
@@ -203,7 +204,7 @@ impl Signal {
         if self.missing.binary_search(&raw).is_ok() || self.largest_raw.is_some_and(|largest| raw > largest) {
             return (f64::NAN, Quality::Missing);
         }
-        let value = self.number.of(raw, self.bits.size) * self.factor + self.offset;
+        let value = self.factor.of_value(self.number.of(raw, self.bits.size)) + self.offset;
         let quality = match () {
             () if !value.is_finite() => Quality::Missing,
             () if self.can_saturate && self.bits.all_set(raw) => Quality::Saturated,

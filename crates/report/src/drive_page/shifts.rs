@@ -274,6 +274,8 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
     let [offgoing, oncoming] = clutch_names(shift, car);
     let quality = &shift.quality;
     let number = |name: &str, value: f64| (name.to_owned(), Cell::Number(trace::rounded(value)));
+    // A clock since 1970 has a fraction of a microsecond.
+    let duration = |name: &str, value_s: f64| number(name, (1e6 * value_s).round() / 1e6);
     let word = |name: &str, word: &'a str| (name.to_owned(), Cell::Word(word));
     let mut cells = vec![
         ("number".to_owned(), Cell::Whole(shift.number as u64)),
@@ -283,12 +285,12 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         word("kind", kind_name(shift).unwrap_or_default()),
         word("offgoing", offgoing),
         word("oncoming", oncoming),
-        number("complete_s", quality.complete_s.unwrap_or(f64::NAN)),
-        number(
+        duration("complete_s", quality.complete_s.unwrap_or(f64::NAN)),
+        duration(
             "torque_phase_s",
             if car.gearbox.has_ratios_alone() { f64::NAN } else { phase_s(shift, TruePhase::Torque) },
         ),
-        number("inertia_phase_s", phase_s(shift, TruePhase::Inertia)),
+        duration("inertia_phase_s", phase_s(shift, TruePhase::Inertia)),
         number("flare_rad_s", quality.flare_rad_s),
         number("past_synchronous_rad_s", quality.past_synchronous_rad_s),
         number("held_slip_rad_s", quality.held_slip_rad_s),
@@ -299,10 +301,10 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
     let felt = |of: fn(&ShiftComfort) -> f64| shift.comfort.as_ref().map_or(f64::NAN, of);
     let rating = shift.comfort.as_ref().and_then(|comfort| comfort.rating(quality));
     cells.extend([
-        number("response_s", felt(|comfort| comfort.response_s)),
+        duration("response_s", felt(|comfort| comfort.response_s)),
         number("acceleration_step_m_s2", felt(ShiftComfort::step_m_s2)),
         number("torque_hole_fraction", felt(|comfort| comfort.hole)),
-        number("torque_hole_s", felt(|comfort| comfort.hole_s)),
+        duration("torque_hole_s", felt(|comfort| comfort.hole_s)),
         number("vibration_dose_m_s1_75", felt(|comfort| comfort.vibration_dose_m_s1_75)),
         number("rating", rating.unwrap_or(f64::NAN)),
         number("oncoming_plates_degc", shift.plates_degc.unwrap_or(f64::NAN)),

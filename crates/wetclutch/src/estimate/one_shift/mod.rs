@@ -205,6 +205,9 @@ fn pass<'log, 'rows>(
     for shift in log.last_shifts() {
         rows.shift(shift)?;
     }
+    if let Some(shift) = rows.shifts.of_observer_alone() {
+        rows.shift(shift)?;
+    }
     Ok((log, rows))
 }
 

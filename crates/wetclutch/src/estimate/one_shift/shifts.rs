@@ -3,7 +3,7 @@
 use car::Vehicle;
 use logs::Shift;
 use report::log_page::MAX_DRAWN;
-use study::shift_estimates::{is_of_vehicle, thinned};
+use study::shift_estimates::{is_of_vehicle, seen_by_observer_alone, thinned};
 use study::{LogSample, Overview, RecentSamples, ShiftEstimate};
 
 use crate::Error;
@@ -15,6 +15,8 @@ pub(crate) struct Shifts<'a> {
     ratios: Vec<f64>,
     selection: Selection,
     recent: RecentSamples,
+    /// When the last one ended, s.
+    ended_s: f64,
     /// Those that are wanted.
     pub(crate) found: Vec<ShiftEstimate>,
     pub(crate) overview: Overview,
@@ -27,6 +29,7 @@ impl<'a> Shifts<'a> {
             ratios: ratios.to_vec(),
             selection: Selection::of(wanted),
             recent: RecentSamples::default(),
+            ended_s: f64::NEG_INFINITY,
             found: Vec::new(),
             overview: Overview::default(),
         }
@@ -47,8 +50,14 @@ impl<'a> Shifts<'a> {
         self.recent.push(sample);
     }
 
+    /// The shift at the end of the log that the observer alone has seen, if there is one.
+    pub(crate) fn of_observer_alone(&self) -> Option<Shift> {
+        seen_by_observer_alone(&self.recent, self.ended_s, &self.ratios, self.vehicle)
+    }
+
     /// Takes a shift that is known now; `write` gets its samples if only some shifts are wanted and this is one.
     pub(crate) fn take<E>(&mut self, shift: Shift, write: impl FnOnce(&[LogSample]) -> Result<(), E>) -> Result<(), E> {
+        self.ended_s = self.ended_s.max(shift.end_s());
         if !self.selection.begins(&format!("{}-{}", shift.from, shift.to)) {
             return Ok(());
         }
