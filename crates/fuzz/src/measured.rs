@@ -43,7 +43,7 @@ pub(crate) fn log(fuzzer: &Fuzzer, input: &[u8]) {
     let options = OpenOptions { dbc: Some(bus()), time: None };
     let open = || Log::open(&path, &options).ok();
     let Some(mut log) = open() else { return };
-    let map = written(fuzzer, "suggested.toml", suggest(log.channels(), None).as_bytes());
+    let map = written(fuzzer, "suggested.toml", suggest(log.channels(), &[], None).as_bytes());
     let inspected = inspect(&mut log).ok();
     // In columns, and on several threads, a log has the same samples.
     let on_threads = open().map(|log| log.on_threads(3));

@@ -124,8 +124,6 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
         Quantity::Pressure => Role::ElementPressure,
         _ => return None,
     };
-    // `I_EDS_A`, `MV1`: the solenoid of an element, with the letter of the element or its own number.
-    const BANK: &[&str] = &["eds", "edc", "mv", "dr", "pcs", "ssv", "vbs", "nfs", "y", "druckregler", "regelventil"];
     // `I_A`, `I_K1`: a current and a letter, with or without a number.
     let is_lettered = match &words[..] {
         [i, letter, number @ ..] => {
@@ -167,6 +165,16 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
     let name = named.concat();
     let longest = if named.iter().any(|word| BANK.contains(word)) { LONGEST_ELEMENT + 2 } else { LONGEST_ELEMENT };
     (1..=longest).contains(&name.len()).then_some((role, name))
+}
+
+/// Words for the solenoids of elements: `I_EDS_A`, `MV1`.
+const BANK: &[&str] = &["eds", "edc", "mv", "dr", "pcs", "ssv", "vbs", "nfs", "y", "druckregler", "regelventil"];
+
+/// Whether a channel without a unit has the name of a solenoid and its number: `MV1`, `Y3`.
+fn is_solenoid_without_unit(channel: &Channel) -> bool {
+    let words = words(&channel.name);
+    let [bank, number] = &words[..] else { return false };
+    channel.unit.trim().is_empty() && BANK.contains(&bank.as_str()) && number.bytes().all(|c| c.is_ascii_digit())
 }
 
 /// The commands of the elements of a whole gearbox, and what is measured of their pressures: keys in a map, and channels. None if there are
@@ -226,9 +234,15 @@ fn fraction_of(whole: usize, channels: &[Channel]) -> Option<usize> {
 /// Unused channels that are named at most; a bus has hundreds.
 const UNUSED: usize = 20;
 
-/// A channel map for a log, as the text of a TOML file. Channels in doubt stand beside it as comments.
-pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
-    let mut text = String::from("# A first channel map, from names and units alone: check every line.\n");
+/// Minimum and maximum of the values of a channel, in its unit; none where they are not known.
+type Range = Option<[f64; 2]>;
+
+/// A channel map for a log, as the text of a TOML file. Channels in doubt stand beside it as comments. `ranges` are those of the values of the channels; it
+/// is empty where they are not known.
+pub fn suggest(channels: &[Channel], ranges: &[Range], dbc: Option<&str>) -> String {
+    let range = |at: usize| ranges.get(at).copied().flatten();
+    let source = if ranges.is_empty() { "names and units" } else { "names, units and values" };
+    let mut text = format!("# A first channel map, from {source} alone: check every line.\n");
     if let Some(dbc) = dbc {
         let _ = writeln!(text, "dbc = {}", quoted(dbc));
     }
@@ -236,8 +250,10 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     let mut taken = vec![false; channels.len()];
     let elements = elements(channels);
     elements.iter().for_each(|(_, at)| taken[*at] = true);
-    let fractions: Vec<Option<usize>> = (0..channels.len()).map(|at| fraction_of(at, channels)).collect();
-    fractions.iter().flatten().for_each(|at| taken[*at] = true);
+    let named: Vec<Option<usize>> = (0..channels.len()).map(|at| fraction_of(at, channels)).collect();
+    let is_fraction = |at: &usize| range(*at).is_none_or(|[low, high]| -1.0 <= low && high <= 1.0);
+    let fractions: Vec<Option<usize>> = named.iter().map(|at| at.filter(is_fraction)).collect();
+    named.iter().flatten().for_each(|at| taken[*at] = true);
     for entry in TABLE {
         let mut found: Vec<(Fit, usize)> = channels
             .iter()
@@ -255,9 +271,16 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
         taken[best] = true;
         let table = match fractions[best] {
             Some(fraction) => sum_of([best, fraction], entry.role, channels),
-            None => table_of(entry.role.name(), entry.role, best, channels),
+            None => table_of(entry.role.name(), entry.role, best, channels, range(best)),
         };
         text += &if best_fit == Fit::Fraction { of_fraction(&table) } else { table };
+        if let Some((at, [low, high])) =
+            named[best].and_then(|at| Some((at, range(at)?))).filter(|(at, _)| !is_fraction(at))
+        {
+            let name = error::shown(&channels[at].name);
+            let _ =
+                writeln!(text, "# {name} has values of {low} to {high}: more than a fraction has, and is not added");
+        }
         let others = found.iter().skip(1).filter(|(fit, _)| (*fit == Fit::Fraction) == (best_fit == Fit::Fraction));
         let others: Vec<String> = others.take(4).map(|(_, i)| error::shown(&channels[*i].name)).collect();
         if !others.is_empty() {
@@ -271,12 +294,12 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     }
     for (key, at) in &elements {
         let role = Role::of_element(key).map_or(Role::ElementCurrent, |(role, _)| role);
-        text += &table_of(key, role, *at, channels);
+        text += &table_of(key, role, *at, channels, range(*at));
     }
-    let perhaps = channels
-        .iter()
-        .zip(&taken)
-        .filter(|(channel, taken)| !**taken && element(channel).is_some_and(|(role, _)| role != Role::ElementPressure));
+    let may_be_command = |channel: &Channel| {
+        is_solenoid_without_unit(channel) || element(channel).is_some_and(|(role, _)| role != Role::ElementPressure)
+    };
+    let perhaps = channels.iter().zip(&taken).filter(|(channel, taken)| !**taken && may_be_command(channel));
     let perhaps: Vec<String> = perhaps.take(UNUSED).map(|(channel, _)| error::shown(&channel.name)).collect();
     if !perhaps.is_empty() {
         let _ = writeln!(text, "\n# Perhaps commands of clutches, which an estimate needs: {}", perhaps.join(", "));
@@ -297,8 +320,20 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     text
 }
 
+/// The unit of values without one: that of the program, or the usual one of those that no car has in that unit.
+fn unit_by_values(role: Role, range: Range) -> &'static str {
+    let is_above = |maximum: f64| range.is_some_and(|[_, high]| high > maximum);
+    match role.quantity() {
+        // 7600 rpm, 250 km/h and 20 A \[chosen\].
+        Some(Quantity::Rotation) if is_above(800.0) => "rpm",
+        Some(Quantity::Velocity) if is_above(70.0) => "km/h",
+        Some(Quantity::Current) if is_above(20.0) => "mA",
+        _ => role.unit(),
+    }
+}
+
 /// The table of a channel in a map.
-fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
+fn table_of(key: &str, role: Role, at: usize, channels: &[Channel], range: Range) -> String {
     let channel = &channels[at];
     let mut text = format!("\n[channel.{key}]\nname = {}\n", quoted(&channel.name));
     if channels.iter().filter(|other| other.name == channel.name).count() > 1 {
@@ -312,7 +347,9 @@ fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
             let _ = writeln!(text, "# unit of the log: {}", error::shown(&channel.unit));
         }
         _ if role.quantity().is_some() => {
-            let _ = writeln!(text, "unit = {} # not in the log: check", quoted(role.unit()));
+            let unit = unit_by_values(role, range);
+            let reason = if unit == role.unit() { "" } else { ", by its values" };
+            let _ = writeln!(text, "unit = {} # not in the log{reason}: check", quoted(unit));
         }
         _ => {}
     }
@@ -323,7 +360,8 @@ fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
 fn sum_of([whole, fraction]: [usize; 2], role: Role, channels: &[Channel]) -> String {
     let name = |at: usize| quoted(&channels[at].name);
     let both = format!("names = [{}, {}]\ncombine = \"sum\"\n", name(whole), name(fraction));
-    let table = table_of(role.name(), role, whole, channels).replacen(&format!("name = {}\n", name(whole)), &both, 1);
+    let table =
+        table_of(role.name(), role, whole, channels, None).replacen(&format!("name = {}\n", name(whole)), &both, 1);
     let (unit, other) = (&channels[whole].unit, &channels[fraction].unit);
     if unit == other {
         return table;

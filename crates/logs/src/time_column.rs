@@ -155,12 +155,15 @@ fn are_of_signals(names: &[(String, String)], time: usize, other: usize) -> bool
     time_of_signal(&names[time]).is_some_and(|word| time_of_signal(&names[other]) == Some(word))
 }
 
-/// The word for time before the name of a signal, as in `t_Eng [ms]`: the time of that signal alone.
-fn time_of_signal((name, unit): &(String, String)) -> Option<String> {
-    let is_in_time = Unit::parse(unit).is_some_and(|unit| unit.quantity == Quantity::Time);
-    let (word, signal) = name.split_once(['_', ' ', '.', '-']).filter(|_| is_in_time)?;
-    let word = word.to_lowercase();
-    (!signal.is_empty() && ["t", "ts", "time", "zeit"].contains(&word.as_str())).then_some(word)
+/// The word for time before or after the name of a signal, as in `t_Eng [ms]` and `Eng_t [ms]`: the time of that signal alone; and whether it is before.
+fn time_of_signal((name, unit): &(String, String)) -> Option<(String, bool)> {
+    const SIGNS: [char; 4] = ['_', ' ', '.', '-'];
+    Unit::parse(unit).filter(|unit| unit.quantity == Quantity::Time)?;
+    let before = name.split_once(SIGNS).map(|(word, signal)| (word, signal, true));
+    let after = name.rsplit_once(SIGNS).map(|(signal, word)| (word, signal, false));
+    let words = [before, after].into_iter().flatten().filter(|(_, signal, _)| !signal.is_empty());
+    let mut words = words.map(|(word, _, is_before)| (word.to_lowercase(), is_before));
+    words.find(|(word, _)| ["t", "ts", "time", "zeit"].contains(&word.as_str()))
 }
 
 /// The column of the time: the one that is wanted, or has a usual name, or is the first one and in a unit of time.

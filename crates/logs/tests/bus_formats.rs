@@ -152,7 +152,7 @@ fn parameter_groups_of_j1939_are_found_whatever_priority_and_source_are() {
         notes.iter().any(|note| note.starts_with("1 of 5 frames, of 1 identifiers, are not in the DBC: 0x18FEF100")),
         "{notes:?}"
     );
-    let suggested = logs::suggest(found.channels(), None);
+    let suggested = logs::suggest(found.channels(), &[], None);
     for (role, name) in [
         ("engine_speed", "EngSpeed"),
         ("output_speed", "TransOutputShaftSpeed"),

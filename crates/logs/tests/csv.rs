@@ -150,6 +150,7 @@ fn a_table_with_a_time_for_each_signal_is_refused() {
         ("timestamp", "timestamp (2)"),
         ("t [s]", "t [s]"),
         ("t_Eng [s]", "t_Turb [s]"),
+        ("Eng_t [s]", "Turb_t [s]"),
     ] {
         let text = format!(
             "{one};N [rpm];{other};M [rpm]\n0.00;1500;0.000;1400\n0.01;1501;0.005;1401\n0.02;1502;0.010;1402\n"

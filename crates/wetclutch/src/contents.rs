@@ -37,14 +37,16 @@ fn channel_cells<'a>((channel, summary): (&'a Channel, &ChannelSummary)) -> Vec<
     cells.map(|(name, cell)| (name.to_owned(), cell)).into()
 }
 
-/// A first channel map of a log by the names and units of its channels, as text. Every line of it has to be checked.
+/// A first channel map of a log by the names, units and values of its channels, as text. Every line of it has to be checked.
 ///
 /// # Errors
-/// The log cannot be opened.
+/// The log cannot be read.
 pub fn suggested_map(log: LogInput<'_>) -> Result<String, Error> {
-    let opened = log.open(None, 1)?;
+    let mut opened = log.open(None, 1)?;
+    let inspection = logs::inspect(&mut opened)?;
+    let ranges: Vec<_> = inspection.channels.iter().map(|channel| channel.range).collect();
     let dbc = log.map.open.dbc.as_ref().map(|dbc| dbc.to_string_lossy().into_owned());
-    Ok(logs::suggest(opened.channels(), dbc.as_deref()))
+    Ok(logs::suggest(opened.channels(), &ranges, dbc.as_deref()))
 }
 
 /// The shifts that the speeds of a log show, a row for each, without a vehicle file: gears, kind, times, flare and jerk. Where no

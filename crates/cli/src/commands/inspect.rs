@@ -84,8 +84,13 @@ fn inspect_log(options: &Inspect, path: &Path) -> Result<Option<Value>, Failure>
         let dbc = options.mapping.dbc.as_ref().filter(|_| has_frames);
         let dbc =
             dbc.map(|dbc| std::path::absolute(dbc).unwrap_or_else(|_| dbc.clone()).to_string_lossy().into_owned());
-        let by_names = logs::suggest(log.channels(), dbc.as_deref());
-        let by_values = by_values(path, &by_names);
+        // The values of standard input are gone after they are read.
+        let from_pipe = path == Path::new("-");
+        let inspection = if from_pipe { None } else { logs::inspect(&mut log).ok() };
+        let ranges: Vec<Option<[f64; 2]>> =
+            inspection.iter().flat_map(|inspection| &inspection.channels).map(|channel| channel.range).collect();
+        let by_names = logs::suggest(log.channels(), &ranges, dbc.as_deref());
+        let by_values = by_values(path, &by_names, log.channels(), &ranges);
         let suggested = format!("{by_names}{by_values}");
         if options.json {
             return Ok(Some(json!({ "log": path.shown().to_string(), "channel_map": suggested })));

@@ -9,11 +9,12 @@ use trace::{Quantity, Unit};
 
 use crate::args::available_threads;
 
-/// Lines of comments for a suggested map; none where the log shows nothing, or cannot be read again.
-pub(super) fn by_values(path: &Path, suggested: &str) -> String {
-    let from_pipe = path == Path::new("-");
-    let map = ChannelMap::of_text(Path::new("map.toml"), suggested).ok().filter(|_| !from_pipe);
-    map.map_or(String::new(), |map| ranges(path, &map).unwrap_or_default() + &ratios(path, &map).unwrap_or_default())
+/// Lines of comments for a suggested map, by the ranges of the values of the channels; none where the log shows nothing, or cannot be read again.
+pub(super) fn by_values(path: &Path, suggested: &str, channels: &[Channel], of: &[Option<[f64; 2]>]) -> String {
+    let map = ChannelMap::of_text(Path::new("map.toml"), suggested).ok().filter(|_| !of.is_empty());
+    map.map_or(String::new(), |map| {
+        ranges(&map, channels, of).unwrap_or_default() + &ratios(path, &map).unwrap_or_default()
+    })
 }
 
 fn opened(path: &Path, map: &ChannelMap) -> Option<Log> {
@@ -44,14 +45,15 @@ fn ratios(path: &Path, map: &ChannelMap) -> Option<String> {
 }
 
 /// Ranges for the channels with values that no car has, such as those that mean that there is none.
-fn ranges(path: &Path, map: &ChannelMap) -> Option<String> {
-    let mut log = opened(path, map)?;
-    let inspection = logs::inspect(&mut log).ok()?;
+fn ranges(map: &ChannelMap, channels: &[Channel], of: &[Option<[f64; 2]>]) -> Option<String> {
     let mut text = String::new();
     for mapped in &map.channels {
         let [name] = &mapped.names[..] else { continue };
-        let Ok(at) = log.find(name, mapped.group.as_deref()) else { continue };
-        let found = valid(mapped, &log.channels()[at]).zip(inspection.channels[at].range);
+        let is_it = |channel: &Channel| {
+            channel.name == *name && mapped.group.as_ref().is_none_or(|group| *group == channel.group)
+        };
+        let Some(at) = channels.iter().position(is_it) else { continue };
+        let found = valid(mapped, &channels[at]).zip(of.get(at).copied().flatten());
         let Some(([low, high], [minimum, maximum])) =
             found.filter(|([low, high], [minimum, maximum])| minimum < low || maximum > high)
         else {

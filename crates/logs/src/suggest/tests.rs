@@ -8,7 +8,7 @@ fn channel(name: &str, unit: &str) -> Channel {
 
 /// The channel that is suggested for each role.
 fn suggested(channels: &[Channel]) -> Vec<(String, String)> {
-    let text = suggest(channels, None);
+    let text = suggest(channels, &[], None);
     let table: toml::Table = text.parse().unwrap();
     let channels = table.get("channel").and_then(|value| value.as_table()).cloned().unwrap_or_default();
     channels.into_iter().map(|(role, entry)| (role, entry["name"].as_str().unwrap().to_owned())).collect()
@@ -193,22 +193,22 @@ fn names_that_look_alike_are_not_taken() {
 #[test]
 fn per_cent_of_a_torque_and_single_currents_stand_as_comments() {
     for unit in ["%", ""] {
-        let text = suggest(&[channel("ActualEngPercentTorque", unit)], None);
+        let text = suggest(&[channel("ActualEngPercentTorque", unit)], &[], None);
         let block = "# [channel.engine_torque]\n# name = \"ActualEngPercentTorque\"\n# unit = \"N m\"";
         assert!(text.contains(block) && text.contains("\n# scale =\n"), "{text}");
     }
-    let text = suggest(&[channel("I_A", "mA"), channel("I_B", "mA")], None);
+    let text = suggest(&[channel("I_A", "mA"), channel("I_B", "mA")], &[], None);
     assert!(text.contains("# Perhaps commands of clutches, which an estimate needs: I_A, I_B\n"), "{text}");
     assert_eq!(suggested(&[channel("I_A", "mA"), channel("I_B", "mA")]), []);
 }
 
 #[test]
 fn the_input_of_a_gearbox_is_found_and_unused_channels_are_named() {
-    let text = suggest(&[channel("N_In", "1/min"), channel("I_K1", "mA"), channel("Wiper", "")], None);
+    let text = suggest(&[channel("N_In", "1/min"), channel("I_K1", "mA"), channel("Wiper", "")], &[], None);
     assert!(text.contains("[channel.turbine_speed]\nname = \"N_In\""), "{text}");
     assert!(text.ends_with("# Channels that are not used: I_K1, Wiper\n"), "{text}");
     let many: Vec<Channel> = (0..30).map(|at| channel(&format!("Signal{at}"), "")).collect();
-    assert!(suggest(&many, None).ends_with("Signal19, ...\n"));
+    assert!(suggest(&many, &[], None).ends_with("Signal19, ...\n"));
 }
 
 #[test]
@@ -267,7 +267,7 @@ fn solenoids_by_the_letter_of_their_element_or_their_number_are_commands() {
 #[test]
 fn a_speed_in_two_channels_is_their_sum() {
     let channels = [channel("VehicleSpeed_frac", "km/h"), channel("VehicleSpeed", "km/h"), channel("N_Eng", "rpm")];
-    let text = suggest(&channels, None);
+    let text = suggest(&channels, &[], None);
     let both = "[channel.vehicle_speed]\nnames = [\"VehicleSpeed\", \"VehicleSpeed_frac\"]\ncombine = \"sum\"\n# unit of the log: km/h\n";
     assert!(text.contains(both) && !text.contains("not used"), "{text}");
     for (whole, fraction, unit) in [
@@ -276,11 +276,35 @@ fn a_speed_in_two_channels_is_their_sum() {
         ("VehSpd_Int", "VehSpd_Fract", "km/h"),
         ("VSS_kmh", "VSS_decimal", ""),
     ] {
-        let text = suggest(&[channel(whole, "km/h"), channel(fraction, unit)], None);
+        let text = suggest(&[channel(whole, "km/h"), channel(fraction, unit)], &[], None);
         assert!(text.contains(&format!("names = [\"{whole}\", \"{fraction}\"]\ncombine = \"sum\"")), "{text}");
         assert!(text.contains(if unit.is_empty() { "\nunit = \"km/h\"" } else { "# unit of the log: km/h" }), "{text}");
     }
     // Of another unit it is another signal.
-    let other = suggest(&[channel("VehicleSpeed_frac", "m/s"), channel("VehicleSpeed", "km/h")], None);
+    let other = suggest(&[channel("VehicleSpeed_frac", "m/s"), channel("VehicleSpeed", "km/h")], &[], None);
     assert!(!other.contains("sum"), "{other}");
+}
+
+/// A unit that no car has these values in, and a fraction that is none.
+#[test]
+fn values_tell_a_unit_and_a_fraction() {
+    let channels = [
+        channel("EngineSpeed", ""),
+        channel("TurbineSpeed", ""),
+        channel("VehicleSpeed", "km/h"),
+        channel("VehicleSpeed_frac", ""),
+        channel("MV1", ""),
+        channel("Y3", ""),
+        channel("Y", ""),
+    ];
+    let ranges =
+        [[0.0, 2615.0], [0.0, 510.0], [0.0, 160.0], [0.0, 255.0], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0]].map(Some);
+    let text = suggest(&channels, &ranges, None);
+    assert!(text.contains("unit = \"rpm\" # not in the log, by its values: check"), "{text}");
+    assert!(text.contains("unit = \"rad/s\" # not in the log: check"), "{text}");
+    assert!(text.contains("name = \"VehicleSpeed\"") && !text.contains("combine"), "{text}");
+    assert!(text.contains("# VehicleSpeed_frac has values of 0 to 255"), "{text}");
+    assert!(text.contains("Perhaps commands of clutches, which an estimate needs: MV1, Y3\n"), "{text}");
+    let fraction = [Some([0.0, 2615.0]), None, Some([0.0, 160.0]), Some([0.0, 0.99])];
+    assert!(suggest(&channels, &fraction, None).contains("combine = \"sum\""));
 }
