@@ -133,7 +133,7 @@ pub fn collect(source: LogSource<'_>, given: &Given) -> Result<Collected, FitErr
             Err(reason) => collected.skipped.push(format!("{}: {reason}", record.name)),
         }
     }
-    collected.driving.push(between.recorder.finish());
+    collected.driving.push(Driving { log: path.shown().to_string(), ..between.recorder.finish() });
     Ok(collected)
 }
 

@@ -31,8 +31,10 @@ impl<'a> UsedDriving<'a> {
         let mut used = Self { logs: Vec::new(), others: Vec::new(), left_out: Vec::new() };
         for log in logs.iter().filter(|log| log.time_s() > 0.0) {
             match usable(car, log).car {
-                Err(reason) => used.left_out.push(reason),
-                Ok(()) if used.logs.contains(&log) => used.left_out.push("the same drive again".to_owned()),
+                Err(reason) => used.left_out.push(format!("{}{reason}", log.shown())),
+                Ok(()) if used.logs.iter().any(|other| other.is_same(log)) => {
+                    used.left_out.push(format!("{}the same drive again", log.shown()));
+                }
                 Ok(()) => used.logs.push(log),
             }
         }
@@ -58,7 +60,7 @@ impl<'a> UsedDriving<'a> {
                 None => kept.push(log),
                 Some(reason) => {
                     self.others.push(log);
-                    self.left_out.push(reason);
+                    self.left_out.push(format!("{}{reason}", log.shown()));
                 }
             }
         }

@@ -132,7 +132,7 @@ impl Fit {
         let reasons = match self.driving_left_out.as_slice() {
             [] => String::new(),
             [first] => format!("; not used: {first}"),
-            [first, more @ ..] => format!("; not used: {first} (and those of {} more logs)", more.len()),
+            all => format!("; not used: {}", all.join("; ")),
         };
         if self.driving_s == 0.0 {
             return format!(

@@ -47,15 +47,16 @@ impl Measure {
         }
     }
 
-    /// A number for people, without its unit.
-    fn number(self, value: f64) -> String {
+    /// A number for people, without its unit; with more digits than usual where it has to be told from another one.
+    fn number(self, value: f64, more: usize) -> String {
+        let (few, some) = (1 + more, 3 + more);
         match self {
-            Self::Factor => format!("{value:.3}"),
-            Self::Fraction => format!("{:+.1}", 100.0 * value),
-            Self::Delay => format!("{:+.1}", 1e3 * value),
-            Self::Offset => format!("{:+.1}", 1e-3 * value),
-            Self::Width => format!("{:.1}", 1e-3 * value),
-            Self::Torque => format!("{value:+.1}"),
+            Self::Factor => format!("{value:.some$}"),
+            Self::Fraction => format!("{:+.few$}", 100.0 * value),
+            Self::Delay => format!("{:+.few$}", 1e3 * value),
+            Self::Offset => format!("{:+.few$}", 1e-3 * value),
+            Self::Width => format!("{:.few$}", 1e-3 * value),
+            Self::Torque => format!("{value:+.few$}"),
         }
     }
 
@@ -75,12 +76,20 @@ impl ReportRow {
     /// The value for people: `x 1.042` or `+3.1 ms`.
     pub fn value_text(&self) -> String {
         let times = if self.measure == Measure::Factor { "x " } else { "" };
-        format!("{times}{}{}", self.measure.number(self.value), self.measure.unit_for_people())
+        format!("{times}{}{}", self.measure.number(self.value, self.more_digits()), self.measure.unit_for_people())
+    }
+
+    /// Digits beyond the usual ones with which the ends of the interval are two numbers.
+    fn more_digits(&self) -> usize {
+        const MOST: usize = 3;
+        let [low, high] = self.interval;
+        let is_told = |more: &usize| self.measure.number(low, *more) != self.measure.number(high, *more);
+        (0..MOST).find(is_told).filter(|_| low < high).unwrap_or(0)
     }
 
     /// The interval for people: `1.012 to 1.073`.
     pub fn interval_text(&self) -> String {
-        let [low, high] = self.interval.map(|end| self.measure.number(end));
+        let [low, high] = self.interval.map(|end| self.measure.number(end, self.more_digits()));
         format!("{low} to {high}{}", self.measure.unit_for_people())
     }
 }
@@ -97,6 +106,8 @@ mod tests {
             [row.value_text(), row.interval_text()]
         };
         assert_eq!(row(Measure::Factor, 1.0423, [1.01, 1.0734]), ["x 1.042", "1.010 to 1.073"]);
+        assert_eq!(row(Measure::Factor, 1.00021, [1.0001, 1.0003]), ["x 1.0002", "1.0001 to 1.0003"]);
+        assert_eq!(row(Measure::Factor, 1.0, [1.0, 1.0]), ["x 1.000", "1.000 to 1.000"]);
         assert_eq!(row(Measure::Delay, 0.0031, [-0.001, 0.01]), ["+3.1 ms", "-1.0 to +10.0 ms"]);
         assert_eq!(row(Measure::Offset, -2e3, [-3e3, -1e3]), ["-2.0 kPa", "-3.0 to -1.0 kPa"]);
         assert_eq!(row(Measure::Width, 2e3, [0.0, 4e3]), ["2.0 kPa", "0.0 to 4.0 kPa"]);

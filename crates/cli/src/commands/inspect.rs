@@ -340,6 +340,11 @@ fn shifts(options: &Inspect, path: &Path, log: &mut Log, map: &ChannelMap) -> Re
             "command and gear signal: to one row; phases: as uncertain as begin and end of the inertia phase",
         )?;
     }
+    if found.iter().any(|shift| shift.quality.jerk_m_s3.is_none()) {
+        output::note(
+            "jerk: none without vehicle_acceleration, vehicle_speed, or output_speed with `gearbox.output_rad_per_m`, in all of a shift",
+        );
+    }
     if !has_command(map) {
         output::note("no valve command is mapped: shifts and speeds can be studied, a pressure cannot be estimated");
     }

@@ -32,9 +32,23 @@ pub struct Driving {
     pub(crate) engines: Vec<Vec<Pair>>,
     /// Whether the log was longer than what is kept.
     pub(crate) is_cut: bool,
+    /// What messages call the log; of several logs together nothing.
+    pub(crate) log: String,
 }
 
 impl Driving {
+    /// Whether another log has the same driving.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let Self { stretches, twists, outputs, engines, is_cut, log: _ } = self;
+        (stretches, twists, is_cut) == (&other.stretches, &other.twists, &other.is_cut)
+            && (outputs, engines) == (&other.outputs, &other.engines)
+    }
+
+    /// What messages call the log, before a reason against it.
+    pub(crate) fn shown(&self) -> String {
+        if self.log.is_empty() { String::new() } else { format!("{}: ", self.log) }
+    }
+
     /// Adds the driving of another log.
     pub(crate) fn add(&mut self, more: Self) {
         // The same drive says what it has to say once.
