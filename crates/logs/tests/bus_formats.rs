@@ -124,6 +124,31 @@ fn a_classic_frame_with_a_length_code_above_eight_has_eight_bytes_in_every_forma
     }
 }
 
+/// 64 bytes with their length code in place of their length.
+#[test]
+fn a_frame_of_can_fd_may_have_its_length_code() {
+    let more = |count: usize, with: &str| vec!["00"; count].join(with);
+    let base64 = format!("QAwA{}AA==", "A".repeat(80));
+    for code in [15, 64] {
+        let logs = [
+            format!(
+                ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,l,D\n 1 1000.000 FD 1 0100 Rx - {code} {DATA} {}\n",
+                more(56, " ")
+            ),
+            format!(
+                "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n1000000,00000100,false,Rx,0,{code},{},{},\n",
+                DATA.replace(' ', ","),
+                more(56, ",")
+            ),
+            format!("timestamp,arbitration_id,extended,remote,error,dlc,data\n1.0,0x100,0,0,0,{code},{base64}\n"),
+        ];
+        for log in logs {
+            let (_, values, notes) = engine(&log);
+            assert_eq!((values, notes), (vec![(1.0, 0.25 * f64::from(0x0c40))], vec![]), "{log}");
+        }
+    }
+}
+
 /// A DBC of J1939: engine speed of EEC1, both shaft speeds of ETC1.
 const J1939: &str = "VERSION \"\"\n\nBU_: A\n\nBO_ 2364540158 EEC1: 8 A\n SG_ EngSpeed : 24|16@1+ (0.125,0) [0|8031.875] \"rpm\" A\n\n\
     BO_ 2364539646 ETC1: 8 A\n SG_ TransOutputShaftSpeed : 8|16@1+ (0.125,0) [0|8031.875] \"rpm\" A\n SG_ TransInputShaftSpeed : 40|16@1+ (0.125,0) [0|8031.875] \"rpm\" A\n";

@@ -17,9 +17,14 @@ pub(super) fn classic_length(code: &str) -> Option<usize> {
     usize::from_str_radix(code, 16).ok().filter(|code| *code <= 0xf).map(|code| code.min(8))
 }
 
-/// Bytes of a frame by its length code or length, of which so many are there: a classic frame with a code from 9 to 15 has eight bytes.
+/// Bytes by the length code of CAN FD.
+pub(super) const FD_LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
+
+/// Bytes of a frame by its length code or length, of which so many are there: with a code from 9 to 15 a classic frame has eight bytes, and one of CAN FD
+/// up to 64.
 pub(super) fn length_with(length: usize, bytes: usize) -> usize {
-    if bytes == 8 && (9..=15).contains(&length) { 8 } else { length }
+    let by_code = FD_LENGTHS.get(length).copied().filter(|_| length > 8);
+    if by_code.is_some_and(|by_code| bytes == 8 || bytes == by_code) { bytes } else { length }
 }
 
 /// An identifier in base 16, of at most 29 bits.

@@ -3,7 +3,7 @@
 //! A version below 2 has fixed columns; from version 2 on `;$COLUMNS=N,O,T,I,d,l,D` names them. Times are in ms from the start of the trace.
 
 use super::frame::{Frame, PAYLOAD};
-use super::line::{Line, id_of, length_with, payload};
+use super::line::{FD_LENGTHS, Line, id_of, length_with, payload};
 
 /// A column of a line, by its letter in `;$COLUMNS`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,9 +43,6 @@ impl Column {
 pub(super) struct Trc {
     columns: Vec<Column>,
 }
-
-/// Bytes by the length code of CAN FD.
-const FD_LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
 impl Trc {
     /// Of a trace without a word about its version: 1.0.
