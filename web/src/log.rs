@@ -71,6 +71,8 @@ pub(crate) fn estimates(asked: &Asked<'_>) -> Result<Table, Error> {
 /// A first channel map for a log, as `wetclutch inspect --suggest` writes it.
 pub(crate) fn suggested(asked: &Asked<'_>) -> Result<Value, Error> {
     let text: Arc<[u8]> = asked.text.into();
-    let log = Log::of_text(Path::new(asked.name), &OpenOptions::default(), Box::new(std::io::Cursor::new(text)))?;
-    Ok(json!({ "map": logs::suggest(log.channels(), None).trim_end() }))
+    let mut log = Log::of_text(Path::new(asked.name), &OpenOptions::default(), Box::new(std::io::Cursor::new(text)))?;
+    let inspection = logs::inspect(&mut log)?;
+    let ranges: Vec<_> = inspection.channels.iter().map(|channel| channel.range).collect();
+    Ok(json!({ "map": logs::suggest(log.channels(), &ranges, None).trim_end() }))
 }
