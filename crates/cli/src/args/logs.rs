@@ -42,7 +42,7 @@ pub(crate) struct Inspect {
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) mapping: Mapping,
-    /// Print a first channel map from names and units
+    /// Print a first channel map from names, units and values
     #[arg(long, conflicts_with_all = ["shifts", "map", "channel"])]
     pub(crate) suggest: bool,
     /// List the shifts; needs --map or --channel

@@ -53,12 +53,21 @@ pub(super) struct Draft {
     guessed: HashMap<(usize, String), Option<[f64; 2]>>,
     /// Keys that were taken out, as a reader names them.
     taken: HashSet<String>,
+    /// Lines with an empty table that is not in the file: what a reader misses there is that of none.
+    emptied: HashSet<usize>,
     guess: Guess,
 }
 
 impl Draft {
     pub(super) fn of(text: &str, guess: Guess) -> Self {
-        Self { text: text.to_owned(), added: Vec::new(), guessed: HashMap::new(), taken: HashSet::new(), guess }
+        Self {
+            text: text.to_owned(),
+            added: Vec::new(),
+            guessed: HashMap::new(),
+            taken: HashSet::new(),
+            emptied: HashSet::new(),
+            guess,
+        }
     }
 
     /// Whether all values are those of the file.
@@ -90,7 +99,9 @@ impl Draft {
             | Wrong::Name { key, .. }
             | Wrong::Meaning { key } => in_table(key),
             // A key that is missing in a table that was put in, or that was taken out.
-            Wrong::Missing { key, .. } => return self.added.contains(&line) || self.taken.contains(key),
+            Wrong::Missing { key, .. } => {
+                return self.added.contains(&line) || self.taken.contains(key) || self.emptied.contains(&line);
+            }
             Wrong::Unknown { .. } => return self.added.contains(&line),
             _ => "",
         };
@@ -334,6 +345,7 @@ impl Draft {
         for added in self.added.iter_mut().filter(|added| **added >= line) {
             *added += 1;
         }
+        self.emptied = self.emptied.drain().map(|at| if at >= line { at + 1 } else { at }).collect();
         let moved = |((at, key), within)| ((if at >= line { at + 1 } else { at }, key), within);
         self.guessed = self.guessed.drain().map(moved).collect();
         self.added.push(line);
@@ -347,6 +359,9 @@ impl Draft {
         match guess(expected, old, self.guess.number) {
             Some(new) => {
                 let within = new.parse::<f64>().ok().map(|_| [1.0, 2.0]);
+                if new == "{}" {
+                    self.emptied.insert(line);
+                }
                 self.put(place, &new, (line, String::new()), within)
             }
             None => {

@@ -377,6 +377,9 @@ fn errors_behind_a_value_that_is_wrong_beside_others_are_named() {
 fn what_is_said_of_a_wrong_value_does_not_follow_from_a_guess() {
     let far = ("valve_delay_s = [0.0, 0.03]", "valve_delay_s = [0.5, 0.6]");
     has_all("vehicles/two_speed_at.toml", &[far], "", &["valve_delay_s[1]` is 0.6, expected 0 to 0.5"]);
+    // The tables that a valve misses are put in, and what they miss is none.
+    let valve = "\n[clutch.A]\nvalve = { hysteresis_pa = {} }\n";
+    has_all("vehicles/eight_speed.toml", &[], valve, &["invalid type: a table, expected a number"]);
     for duration in ["1e300", "-inf", "-7777"] {
         let far = format!("duration_s = {duration} #");
         let changes = [("duration_s = ", far.as_str()), ("position = [", "position = [7, ")];
