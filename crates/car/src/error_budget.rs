@@ -81,6 +81,8 @@ pub struct ElementErrors {
     pub valve_lag_factor: [f64; 2],
     /// Minimum and maximum delay, s.
     pub valve_delay_s: [f64; 2],
+    /// The middle of the delays that the valve of the file can have without a stated bound, s.
+    pub valve_delay_middle_s: f64,
     /// Maximum half-width of its hysteresis, Pa.
     pub valve_hysteresis_pa: f64,
     /// Maximum error of a reading of its command, A or %.
@@ -149,6 +151,7 @@ impl ElementErrors {
         valve_gain_factor: around(VALVE_GAIN),
         valve_lag_factor: around(VALVE_LAG),
         valve_delay_s: VALVE_DELAY_S,
+        valve_delay_middle_s: 0.5 * (VALVE_DELAY_S[0] + VALVE_DELAY_S[1]),
         valve_hysteresis_pa: HYSTERESIS_PA,
         command: 0.0,
         command_max: 0.0,
@@ -163,6 +166,7 @@ impl ElementErrors {
             valve_gain_factor,
             valve_lag_factor: own.valve_lag_factor.unwrap_or(around(VALVE_LAG)),
             valve_delay_s: own.valve_delay_s.unwrap_or_else(|| default_delay_s(&clutch.valve)),
+            valve_delay_middle_s: 0.5 * default_delay_s(&clutch.valve).iter().sum::<f64>(),
             valve_hysteresis_pa: own.valve_hysteresis_pa.unwrap_or(HYSTERESIS_PA.max(clutch.hysteresis_pa)),
             command: own.command.unwrap_or(COMMAND * needed),
             command_max,
@@ -170,19 +174,19 @@ impl ElementErrors {
         }
     }
 
-    /// The relative error of the friction: half of its range.
+    /// The relative error of the friction: half of its range, and more where the range lies to one side of the value of the file.
     pub fn friction(&self) -> f64 {
-        half_width(self.friction_factor)
+        off_by(self.friction_factor, 1.0)
     }
 
     /// The same of the gain of the valve.
     pub fn valve_gain(&self) -> f64 {
-        half_width(self.valve_gain_factor)
+        off_by(self.valve_gain_factor, 1.0)
     }
 
     /// The same of its lag.
     pub fn valve_lag(&self) -> f64 {
-        half_width(self.valve_lag_factor)
+        off_by(self.valve_lag_factor, 1.0)
     }
 
     /// How many times as wide as the default its bounds are, at least one: the wider of friction and gain, of hysteresis and command, and of lag and
@@ -211,9 +215,9 @@ impl ElementErrors {
         off_pa(at + self.command).max(off_pa((at - self.command).max(0.0)))
     }
 
-    /// Half of the range of its delay, s.
+    /// The error of its delay, s, as that of the friction.
     pub fn valve_delay(&self) -> f64 {
-        half_width(self.valve_delay_s)
+        off_by(self.valve_delay_s, self.valve_delay_middle_s)
     }
 }
 
@@ -233,6 +237,12 @@ pub fn command_limits(valve: &ClutchValve<f64>, line_pressure_pa: f64, gain_fact
 /// Factors up to a relative error.
 pub const fn around(relative: f64) -> [f64; 2] {
     [1.0 - relative, 1.0 + relative]
+}
+
+/// Half of the width of the range about this value in which it is off by as much, in the mean square, as in a range that may lie to one side of it.
+fn off_by([minimum, maximum]: [f64; 2], value: f64) -> f64 {
+    let (low, high) = (minimum - value, maximum - value);
+    (low * low + low * high + high * high).sqrt()
 }
 
 /// Half of the width of a range.

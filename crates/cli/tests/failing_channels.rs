@@ -225,6 +225,28 @@ fn a_shift_in_which_a_speed_fails_keeps_its_friction_work_and_says_what_failed()
     }
 }
 
+/// Of the car with a gearbox too: while the turbine speed is lost its clutches may slip by anything between both gears.
+#[test]
+fn the_range_of_friction_work_holds_the_work_of_the_log_without_faults() {
+    let case = Case::gearbox();
+    let (_, _, clean) = case.estimate(&case.log, &[]);
+    let works = |table: &str, name: &str| numbers(table, name);
+    for (value, length_s) in [("0", 1.0), ("", 1.0), ("0", 0.4)] {
+        let begin_s = case.times_s[0] - 0.3;
+        let log = case.with("turbine_speed_rad_s", [begin_s, begin_s + length_s], value);
+        let (note, _, shifts) = case.estimate(&log, &[]);
+        assert_eq!(shifts.lines().count(), clean.lines().count(), "{note}");
+        for clutch in ["offgoing", "oncoming"] {
+            let [work, least, greatest] =
+                ["", "_least", "_greatest"].map(|end| format!("{clutch}_friction_work{end}_j"));
+            let ends = works(&shifts, &least).into_iter().zip(works(&shifts, &greatest));
+            for (work_j, (least_j, greatest_j)) in works(&clean, &work).into_iter().zip(ends) {
+                assert!(work_j.is_nan() || (least_j <= work_j && work_j <= greatest_j), "{clutch} {work_j}: {shifts}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_command_that_its_valve_cannot_have_refuses_the_log_of_either_car() {
     for case in Case::both() {

@@ -318,6 +318,7 @@ mod tests {
             pressure_pa: [3e5, 3.1e5, 3e5],
             sticks,
             slip_rad_s: if sticks { 0.0 } else { 20.0 },
+            slip_range_rad_s: None,
             alpha: 1.0,
             is_one_way: false,
             torque_range_n_m: Some([0.0, 200.0]),

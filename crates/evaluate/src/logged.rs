@@ -24,6 +24,11 @@ const STICKS_RAD_S: f64 = 0.05;
 
 /// Without turbine or output speed for so long, s, the slips are not known \[chosen\]: a shift is found over a speed that is refused for so long.
 const UNREAD_S: f64 = 3.0;
+/// A speed that has not come for so long says little of a slip, s \[chosen\]: that of a shift changes by a fifth. Slower readings are seldom.
+const OLD_S: f64 = 0.1;
+/// By how much the turbine may be outside the speeds of both gears in a shift, as a fraction and beside it, rad/s \[chosen\].
+const OUTSIDE: f64 = 0.1;
+const OUTSIDE_RAD_S: f64 = 5.0;
 
 /// The filter of a car on its way through a log.
 pub struct LoggedDrive<'c> {
@@ -260,6 +265,8 @@ impl<'c> LoggedDrive<'c> {
         let [_, fresh @ ..] = self.speeds_at(step.time_s, LOST_S);
         self.is_unread |= fresh.iter().any(|speed| speed.is_nan());
         let [engine, turbine, output] = self.speeds_at(step.time_s, UNREAD_S);
+        let [_, recent @ ..] = self.speeds_at(step.time_s, OLD_S);
+        let ratios = [gears.from, gears.to].map(|gear| self.car.ratio(gear).unwrap_or(f64::NAN));
         let Some(shift) = &mut self.passing.open else { return };
         shift.time_s[1] = step.time_s;
         self.beyond.push(&mut shift.quality, fresh);
@@ -268,12 +275,19 @@ impl<'c> LoggedDrive<'c> {
         let clutches = match (found.zip(row), self.car.gearbox.has_ratios_alone()) {
             (Some((found, row)), _) => {
                 let pressures_pa = self.carried.pressures_pa(step, self.tables);
+                let ends = speeds_without(recent, [turbine, output], ratios);
                 [0, 1].map(|c| {
                     let [_, torque_n_m, slip_rad_s] = step.truth[c];
                     let by_speeds = row.clutches[c].alpha * (turbine - row.clutches[c].ratio * output);
                     let slips = [slip_rad_s, by_speeds];
                     ClutchRow {
                         alpha: row.clutches[c].alpha,
+                        slip_range_rad_s: ends.map(|ends| {
+                            let slips = ends.map(|[turbine, output]| {
+                                row.clutches[c].alpha * (turbine - row.clutches[c].ratio * output)
+                            });
+                            [slips[0].min(slips[1]), slips[0].max(slips[1])]
+                        }),
                         ..clutch_row(&found[c], [pressures_pa[c], torque_n_m], slips)
                     }
                 })
@@ -353,6 +367,21 @@ impl<'c> LoggedDrive<'c> {
 }
 
 /// The row of a clutch beside the pressure and torque that are known, with its true slip and that by the readings.
+/// Turbine and output speed at both ends of what they can be in a shift between gears of these ratios, by the recent ones and the last ones, rad/s; none
+/// where both are recent, and not numbers where one has not come for long.
+fn speeds_without(recent: [f64; 2], last: [f64; 2], ratios: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+    let ends = match recent.map(f64::is_nan) {
+        [false, false] => return None,
+        _ if last.iter().any(|speed| speed.is_nan()) => return Some([[f64::NAN; 2]; 2]),
+        [false, true] => ratios.map(|ratio| [recent[0], recent[0] / ratio]),
+        _ => ratios.map(|ratio| [ratio * last[1], last[1]]),
+    };
+    let [lower, higher] = if ends[0][0] / ends[0][1] <= ends[1][0] / ends[1][1] { ends } else { [ends[1], ends[0]] };
+    let outside =
+        |[turbine, output]: [f64; 2], sign: f64| [turbine + sign * (OUTSIDE * turbine.abs() + OUTSIDE_RAD_S), output];
+    Some([outside(lower, -1.0), outside(higher, 1.0)])
+}
+
 fn clutch_row(
     found: &ClutchEstimate<f64>,
     [pressure_pa, torque_n_m]: [f64; 2],
@@ -360,6 +389,7 @@ fn clutch_row(
 ) -> ClutchRow {
     ClutchRow {
         slip_rad_s: if slip_rad_s.is_nan() { by_speeds } else { slip_rad_s },
+        slip_range_rad_s: None,
         alpha: f64::NAN,
         torque_n_m: [torque_n_m, found.torque_n_m, found.open_loop_n_m],
         torque_std_dev_n_m: found.std_dev_n_m,

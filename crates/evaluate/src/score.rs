@@ -23,6 +23,8 @@ pub struct ClutchRow {
     pub pressure_pa: [f64; 3],
     /// Slip, rad/s; by the readings where the true one is not known.
     pub slip_rad_s: f64,
+    /// Where turbine or output speed has not come for a while: the slips that it can have; not numbers where nothing is known of them.
+    pub slip_range_rad_s: Option<[f64; 2]>,
     /// Its slip per turbine speed, `alpha`: the turbine feels `alpha` times its torque.
     pub alpha: f64,
     /// Whether it truly sticks; by the estimate where that is not known.
@@ -95,6 +97,7 @@ impl ClutchRow {
             pressure_std_dev_pa: f64::NAN,
             pressure_pa: [f64::NAN; 3],
             slip_rad_s: f64::NAN,
+            slip_range_rad_s: None,
             alpha: f64::NAN,
             sticks,
             is_one_way: false,
@@ -280,6 +283,7 @@ pub fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstima
                 pressure_std_dev_pa: found.pressure_std_dev_pa,
                 pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
                 slip_rad_s: truth.slip_rad_s,
+                slip_range_rad_s: None,
                 alpha: alphas.map_or(f64::NAN, |alphas| alphas[c]),
                 sticks: truth.sticks,
                 torque_range_n_m: found.torque_range_n_m,

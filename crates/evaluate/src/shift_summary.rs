@@ -109,10 +109,18 @@ fn pressures(rows: &[ShiftScoreRow]) -> [u64; 2] {
 }
 
 /// Torque of a clutch times its slip over the shift, with the estimated torque and with the ends of its range, J; none where its slip is not
-/// known.
+/// known. While a speed does not come, the ends are those of any slip that it can have.
 fn friction_work_j(rows: &[ShiftScoreRow], clutch: usize) -> Option<[f64; 3]> {
     let power_w = |row: &ShiftScoreRow| {
-        let ClutchRow { torque_n_m: [_, torque, _], torque_range_n_m, slip_rad_s, sticks, .. } = row.clutches[clutch];
+        let ClutchRow { torque_n_m: [_, torque, _], torque_range_n_m, slip_rad_s, slip_range_rad_s, sticks, .. } =
+            row.clutches[clutch];
+        if let Some(slips) = slip_range_rad_s {
+            // It may slip by as much, or not at all.
+            let [low, high] = torque_range_n_m.unwrap_or([torque; 2]);
+            let most = low.abs().max(high.abs()) * slips[0].abs().max(slips[1].abs());
+            let slip = if sticks || slip_rad_s.is_nan() { 0.0 } else { slip_rad_s };
+            return (row.time_s, [(torque * slip).abs().min(most), 0.0, most]);
+        }
         if sticks {
             return (row.time_s, [0.0; 3]);
         }
@@ -123,8 +131,13 @@ fn friction_work_j(rows: &[ShiftScoreRow], clutch: usize) -> Option<[f64; 3]> {
         (row.time_s, [torque * slip_rad_s, low, high].map(at_least_zero))
     };
     let shown = || rows.iter().filter(|row| row.at_turbine_n_m.is_none());
-    let is_unread =
-        |clutch: &ClutchRow| !clutch.sticks && clutch.slip_rad_s.is_nan() && clutch.torque_n_m[1].is_finite();
+    let is_unread = |clutch: &ClutchRow| {
+        let is_unknown = match clutch.slip_range_rad_s {
+            Some(slips) => slips[0].is_nan(),
+            None => !clutch.sticks && clutch.slip_rad_s.is_nan(),
+        };
+        is_unknown && clutch.torque_n_m[1].is_finite()
+    };
     if shown().any(|row| is_unread(&row.clutches[clutch])) {
         return None;
     }

@@ -139,6 +139,7 @@ fn clutch_row([pressure_pa, torque_n_m, slip_rad_s]: [f64; 3], found: &[f64]) ->
         pressure_std_dev_pa: f64::NAN,
         pressure_pa: [pressure_pa, estimate_pa, valve_pa],
         slip_rad_s,
+        slip_range_rad_s: None,
         alpha: f64::NAN,
         sticks: slip_rad_s.abs() < STICKS_RAD_S,
         torque_range_n_m,

@@ -32,6 +32,9 @@ const ALIKE: [usize; 4] = [0, KISS_AT, LAG_AT, DELAY_AT];
 const HYPOTHESES: usize = LEARNT + ALIKE.len();
 /// Standard deviations beyond the bound \[chosen\]: by chance in one of 200 cases of a quantity that is at its bound.
 const CERTAIN: f64 = 2.6;
+/// Rows further apart are no evidence, s \[chosen\]: a command is read up to so much later than its valve has it, which is twice the standard deviation of
+/// a delay.
+pub(super) const FINE_S: f64 = 0.015;
 /// Part of the evidence that is left after each further shift \[chosen\]: the last thirty count.
 const KEPT: f64 = 0.97;
 /// Shifts that are needed: one alone may be one with wrong readings.

@@ -63,7 +63,7 @@ use drivetrain::{Driveline, Real};
 use crate::kalman::engine::Engine;
 use crate::kalman::gate::{Gate, Verdict};
 use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, LOST_S, Reading, SpeedReading};
-use beyond_bounds::Evidence;
+use beyond_bounds::{Evidence, FINE_S};
 use covariance::{Gaussian, Measured};
 use doubt::Moment;
 use elements::ElementState;
@@ -387,7 +387,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         self.take_newest(state, input, dt_s, &mut channels);
         self.take_noise(state, input);
         self.take_skew(state, input, dt_s);
-        health = health.max(self.take_gear(state, input.gear));
+        health = health.max(self.take_gear(state, input.gear, dt_s));
         let side = self.input_side(state, input, dt_s);
         let torque = side.as_ref().and_then(|side| self.turbine.at(side));
         let input_clutch = side.as_ref().and_then(|side| self.input_clutch(state, input, side));
@@ -442,10 +442,10 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// Follows the shift command.
-    fn take_gear(&self, state: &mut GearboxState<T>, command: ShiftCommand) -> Health {
+    fn take_gear(&self, state: &mut GearboxState<T>, command: ShiftCommand, dt_s: T) -> Health {
         let opens = self.is_open(state, command);
         let has_wheels = state.newest[WHEEL].is_some_and(|newest| newest.age_s <= T::of(LOST_S));
-        let evidence = (&mut state.evidence, has_wheels);
+        let evidence = (Some(&mut state.evidence).filter(|_| dt_s <= T::of(FINE_S)), has_wheels);
         let (learnt, fading_s, elements) = (&mut state.learnt, &mut state.fading_s, &mut state.elements);
         let Some(running) = &mut state.running else { return Health::Good };
         let in_gear = command.is_steady();

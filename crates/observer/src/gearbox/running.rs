@@ -191,19 +191,21 @@ impl<T: Real> GearboxFilter<'_, T> {
         running.shift = Some(shift);
     }
 
-    /// The gear holds, and the shift is learnt from. With the evidence comes whether there is a wheel speed.
+    /// The gear holds, and the shift is learnt from. With the evidence, where it can be taken, comes whether there is a wheel speed.
     pub(super) fn end_shift(
         &self,
         running: &mut Running<T>,
         gear: Gear,
-        (learnt, (evidence, has_wheels)): (&mut Learnt<T>, (&mut Evidence<T>, bool)),
+        (learnt, (evidence, has_wheels)): (&mut Learnt<T>, (Option<&mut Evidence<T>>, bool)),
     ) {
         if let Some((before, shift)) = running.before.take().zip(running.shift) {
             let (correlations, acting) = (self.correlations(), self.acting(&shift));
             let both = running.x.timing.together(before, running.lasting()).filter(|_| running.x.is_sound());
             let shown = both.and_then(|(before, after)| Shown::of(&acting, &before, &after, &correlations));
             let taken = shown.is_some_and(|shown| {
-                evidence.take(&acting, &shown, &self.widths(), has_wheels);
+                if let Some(evidence) = evidence {
+                    evidence.take(&acting, &shown, &self.widths(), has_wheels);
+                }
                 learnt.take_shown(&acting, shown, &correlations)
             });
             learnt.count(taken, &correlations);
