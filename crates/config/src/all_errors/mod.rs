@@ -18,8 +18,15 @@ use draft::{Draft, Guess, Number};
 use misspelt::Misspelt;
 use wrong::Wrong;
 
-/// Most times that a file is read.
+/// Most times that a file is read, and most bytes in all of these times: a large file with errors on every line would take minutes.
 const READINGS: usize = 100;
+const BYTES: usize = 4 << 20;
+
+/// Most times that a text is read.
+fn readings(text: &str) -> usize {
+    (BYTES / text.len().max(1)).clamp(2, READINGS)
+}
+
 /// Most times that one place is mended.
 const MENDED_MAX: usize = 6;
 
@@ -113,7 +120,7 @@ fn with_others_of_its_file(
 fn errors_with(guess: Guess, source: &Source, read: &Reader<'_>) -> Shown {
     let mut source = source.clone();
     let mut errors = Vec::new();
-    for _ in 0..READINGS {
+    for _ in 0..readings(&source.text) {
         match search(guess, &source, read) {
             Found::Errors(shown) => {
                 errors.extend(shown.errors);
@@ -142,7 +149,7 @@ fn search(guess: Guess, source: &Source, read: &Reader<'_>) -> Found {
     let mut draft = Draft::of(&source.text, guess);
     let mut shown = Shown { errors: Vec::new(), unsure: Vec::new(), is_whole: false };
     let mut mended: Vec<String> = Vec::new();
-    for _ in 0..READINGS {
+    for _ in 0..readings(&source.text) {
         let Err(error) = read(Source { path: source.path.clone(), text: draft.text.clone() }) else {
             shown.is_whole = true;
             break;
