@@ -51,6 +51,8 @@ def test_a_drive_that_follows_a_speed_is_read_from_any_folder(tmp_path: Path, mo
 
 def test_all_errors_of_a_drive_and_of_sensors_are_raised_together(tmp_path: Path) -> None:
     text = short_drive().to_toml().replace("sample_time_s = 0.01", "sample_time_s = -1.0").replace("repetitions =", "repetitons =")
+    # A vehicle file that is not there would be an error of the file too.
+    text = text.replace("../vehicles", (ROOT / "vehicles").as_posix())
     path = tmp_path / "drive.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(wc.InputErrors) as of_file:
