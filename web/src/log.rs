@@ -72,7 +72,6 @@ pub(crate) fn estimates(asked: &Asked<'_>) -> Result<Table, Error> {
 pub(crate) fn suggested(asked: &Asked<'_>) -> Result<Value, Error> {
     let text: Arc<[u8]> = asked.text.into();
     let mut log = Log::of_text(Path::new(asked.name), &OpenOptions::default(), Box::new(std::io::Cursor::new(text)))?;
-    let inspection = logs::inspect(&mut log)?;
-    let ranges: Vec<_> = inspection.channels.iter().map(|channel| channel.range).collect();
+    let ranges = logs::inspect(&mut log)?.ranges();
     Ok(json!({ "map": logs::suggest(log.channels(), &ranges, None).trim_end() }))
 }

@@ -239,7 +239,8 @@ pub const fn around(relative: f64) -> [f64; 2] {
     [1.0 - relative, 1.0 + relative]
 }
 
-/// Half of the width of the range about this value in which it is off by as much, in the mean square, as in a range that may lie to one side of it.
+/// How far values of a range are from this value: half of the range's width where the value is in the middle of it. Another range has the same root
+/// mean square as the range of this half-width about the value.
 fn off_by([minimum, maximum]: [f64; 2], value: f64) -> f64 {
     let (low, high) = (minimum - value, maximum - value);
     (low * low + low * high + high * high).sqrt()

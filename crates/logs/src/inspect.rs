@@ -37,6 +37,13 @@ pub struct Inspection {
     pub notes: Vec<String>,
 }
 
+impl Inspection {
+    /// Minimum and maximum of the values of each channel, in its unit.
+    pub fn ranges(&self) -> Vec<Option<[f64; 2]>> {
+        self.channels.iter().map(|channel| channel.range).collect()
+    }
+}
+
 /// A channel while it is read. A log may have very many.
 #[derive(Default)]
 struct Watched {

@@ -31,8 +31,8 @@ pub fn to_si(name: &str) -> (String, f64) {
 }
 
 /// What brings a value in a unit to SI. The size of a unit such as 0.001 is no binary fraction: a value over 1000 is the number as people write it,
-/// 1.019 A for 1019 mA. Nor is 1.1, and 1.1 bar are 110000 Pa: times a whole number of ten or more, what is as near to a thousandth as its last digit is this
-/// thousandth.
+/// 1.019 A for 1019 mA. Nor is 1.1, and 1.1 bar times 100000 is 110000.00000000001 in floating point. With a unit of ten or more, a result within
+/// rounding of a multiple of 0.001 becomes that multiple: 110000 Pa.
 ///
 /// ```
 /// use trace::units::Scale;

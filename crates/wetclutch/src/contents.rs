@@ -43,8 +43,7 @@ fn channel_cells<'a>((channel, summary): (&'a Channel, &ChannelSummary)) -> Vec<
 /// The log cannot be read.
 pub fn suggested_map(log: LogInput<'_>) -> Result<String, Error> {
     let mut opened = log.open(None, 1)?;
-    let inspection = logs::inspect(&mut opened)?;
-    let ranges: Vec<_> = inspection.channels.iter().map(|channel| channel.range).collect();
+    let ranges = logs::inspect(&mut opened)?.ranges();
     let dbc = log.map.open.dbc.as_ref().map(|dbc| dbc.to_string_lossy().into_owned());
     Ok(logs::suggest(opened.channels(), &ranges, dbc.as_deref()))
 }

@@ -87,8 +87,7 @@ fn inspect_log(options: &Inspect, path: &Path) -> Result<Option<Value>, Failure>
         // The values of standard input are gone after they are read.
         let from_pipe = path == Path::new("-");
         let inspection = if from_pipe { None } else { logs::inspect(&mut log).ok() };
-        let ranges: Vec<Option<[f64; 2]>> =
-            inspection.iter().flat_map(|inspection| &inspection.channels).map(|channel| channel.range).collect();
+        let ranges = inspection.map_or(Vec::new(), |inspection| inspection.ranges());
         let by_names = logs::suggest(log.channels(), &ranges, dbc.as_deref());
         let by_values = by_values(path, &by_names, log.channels(), &ranges);
         let suggested = format!("{by_names}{by_values}");

@@ -53,7 +53,7 @@ pub(super) struct Draft {
     guessed: HashMap<(usize, String), Option<[f64; 2]>>,
     /// Keys that were taken out, as a reader names them.
     taken: HashSet<String>,
-    /// Lines with an empty table that is not in the file: what a reader misses there is that of none.
+    /// Lines with an empty table that was put in: a key that is missing there is no error of the file.
     emptied: HashSet<usize>,
     guess: Guess,
 }
@@ -244,7 +244,7 @@ impl Draft {
         };
         let on_line: Vec<Entry> =
             self.entries().into_iter().filter(|entry| self.line(entry.value.start) == line).collect();
-        let places = on_line
+        let mut places = on_line
             .iter()
             .flat_map(|entry| [&entry.value].into_iter().chain(&entry.items).map(move |place| (entry, place.clone())));
         let mut leaves = on_line.iter().filter(|entry| !entry.is_table);
@@ -253,7 +253,6 @@ impl Draft {
             (leaf, None) => leaf,
             _ => None,
         };
-        let mut places = places;
         let named = places.find(|(_, place)| is_found(place));
         named.or(only.map(|entry| (entry, entry.value.clone()))).map(|(entry, place)| (entry.clone(), place))
     }

@@ -18,8 +18,9 @@ use draft::{Draft, Guess, Number};
 use misspelt::Misspelt;
 use wrong::Wrong;
 
-/// Most times that a file is read, and most bytes in all of these times: a large file with errors on every line would take minutes.
+/// Most times that a file is read.
 const READINGS: usize = 100;
+/// Most bytes that are read in all of these times: a large file with errors on every line would take minutes.
 const BYTES: usize = 4 << 20;
 
 /// Most times that a text is read.
