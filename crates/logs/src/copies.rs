@@ -11,7 +11,8 @@
 //! tells ([`Behind`]): two such speeds have differed and then agree to the last digit. In the direct gear the turbine is the copy as long as the wheels
 //! turn with the output, and the output else. Behind a lock-up clutch the engine is it as long as the output turns with the turbine; else it is one of
 //! both, and neither is believed: the gear changes, or the turbine shows an engine that has parted from it. A control unit that sends one value for
-//! both does so from the first row on in which they turn together, and is believed. Such a copy is not found without a speed of the shaft behind, and
+//! both does so from the first row on in which they turn together, and is believed. Engine and output never turn together without the turbine: where
+//! the wheels turn with the output the engine is the copy, else it is one of both. Such a copy is not found without a speed of the shaft behind, and
 //! between speeds whose noise is not larger than their resolution.
 
 use crate::Role;
@@ -30,9 +31,10 @@ const LATEST: f64 = 0.125;
 /// Samples after which a noise is known, and after which equal ones are hardly a chance \[chosen\].
 const MANY: u32 = 200;
 const SURE: u32 = 5;
-/// Of the changes of the difference of two fine speeds one in so many at most is that before, within this fraction of the speeds \[chosen\]: coarse
+/// Of the changes of the difference of two fine speeds one in so many, and so many more, is that before, within this fraction of the speeds \[chosen\]: coarse
 /// ones often are.
 const FINE: u32 = 500;
+const BY_CHANCE: u32 = 3;
 const ALIKE: f64 = 1e-6;
 /// Of the changes of a noise one in so many at least turns the difference the other way than the one before, by more than [`NOISE_RAD_S`] \[chosen\].
 const TURNS: u32 = 3;
@@ -60,21 +62,22 @@ const ROUNDING: f64 = 1e-12;
 const PAIRS: [[usize; 2]; 6] = [
     [Role::EngineSpeed as usize, Role::TurbineSpeed as usize],
     [Role::TurbineSpeed as usize, Role::OutputSpeed as usize],
-    [Role::OutputSpeed as usize, Role::WheelSpeed as usize],
     [Role::EngineSpeed as usize, Role::OutputSpeed as usize],
+    [Role::OutputSpeed as usize, Role::WheelSpeed as usize],
     [Role::TurbineSpeed as usize, Role::WheelSpeed as usize],
     [Role::EngineSpeed as usize, Role::WheelSpeed as usize],
 ];
 
 /// Those whose shafts a clutch makes one while one of both fails: what is refused for another reason is not compared, but for noisy ones.
-const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[1], PAIRS[2]];
+const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[1], PAIRS[3]];
 
 /// A reading: its value, rad/s, and its time, s.
 pub(crate) type Stamped = [f64; 2];
 
 /// Engine and turbine, which turn together behind a lock-up clutch, by their place in [`PAIRS`]. Turbine and output, which do in the direct gear,
-/// come next.
+/// come next; then engine and output, which turn together with the turbine alone.
 const LOCKED: usize = 0;
+const THROUGH: usize = 2;
 
 /// The first and the second of a pair.
 const FIRST: usize = 0;
@@ -87,8 +90,9 @@ pub(crate) type Copied = (Role, Stamped);
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Copies {
     pairs: [Pair; PAIRS.len()],
-    /// Behind the first two pairs.
-    behind: [Behind; 2],
+    /// Behind the first three pairs.
+    behind: [Behind; 3],
+    turbine: Option<Stamped>,
 }
 
 /// The shaft behind two that turn together, and its speed over that of the second of them.
@@ -136,6 +140,11 @@ struct Pair {
     /// the copy is then for the shaft behind to tell.
     together_since_s: Option<f64>,
     was_together: bool,
+}
+
+/// Whether two readings of about the same time are of two speeds.
+fn is_apart([one, one_s]: Stamped, [other, other_s]: Stamped) -> bool {
+    (one_s - other_s).abs() <= FRESH_S && (one - other).abs() > TOGETHER * other.abs()
 }
 
 impl Behind {
@@ -193,7 +202,8 @@ impl Copies {
         pairs[LOCKED].together = [f64::INFINITY, LOCKED_RAD_S];
         let turbine = Behind::new(Role::OutputSpeed, WITH_TURBINE, [true; 2]);
         let output = Behind::new(Role::WheelSpeed, WITH_OUTPUT, [false, true]);
-        Self { pairs, behind: [turbine, output] }
+        let through = Behind::new(Role::WheelSpeed, WITH_TURBINE, [true; 2]);
+        Self { pairs, behind: [turbine, output, through], turbine: None }
     }
 
     /// Takes a reading, and whether it is refused for another reason. Returns the speeds whose channel shows another one.
@@ -202,6 +212,9 @@ impl Copies {
         let (mut found, mut by) = ([None; 2], None);
         for behind in self.behind.iter_mut().filter(|behind| behind.role == role && !is_fault) {
             behind.newest = Some(reading);
+        }
+        if role == Role::TurbineSpeed && !is_fault {
+            self.turbine = Some(reading);
         }
         for (n, (pair, of)) in self.pairs.iter_mut().zip(PAIRS).enumerate() {
             let Some(which) = of.iter().position(|speed| *speed == at) else { continue };
@@ -214,6 +227,9 @@ impl Copies {
                 pair.newest = [None; 2];
                 let newest = [one, other];
                 let mut copies = pair.compare(newest);
+                if n == THROUGH {
+                    pair.was_together = pair.is_open() && self.turbine.is_some_and(|turbine| is_apart(turbine, one));
+                }
                 if copies == [None; 2]
                     && let Some(behind) = self.behind.get_mut(n)
                 {
@@ -262,8 +278,7 @@ impl Pair {
             self.needed = if jumped.is_some() { SAMPLES } else { SURE };
             self.jumped = jumped.or_else(|| self.leaves(before, newest));
             let is_settled = self.together_since_s.is_some_and(|since_s| newest[SECOND][1] - since_s >= SETTLED_S);
-            let is_open = self.jumped.is_none() && self.is_fine();
-            self.was_together = is_open && (is_settled || self.closes_at_once(before, newest));
+            self.was_together = self.is_open() && (is_settled || self.closes_at_once(before, newest));
         }
         self.equal = self.equal.saturating_add(1);
         let which = self.jumped.filter(|_| self.equal >= self.needed)?;
@@ -315,7 +330,12 @@ impl Pair {
 
     /// Whether two sensors hardly agree to the last digit by chance: their noise is known, and far larger than their resolution.
     fn is_fine(&self) -> bool {
-        self.changes >= MANY && self.turns >= self.changes / TURNS && self.alike <= 1 + self.changes / FINE
+        self.changes >= MANY && self.turns >= self.changes / TURNS && self.alike <= BY_CHANCE + self.changes / FINE
+    }
+
+    /// Whether neither jumped to the other, and they hardly agree by chance.
+    fn is_open(&self) -> bool {
+        self.jumped.is_none() && self.is_fine()
     }
 
     /// By how much each speed leaves the line through its last values, rad/s.

@@ -2,7 +2,8 @@
 //!
 //! A shaft passes every speed between two others, and it takes torque and time. A reading is a fault
 //!
-//! - if it is further from the last one that was believed than the shaft's largest acceleration allows in the time between them, or
+//! - if it is further from the last one that was believed than the shaft's largest acceleration allows in the time between them, also for as long
+//!   as the readings go on from there, until they jump back, or
 //! - if it fell to a tenth of that and less while another speed shows that the shaft turns, or
 //! - if it came by a jump to the value of another speed: two sensors of two shafts do not agree by a jump, or
 //! - if output and wheel speed, which the final drive ties, part, or
@@ -17,6 +18,8 @@ use crate::Role;
 
 /// A fault that the other speeds do not contradict ends after so long, s \[chosen\].
 pub const LONGEST_S: f64 = 2.5;
+/// What jumped is back when it comes by this fraction of that at once.
+const RETURNED: f64 = 0.5;
 /// A reading older than this is no evidence against another, s.
 const FRESH_S: f64 = 0.25;
 /// A table holds a slow channel for up to so long: the shaft may have changed since the value came, s.
@@ -48,7 +51,7 @@ const PARTED: std::ops::Range<f64> = 0.6..1.6;
 /// The ratio of both is remembered so often, s: more rarely than readings are withdrawn afterwards.
 const RATIO_S: f64 = 0.6;
 /// Faster than any shaft of a car, rad/s: not taken as a speed at all.
-const MAX_RAD_S: f64 = 1500.0;
+pub(crate) const MAX_RAD_S: f64 = 1500.0;
 /// How long another speed contradicts one that stands at zero before it is a fault, s, and by how many times the speed up to which a sensor may
 /// read zero \[chosen\]: the sensor of a shaft that begins to turn wakes up late.
 const STANDS_S: f64 = 0.3;
@@ -65,12 +68,16 @@ const WATCHED: usize = 4;
 /// Largest acceleration of each shaft, rad/s^2, and speed up to which its sensor may read zero or wake up, rad/s \[chosen\]. An engine or a
 /// turbine of 0.1 kg m^2 has 3000 rad/s^2 by 300 N m; a locked brake stops a wheel of 2 kg m^2 by 1000 rad/s^2 with 2000 N m.
 const SHAFTS: [(f64, f64); WATCHED] = [(3000.0, 40.0), (3000.0, 40.0), (1000.0, 10.0), (1000.0, 4.0)];
+/// By so much two readings of a speed that turns may differ at once, rad/s: noise, and times that are rounded \[chosen\].
+const AT_ONCE_RAD_S: [f64; WATCHED] = [20.0, 20.0, 6.0, 2.0];
 
 /// Watches engine, turbine, output and wheel speed.
 #[derive(Debug, Clone, Copy)]
 pub struct SpeedFaults {
-    believed: [Option<Believed>; WATCHED],
+    believed: [Option<Latest>; WATCHED],
     faults: [Option<Fault>; WATCHED],
+    /// Whether a speed is believed again where its fault was: its next jump may be that to the right value.
+    doubtful: [bool; WATCHED],
     /// Output over wheel speed when both were last believed; not a number before.
     output_over_wheel: f64,
     /// The same at two earlier times.
@@ -129,6 +136,11 @@ struct Fault {
     engine_rad_s: Option<f64>,
     /// The last speed that was believed over the first reading that was not.
     ratio: f64,
+    /// Whether it began by a jump of this speed alone: where others jump with it, another recording goes on.
+    by_jump: bool,
+    /// What it began with over the speed before, rad/s.
+    jump_rad_s: f64,
+    newest: Latest,
     /// Since when a shift may have brought the turbine to the speed of the output, s; not a number before.
     shifted_since_s: f64,
 }
@@ -140,9 +152,9 @@ struct Ratio {
     time_s: f64,
 }
 
-/// The last reading of a speed that was believed.
+/// The latest reading of a speed: of those that are believed, or of those of a fault.
 #[derive(Debug, Clone, Copy)]
-struct Believed {
+struct Latest {
     rad_s: f64,
     /// When it came last, and when it came first with this value, s.
     time_s: f64,
@@ -164,6 +176,7 @@ impl SpeedFaults {
         Self {
             believed: [None; WATCHED],
             faults: [None; WATCHED],
+            doubtful: [false; WATCHED],
             output_over_wheel: f64::NAN,
             ratios: [Ratio { value: f64::NAN, time_s: f64::NEG_INFINITY }; 2],
             together_s: f64::NEG_INFINITY,
@@ -189,29 +202,47 @@ impl SpeedFaults {
             Some(_) if stands => true,
             Some(fault) => self.lasts(at, before, rad_s, (fault, time_s)),
         });
-        if is_fault {
-            let another = self.another(at, rad_s, time_s);
-            let engine_rad_s = self.turning(ENGINE, time_s);
-            let ratio = self.believed[at].map_or(f64::NAN, |before| before.rad_s / rad_s);
-            let begun = Fault { since_s: time_s, another, engine_rad_s, ratio, shifted_since_s: f64::NAN };
-            let fault = *self.faults[at].get_or_insert(begun);
-            let shifts = self.believed[at].is_some_and(|before| self.may_shift(before, rad_s, (fault, time_s)));
-            let shifted_since_s = match fault.shifted_since_s {
-                since_s if shifts && !since_s.is_nan() => since_s,
-                _ if shifts => time_s,
-                _ => f64::NAN,
-            };
-            self.faults[at] = Some(Fault { shifted_since_s, ..fault });
-        } else {
-            self.believe(at, rad_s, time_s);
+        match self.believed[at].filter(|_| is_fault) {
+            Some(before) => self.goes_on(at, before, rad_s, time_s),
+            None => self.believe(at, rad_s, time_s),
         }
         is_fault
+    }
+
+    /// Takes a reading that is a fault.
+    fn goes_on(&mut self, at: usize, before: Latest, rad_s: f64, time_s: f64) {
+        let fault = self.faults[at].unwrap_or_else(|| self.fault(at, before, rad_s, time_s));
+        let shifts = self.may_shift(before, rad_s, (fault, time_s));
+        let shifted_since_s = match fault.shifted_since_s {
+            since_s if shifts && !since_s.is_nan() => since_s,
+            _ if shifts => time_s,
+            _ => f64::NAN,
+        };
+        self.faults[at] = Some(Fault { shifted_since_s, newest: fault.newest.then(rad_s, time_s), ..fault });
+    }
+
+    /// A fault that begins.
+    fn fault(&mut self, at: usize, before: Latest, rad_s: f64, time_s: f64) -> Fault {
+        let mut by_jump = jumps(at, before, rad_s, time_s) && !core::mem::take(&mut self.doubtful[at]);
+        for other in self.faults.iter_mut().flatten().filter(|other| time_s - other.since_s <= AT_ONCE_S) {
+            by_jump &= !core::mem::take(&mut other.by_jump);
+        }
+        Fault {
+            since_s: time_s,
+            another: self.another(at, rad_s, time_s),
+            engine_rad_s: self.turning(ENGINE, time_s),
+            ratio: before.rad_s / rad_s,
+            by_jump,
+            jump_rad_s: rad_s - before.rad_s,
+            newest: Latest::first(rad_s, time_s),
+            shifted_since_s: f64::NAN,
+        }
     }
 
     /// The readings of a speed after this one, which came at this time, s, turned out to be wrong.
     pub fn disbelieve_after(&mut self, role: Role, rad_s: f64, time_s: f64) {
         if let Some(believed) = self.believed.get_mut(role as usize) {
-            *believed = Some(Believed { rad_s, time_s, first_s: time_s });
+            *believed = Some(Latest::first(rad_s, time_s));
             self.faults[role as usize] = None;
         }
         if matches!(role, Role::OutputSpeed | Role::WheelSpeed) {
@@ -225,9 +256,11 @@ impl SpeedFaults {
     }
 
     fn believe(&mut self, at: usize, rad_s: f64, time_s: f64) {
-        let before = self.believed[at].filter(|before| before.rad_s == rad_s);
-        let first_s = before.map_or(time_s, |before| before.first_s);
-        self.believed[at] = Some(Believed { rad_s, time_s, first_s });
+        let first = Latest::first(rad_s, time_s);
+        self.believed[at] = Some(self.believed[at].map_or(first, |before| before.then(rad_s, time_s)));
+        if let Some(fault) = self.faults[at] {
+            self.doubtful[at] = fault.goes_on(at, rad_s, time_s);
+        }
         self.faults[at] = None;
         if (at == ENGINE && self.shows(TURBINE, rad_s, time_s)) || (at == TURBINE && self.shows(ENGINE, rad_s, time_s))
         {
@@ -245,7 +278,7 @@ impl SpeedFaults {
     }
 
     /// Whether a fault begins with a reading.
-    fn begins(&self, at: usize, before: Believed, rad_s: f64, time_s: f64) -> bool {
+    fn begins(&self, at: usize, before: Latest, rad_s: f64, time_s: f64) -> bool {
         let change = (rad_s - before.rad_s).abs();
         let (_, min_rad_s) = SHAFTS[at];
         let fell = rad_s.abs() <= FELL * before.rad_s.abs() && before.rad_s.abs() > min_rad_s;
@@ -259,19 +292,22 @@ impl SpeedFaults {
     }
 
     /// Whether a fault goes on with a reading.
-    fn lasts(&self, at: usize, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
+    fn lasts(&self, at: usize, before: Latest, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
         let fell = rad_s.abs() <= FELL * before.rad_s.abs();
         let is_short = time_s - fault.since_s <= LONGEST_S;
-        let shows_another = fault.another.is_some_and(|another| self.is_near(STILL_ANOTHER, another, rad_s, time_s))
-            && !((at, fault.another) == (TURBINE, Some(OUTPUT)) && time_s - fault.shifted_since_s >= GONE_S);
-        let is_wrong = || jumps(at, before, rad_s, time_s) || fell || shows_another || self.parts(at, rad_s, time_s);
+        let is_shift = (at, fault.another) == (TURBINE, Some(OUTPUT)) && time_s - fault.shifted_since_s >= GONE_S;
+        let shows_another = fault.another.is_some_and(|another| self.is_near(STILL_ANOTHER, another, rad_s, time_s));
+        let is_wrong = || {
+            let is_elsewhere = !is_shift && (shows_another || fault.by_jump && fault.goes_on(at, rad_s, time_s));
+            jumps(at, before, rad_s, time_s) || fell || is_elsewhere || self.parts(at, rad_s, time_s)
+        };
         let is_dead = || rad_s.abs() <= ZERO_RAD_S && fell && self.is_contradicted(at, before, time_s);
         (is_short && is_wrong()) || is_dead()
     }
 
     /// Whether a shift may have brought the turbine to this speed since it was believed last: it was on the way to the direct gear, there was time
     /// for it, and the engine went along.
-    fn may_shift(&self, before: Believed, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
+    fn may_shift(&self, before: Latest, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
         let change = rad_s - before.rad_s;
         let engine = fault.engine_rad_s.zip(self.turning(ENGINE, time_s)).map(|(then, now)| now - then);
         let goes_along = engine.is_some_and(|engine| engine * change.signum() > GOES_ALONG * change.abs());
@@ -303,7 +339,7 @@ impl SpeedFaults {
     }
 
     /// Whether the other speeds show that this shaft turns.
-    fn is_contradicted(&self, at: usize, before: Believed, time_s: f64) -> bool {
+    fn is_contradicted(&self, at: usize, before: Latest, time_s: f64) -> bool {
         let turns =
             |other: usize, from_rad_s: f64| self.turning(other, time_s).is_some_and(|speed| speed.abs() >= from_rad_s);
         match at {
@@ -339,10 +375,25 @@ impl SpeedFaults {
             WHEEL => self.turning(OUTPUT, time_s).map(|output| output / rad_s),
             _ => None,
         };
-        ratio.is_some_and(|ratio| {
+        // Where this one crawls the other one may be the wrong one.
+        let (_, min_rad_s) = SHAFTS[at];
+        let turns = self.believed[at].is_none_or(|before| before.rad_s.abs().max(rad_s.abs()) > min_rad_s);
+        ratio.filter(|_| turns).is_some_and(|ratio| {
             let change = ratio / self.output_over_wheel;
             !change.is_nan() && !PARTED.contains(&change)
         })
+    }
+}
+
+impl Fault {
+    /// Whether a reading goes on from the newest one of the fault: it has not come back by half of what the fault began with, nor by a jump, nor
+    /// left a value that stood still.
+    fn goes_on(&self, at: usize, rad_s: f64, time_s: f64) -> bool {
+        let back = (self.newest.rad_s - rad_s) * self.jump_rad_s.signum();
+        let is_back = back >= RETURNED * self.jump_rad_s.abs() || back > 0.0 && jumps(at, self.newest, rad_s, time_s);
+        let stood = self.newest.first_s < self.newest.time_s;
+        let has_left = stood && (rad_s - self.newest.rad_s).abs() > AT_ONCE_RAD_S[at];
+        !(is_back || has_left)
     }
 }
 
@@ -352,7 +403,17 @@ impl Default for SpeedFaults {
     }
 }
 
-impl Believed {
+impl Latest {
+    fn first(rad_s: f64, time_s: f64) -> Self {
+        Self { rad_s, time_s, first_s: time_s }
+    }
+
+    /// The next one after it.
+    fn then(self, rad_s: f64, time_s: f64) -> Self {
+        let first_s = if rad_s == self.rad_s { self.first_s } else { time_s };
+        Self { rad_s, time_s, first_s }
+    }
+
     /// Time in which the shaft may have changed, s.
     fn passed_s(&self, time_s: f64) -> f64 {
         (time_s - self.first_s.max(self.time_s - HELD_S)).max(0.0)
@@ -360,276 +421,13 @@ impl Believed {
 }
 
 /// Whether a reading is further from the believed one before than its shaft can have come.
-fn jumps(at: usize, before: Believed, rad_s: f64, time_s: f64) -> bool {
-    let (rate, at_once) = SHAFTS[at];
+fn jumps(at: usize, before: Latest, rad_s: f64, time_s: f64) -> bool {
+    let (rate, min_rad_s) = SHAFTS[at];
+    // A sensor that falls asleep or wakes up jumps.
+    let is_awake = before.rad_s.abs().min(rad_s.abs()) > min_rad_s;
+    let at_once = if is_awake { AT_ONCE_RAD_S[at] } else { min_rad_s };
     (rad_s - before.rad_s).abs() > rate * before.passed_s(time_s) + at_once
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ROLES: [Role; WATCHED] = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
-
-    /// The speeds of a car that accelerates in a gear of ratio 1.6, with a slipping converter and a final ratio of 3.5.
-    fn in_gear(time_s: f64) -> [f64; WATCHED] {
-        let output = 100.0 + 8.0 * time_s;
-        [1.7 * output, 1.6 * output, output, output / 3.5]
-    }
-
-    /// Times of the rows in which a speed is a fault, by speed, of six seconds with this time between rows.
-    fn faults(step_s: f64, speeds: impl Fn(f64) -> [f64; WATCHED]) -> [Vec<f64>; WATCHED] {
-        let mut watch = SpeedFaults::new();
-        let mut rows: [Vec<f64>; WATCHED] = Default::default();
-        for row in (0_u32..).take_while(|row| f64::from(*row) * step_s < 6.0) {
-            let time_s = f64::from(row) * step_s;
-            for (at, speed) in speeds(time_s).into_iter().enumerate() {
-                if watch.is_fault(ROLES[at], speed, time_s) {
-                    rows[at].push(time_s);
-                }
-            }
-        }
-        rows
-    }
-
-    #[test]
-    fn a_speed_that_reads_zero_while_the_car_drives_is_a_fault_until_it_is_back() {
-        for step_s in [0.001, 0.01, 0.02, 0.05, 0.1] {
-            for (at, length_s) in (0..WATCHED).flat_map(|at| [0.1, 0.5, 2.0].map(|length_s| (at, length_s))) {
-                let is_out = |time_s: f64| time_s > 1.0 && time_s < 1.0 + length_s;
-                for zero in [0.0, 0.5, -0.3] {
-                    let found = faults(step_s, |time_s| {
-                        let mut speeds = in_gear(time_s);
-                        if is_out(time_s) {
-                            speeds[at] = zero;
-                        }
-                        speeds
-                    });
-                    for (other, rows) in found.iter().enumerate() {
-                        assert!(
-                            rows.iter().all(|time_s| other == at && is_out(*time_s)),
-                            "{at} {other} {step_s}: {rows:?}"
-                        );
-                    }
-                    let all = (0..).map(|i| step_s * f64::from(i)).take_while(|time_s| *time_s < 6.0);
-                    let all = all.filter(|time_s| is_out(*time_s)).count();
-                    assert_eq!(found[at].len(), all, "{at} {step_s} {length_s}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_sensor_that_is_dead_from_a_standstill_on_is_a_fault_once_the_car_drives() {
-        for at in 0..WATCHED {
-            for step_s in [0.01, 0.05] {
-                let found = faults(step_s, |time_s| {
-                    // From rest, after half a second of idling.
-                    let output = 40.0 * (time_s - 0.5).max(0.0);
-                    let mut speeds = [80.0_f64.max(1.7 * output), 1.6 * output, output, output / 3.5];
-                    speeds[at] = 0.0;
-                    speeds
-                });
-                let first_s = found[at].first().copied().unwrap_or(f64::INFINITY);
-                assert!(first_s < 3.0, "{at} {step_s}: {first_s}");
-                // And from then on without a gap.
-                let count = found[at].len() as f64;
-                assert!((count * step_s - (6.0 - first_s)).abs() < 2.0 * step_s, "{at} {step_s}: {count}");
-                assert!((0..WATCHED).all(|speed| speed == at || found[speed].is_empty()), "{at}: {found:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_speed_that_was_zero_is_believed_again_in_the_direct_gear() {
-        for at in [TURBINE, OUTPUT] {
-            let found = faults(0.01, |time_s| {
-                let mut speeds = in_gear(time_s);
-                if time_s > 2.0 {
-                    speeds[TURBINE] = speeds[OUTPUT];
-                }
-                if time_s > 1.0 && time_s < 2.5 {
-                    speeds[at] = 0.0;
-                }
-                speeds
-            });
-            assert!(
-                found[at].len() >= 149 && found[at].iter().all(|time_s| *time_s < 2.5),
-                "{at}: {:?}",
-                found[at].last()
-            );
-        }
-    }
-
-    #[test]
-    fn a_turbine_that_showed_the_output_is_believed_where_it_turns_with_the_engine() {
-        let found = faults(0.01, |time_s| {
-            let [_, turbine, output, wheel] = in_gear(time_s);
-            // The converter is locked, or there is none.
-            [turbine, if time_s > 1.0 && time_s < 1.5 { output } else { turbine }, output, wheel]
-        });
-        assert!((48..=50).contains(&found[TURBINE].len()), "{:?}", found[TURBINE].last());
-    }
-
-    #[test]
-    fn a_fall_over_some_rows_is_a_fault_as_a_fall_at_once() {
-        for at in 0..WATCHED {
-            let found = faults(0.01, |time_s| {
-                let mut speeds = in_gear(time_s);
-                let rows = ((time_s - 1.0) / 0.01).round();
-                speeds[at] *= match rows {
-                    0.0 => 0.5,
-                    1.0 => 0.2,
-                    rows if (2.0..100.0).contains(&rows) => 0.0,
-                    _ => 1.0,
-                };
-                speeds
-            });
-            assert!(found[at].len() >= 100, "{at}: {}", found[at].len());
-        }
-    }
-
-    #[test]
-    fn a_channel_that_shows_the_speed_next_to_it_is_a_fault() {
-        for (at, other) in [(ENGINE, OUTPUT), (TURBINE, OUTPUT), (OUTPUT, TURBINE), (OUTPUT, WHEEL), (WHEEL, OUTPUT)] {
-            for step_s in [0.001, 0.01, 0.02] {
-                let found = faults(step_s, |time_s| {
-                    let mut speeds = in_gear(time_s);
-                    if time_s > 1.0 && time_s < 2.5 {
-                        speeds[at] = speeds[other];
-                    }
-                    speeds
-                });
-                let rows = 1.5 / step_s;
-                let count = found[at].len() as f64;
-                assert!(count >= rows - 2.0 && count <= rows, "{at} {other} {step_s}: {count}");
-                assert!((0..WATCHED).all(|speed| speed == at || found[speed].is_empty()), "{at} {other}: {found:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_turbine_that_shows_the_output_is_believed_once_a_shift_into_the_direct_gear_may_have_brought_it_there() {
-        let shift = |begin_s: f64, end_s: f64| {
-            faults(0.01, |time_s| {
-                let [_, _, output, wheel] = in_gear(time_s);
-                let slips = 1.0 - ((time_s - begin_s) / (end_s - begin_s)).clamp(0.0, 1.0);
-                let turbine = output * (1.0 + 1.5 * slips);
-                let is_wrong = time_s > 2.0 && time_s < 2.5;
-                [turbine + 30.0, if is_wrong { output } else { turbine }, output, wheel]
-            })
-        };
-        // The shift ends while the turbine is wrong: what it reads at the end and afterwards is right.
-        let [engine, turbine, output, wheel] = shift(1.9, 2.3);
-        assert!(engine.is_empty() && output.is_empty() && wheel.is_empty());
-        assert!(turbine.len() >= 30 && turbine.iter().all(|time_s| *time_s < 2.51 + GONE_S), "{turbine:?}");
-        // No shift: the engine does not go along.
-        let [_, turbine, ..] = shift(5.0, 5.5);
-        assert!((48..=50).contains(&turbine.len()), "{turbine:?}");
-    }
-
-    #[test]
-    fn a_turbine_that_shows_the_output_in_a_shift_is_believed_again_only_where_the_shift_goes_to_the_direct_gear() {
-        // The engine goes along, and the shift is over before the turbine is right again.
-        let rows = |ratios: &[f64], [before, after]: [f64; 2]| {
-            let mut watch = SpeedFaults::of_gearbox(ratios);
-            let is_fault = |row: u32| {
-                let time_s = 0.01 * f64::from(row);
-                let output = 100.0 + 5.0 * time_s;
-                let shifted = ((time_s - 1.0) / 0.5).clamp(0.0, 1.0);
-                let turbine = output * (before + (after - before) * shifted);
-                let shown = if time_s > 1.05 && time_s < 3.0 { output } else { turbine };
-                let speeds = ROLES.into_iter().zip([turbine + 20.0, shown, output, output / 3.5]);
-                speeds.filter(|(role, speed)| watch.is_fault(*role, *speed, time_s)).count()
-            };
-            (0..500).map(is_fault).sum::<usize>()
-        };
-        let (without, with) = ([4.17, 2.34, 1.52, 1.14, 0.87, 0.69], [4.7, 3.13, 2.1, 1.67, 1.28, 1.0, 0.84, 0.67]);
-        assert_eq!(rows(&without, [2.34, 1.52]), 194);
-        assert_eq!(rows(&with, [2.1, 1.67]), 194);
-        assert!(rows(&with, [1.28, 1.0]) < 60);
-        assert!(rows(&[], [2.34, 1.52]) < 194);
-    }
-
-    #[test]
-    fn a_turbine_without_a_converter_that_shows_a_slow_output_is_a_fault_and_so_are_no_right_readings() {
-        let noise = |factor: f64, time_s: f64| 0.3 * (factor * time_s).sin();
-        let found = faults(0.01, |time_s| {
-            let [engine, turbine, output] = [731.0, 517.0, 977.0].map(|factor| noise(factor, time_s));
-            let shown = if time_s > 1.0 && time_s < 1.2 { 21.0 + output } else { 97.0 + turbine };
-            [97.0 + engine, shown, 21.0 + output, 21.0 / 3.5]
-        });
-        assert!((18..=20).contains(&found[TURBINE].len()), "{:?}", found[TURBINE]);
-        assert!([ENGINE, OUTPUT, WHEEL].iter().all(|at| found[*at].is_empty()), "{found:?}");
-    }
-
-    #[test]
-    fn a_zero_without_end_is_a_fault_while_the_other_speeds_contradict_it() {
-        for at in [TURBINE, OUTPUT, WHEEL] {
-            let found = faults(0.01, |time_s| {
-                let mut speeds = in_gear(time_s);
-                if time_s > 1.0 {
-                    speeds[at] = 0.0;
-                }
-                speeds
-            });
-            assert!(found[at].len() >= 498, "{at}: {}", found[at].len());
-        }
-    }
-
-    #[test]
-    fn a_car_that_stops_an_engine_that_stalls_and_a_hard_shift_are_no_faults() {
-        let stops = |time_s: f64| {
-            // 11 m/s^2 on the wheels of 0.3 m; sensors read zero below 2 rad/s of the wheel.
-            let wheel = (70.0 - 37.0 * time_s).max(0.0);
-            let wheel = if wheel < 2.0 { 0.0 } else { wheel };
-            let turbine = 3.5 * 4.7 * wheel;
-            [turbine.max(80.0), turbine, 3.5 * wheel, wheel]
-        };
-        let stalls = |time_s: f64| {
-            let engine = (90.0 - 900.0 * (time_s - 1.0).max(0.0)).max(0.0);
-            [engine, 0.0, 0.0, 0.0]
-        };
-        // Down in 60 ms, with slip zero in one row.
-        let grips = |time_s: f64| {
-            let output = 100.0 + 5.0 * time_s;
-            let slip = (1.6 * output - output) * (1.0 - (time_s - 1.0).clamp(0.0, 0.06) / 0.06);
-            [1.7 * output, output + slip, output, output / 3.5]
-        };
-        let locks = |time_s: f64| {
-            let locked = (time_s - 1.0).clamp(0.0, 0.07) / 0.07;
-            let wheel = if time_s < 2.0 { 60.0 * (1.0 - locked) } else { 60.0 };
-            [200.0, 200.0, 3.5 * wheel, wheel]
-        };
-        let neutral = |time_s: f64| [80.0, if time_s > 1.0 { 80.0 } else { 0.0_f64.max(80.0 * time_s) }, 0.0, 0.0];
-        for step_s in [0.001, 0.005, 0.01, 0.02] {
-            assert!(faults(step_s, stops).iter().all(Vec::is_empty), "stops {step_s}");
-            assert!(faults(step_s, stalls).iter().all(Vec::is_empty), "stalls {step_s}");
-            assert!(faults(step_s, grips).iter().all(Vec::is_empty), "grips {step_s}");
-            assert!(faults(step_s, neutral).iter().all(Vec::is_empty), "neutral {step_s}");
-            let [engine, turbine, ..] = faults(step_s, locks);
-            assert!(engine.is_empty() && turbine.is_empty(), "locks {step_s}");
-        }
-    }
-
-    #[test]
-    fn two_recordings_that_are_joined_go_on_after_the_longest_fault() {
-        let joined = |time_s: f64| if time_s < 1.0 { in_gear(time_s) } else { [80.0, 0.0, 0.0, 0.0] };
-        for (at, rows) in faults(0.01, joined).iter().enumerate() {
-            assert!(rows.last().is_none_or(|last_s| *last_s < 1.0 + LONGEST_S + 0.02), "{at}: {:?}", rows.last());
-        }
-        // A clock that begins anew is another log.
-        let mut watch = SpeedFaults::new();
-        assert!(!watch.is_fault(Role::OutputSpeed, 100.0, 10.0));
-        assert!(!watch.is_fault(Role::OutputSpeed, 0.0, 0.0));
-    }
-
-    #[test]
-    fn what_is_no_speed_is_left_to_others_and_believed_by_none() {
-        let mut watch = SpeedFaults::new();
-        for (row, value) in (0_u32..).zip([16_383.75, f64::NAN, f64::INFINITY, 100.0, 100.5, 16_383.75, 101.0]) {
-            assert!(!watch.is_fault(Role::TurbineSpeed, value, 0.01 * f64::from(row)), "{value}");
-        }
-        assert!(!watch.is_fault(Role::VehicleSpeed, 0.0, 0.1) && !watch.is_fault(Role::Gear, 5.0, 0.1));
-    }
-}
+mod tests;

@@ -3,6 +3,7 @@
 use crate::copies::Copies;
 use crate::frozen::{FrozenSpeed, NO_SPEEDS, SPEEDS, Speeds};
 use crate::held::HeldSpeed;
+use crate::speed_faults::MAX_RAD_S;
 use crate::{Quality, Role, SpeedFaults};
 
 /// Readings of a speed that were taken as good and are not.
@@ -65,6 +66,10 @@ impl SpeedWatch {
     pub fn judge(&mut self, reading: SpeedReading) -> (Quality, AllWithdrawn) {
         let SpeedReading { role, value, time_s, may_be_held } = reading;
         let Some((frozen, held)) = self.speeds.get_mut(role as usize) else { return (Quality::Good, [None; 2]) };
+        if value.abs() > MAX_RAD_S {
+            // No speed, which is refused elsewhere: it is the start of nothing.
+            return (Quality::Good, [None; 2]);
+        }
         let is_fault = self.faults.is_fault(role, value, time_s);
         let was_frozen = frozen.is_known();
         let is_held = !is_fault && may_be_held && held.is_held(value);
@@ -92,5 +97,21 @@ impl SpeedWatch {
 impl Default for SpeedWatch {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_that_is_no_speed_refuses_none_behind_it() {
+        let mut watch = SpeedWatch::new();
+        for row in 0..600_u32 {
+            let time_s = 0.01 * f64::from(row);
+            let value = if (300..310).contains(&row) { 6553.5 } else { 160.0 + 0.03 * (1.7 * f64::from(row)).sin() };
+            let reading = SpeedReading { role: Role::TurbineSpeed, value, time_s, may_be_held: true };
+            assert_eq!(watch.judge(reading), (Quality::Good, [None; 2]), "{row}");
+        }
     }
 }
