@@ -214,9 +214,13 @@ fn a_shift_in_which_a_speed_fails_keeps_its_friction_work_and_says_what_failed()
         assert!(least_j < work_j && work_j < greatest_j, "{least_j} {work_j} {greatest_j}");
         assert!(!["", "good"].contains(&&*health), "{shifts}");
     }
-    // From within the shift to the end of the log.
-    for (speed, from_s) in [("turbine", 7.75), ("turbine", 8.1), ("output", 7.75), ("output", 8.25)] {
-        let log = case.with(&format!("{speed}_speed_rad_s"), [from_s, f64::INFINITY], "0");
+    // From within the shift to the end of the log, and from before it until shortly before that end.
+    let end_s = f64::INFINITY;
+    let to_the_end =
+        [("turbine", 7.75, end_s), ("turbine", 8.1, end_s), ("output", 7.75, end_s), ("output", 8.25, end_s)];
+    let nearly = [("turbine", 7.6, 9.4), ("output", 7.6, 9.4), ("turbine", 7.43, 9.42)];
+    for (speed, from_s, to_s) in to_the_end.into_iter().chain(nearly) {
+        let log = case.with(&format!("{speed}_speed_rad_s"), [from_s, to_s], "0");
         let (note, _, shifts) = case.estimate(&log, &[]);
         assert_eq!(shifts.lines().count(), clean.lines().count(), "{speed} {from_s}: {note}");
         let ([_, least_j, greatest_j], health) = work_of_first(&shifts);

@@ -17,7 +17,7 @@
 
 use crate::Role;
 use crate::frozen::NOISE_RAD_S;
-use crate::speed_faults::LONGEST_S;
+use crate::speed_faults::{GONE_S, LONGEST_S};
 
 /// So many equal samples show it.
 const SAMPLES: u32 = 3;
@@ -77,6 +77,7 @@ pub(crate) type Stamped = [f64; 2];
 /// Engine and turbine, which turn together behind a lock-up clutch, by their place in [`PAIRS`]. Turbine and output, which do in the direct gear,
 /// come next; then engine and output, which turn together with the turbine alone.
 const LOCKED: usize = 0;
+const DIRECT: usize = 1;
 const THROUGH: usize = 2;
 
 /// The first and the second of a pair.
@@ -140,6 +141,8 @@ struct Pair {
     /// the copy is then for the shaft behind to tell.
     together_since_s: Option<f64>,
     was_together: bool,
+    /// Since when the second one has turned with the shaft behind it while both are equal, s.
+    is_with_since_s: Option<f64>,
 }
 
 /// Whether two readings of about the same time are of two speeds.
@@ -165,6 +168,11 @@ impl Behind {
         }
         self.error_rad_s += LATEST * ((rad_s - self.ratio * second).abs() - self.error_rad_s);
         self.ratio += LATEST * (rad_s / second - self.ratio);
+    }
+
+    /// Whether the shaft behind has the speed that belongs to this one, as near as two readings agree.
+    fn is_at(&self, [second, time_s]: Stamped) -> bool {
+        self.at(time_s).is_some_and(|rad_s| (rad_s - self.ratio * second).abs() <= TOGETHER * rad_s.abs())
     }
 
     /// Which of two equal readings are copies, if a speed behind them says it.
@@ -197,6 +205,7 @@ impl Copies {
             together: [TOGETHER, f64::INFINITY],
             together_since_s: None,
             was_together: false,
+            is_with_since_s: None,
         };
         let mut pairs = [pair; PAIRS.len()];
         pairs[LOCKED].together = [f64::INFINITY, LOCKED_RAD_S];
@@ -227,6 +236,10 @@ impl Copies {
                 pair.newest = [None; 2];
                 let newest = [one, other];
                 let mut copies = pair.compare(newest);
+                if n == DIRECT && pair.turns_with(&self.behind[DIRECT], newest) {
+                    // A shift has brought the turbine to the output that showed it.
+                    copies[SECOND] = None;
+                }
                 if n == THROUGH {
                     pair.was_together = pair.is_open() && self.turbine.is_some_and(|turbine| is_apart(turbine, one));
                 }
@@ -284,6 +297,14 @@ impl Pair {
         let which = self.jumped.filter(|_| self.equal >= self.needed)?;
         let is_short = newest[which][1] - before[which][1] <= LONGEST_S;
         is_short.then_some((which, before[which]))
+    }
+
+    /// Whether the second one, which is the first one's value, has turned with the shaft behind it for some time.
+    fn turns_with(&mut self, behind: &Behind, newest: [Stamped; 2]) -> bool {
+        let [_, time_s] = newest[SECOND];
+        let is_with = self.equal > 0 && behind.is_at(newest[SECOND]);
+        self.is_with_since_s = is_with.then(|| self.is_with_since_s.unwrap_or(time_s));
+        self.is_with_since_s.is_some_and(|since_s| time_s - since_s >= GONE_S)
     }
 
     /// The same of two that turned together, by the shaft behind them.

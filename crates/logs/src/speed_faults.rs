@@ -43,7 +43,7 @@ const TO_ANOTHER: (f64, f64) = (1000.0, 5.0);
 /// and the engine goes along by this fraction at least, for so long, s, after which the inertia phase is over \[chosen\].
 const SHIFTS_RAD_S2: f64 = 300.0;
 const GOES_ALONG: f64 = 0.5;
-const GONE_S: f64 = 0.15;
+pub(crate) const GONE_S: f64 = 0.15;
 /// By this fraction the ratio of two readings may differ from that of the gear: noise, and shafts that twist.
 const BESIDE_GEAR: f64 = 0.02;
 /// Factors beyond which output over wheel speed has parted from what it was: readings that are 50 ms apart differ by less.
@@ -141,8 +141,9 @@ struct Fault {
     /// What it began with over the speed before, rad/s.
     jump_rad_s: f64,
     newest: Latest,
-    /// Since when a shift may have brought the turbine to the speed of the output, s; not a number before.
-    shifted_since_s: f64,
+    /// Since when a shift may have brought the turbine to the speed of the output, or output and wheels have their ratio again, s; not a number
+    /// before.
+    right_since_s: f64,
 }
 
 /// Output over wheel speed, and when it was read, s.
@@ -212,13 +213,17 @@ impl SpeedFaults {
     /// Takes a reading that is a fault.
     fn goes_on(&mut self, at: usize, before: Latest, rad_s: f64, time_s: f64) {
         let fault = self.faults[at].unwrap_or_else(|| self.fault(at, before, rad_s, time_s));
-        let shifts = self.may_shift(before, rad_s, (fault, time_s));
-        let shifted_since_s = match fault.shifted_since_s {
-            since_s if shifts && !since_s.is_nan() => since_s,
-            _ if shifts => time_s,
+        let may_be_right = match at {
+            TURBINE => fault.another == Some(OUTPUT) && self.may_shift(before, rad_s, (fault, time_s)),
+            OUTPUT | WHEEL => self.agrees(at, rad_s, time_s),
+            _ => false,
+        };
+        let right_since_s = match fault.right_since_s {
+            since_s if may_be_right && !since_s.is_nan() => since_s,
+            _ if may_be_right => time_s,
             _ => f64::NAN,
         };
-        self.faults[at] = Some(Fault { shifted_since_s, newest: fault.newest.then(rad_s, time_s), ..fault });
+        self.faults[at] = Some(Fault { right_since_s, newest: fault.newest.then(rad_s, time_s), ..fault });
     }
 
     /// A fault that begins.
@@ -235,7 +240,7 @@ impl SpeedFaults {
             by_jump,
             jump_rad_s: rad_s - before.rad_s,
             newest: Latest::first(rad_s, time_s),
-            shifted_since_s: f64::NAN,
+            right_since_s: f64::NAN,
         }
     }
 
@@ -268,6 +273,7 @@ impl SpeedFaults {
         }
         if let (OUTPUT | WHEEL, Some(output), Some(wheel)) =
             (at, self.turning(OUTPUT, time_s), self.turning(WHEEL, time_s))
+            && [OUTPUT, WHEEL].iter().all(|of| self.faults[*of].is_none())
         {
             let value = output / wheel;
             self.output_over_wheel = value;
@@ -295,10 +301,10 @@ impl SpeedFaults {
     fn lasts(&self, at: usize, before: Latest, rad_s: f64, (fault, time_s): (Fault, f64)) -> bool {
         let fell = rad_s.abs() <= FELL * before.rad_s.abs();
         let is_short = time_s - fault.since_s <= LONGEST_S;
-        let is_shift = (at, fault.another) == (TURBINE, Some(OUTPUT)) && time_s - fault.shifted_since_s >= GONE_S;
+        let is_right = time_s - fault.right_since_s >= GONE_S;
         let shows_another = fault.another.is_some_and(|another| self.is_near(STILL_ANOTHER, another, rad_s, time_s));
         let is_wrong = || {
-            let is_elsewhere = !is_shift && (shows_another || fault.by_jump && fault.goes_on(at, rad_s, time_s));
+            let is_elsewhere = !is_right && (shows_another || fault.by_jump && fault.goes_on(at, rad_s, time_s));
             jumps(at, before, rad_s, time_s) || fell || is_elsewhere || self.parts(at, rad_s, time_s)
         };
         let is_dead = || rad_s.abs() <= ZERO_RAD_S && fell && self.is_contradicted(at, before, time_s);
@@ -370,18 +376,25 @@ impl SpeedFaults {
 
     /// Whether output and wheel speed part by a reading of one of them.
     fn parts(&self, at: usize, rad_s: f64, time_s: f64) -> bool {
-        let ratio = match at {
-            OUTPUT => self.turning(WHEEL, time_s).map(|wheel| rad_s / wheel),
-            WHEEL => self.turning(OUTPUT, time_s).map(|output| output / rad_s),
-            _ => None,
-        };
         // Where this one crawls the other one may be the wrong one.
         let (_, min_rad_s) = SHAFTS[at];
         let turns = self.believed[at].is_none_or(|before| before.rad_s.abs().max(rad_s.abs()) > min_rad_s);
-        ratio.filter(|_| turns).is_some_and(|ratio| {
-            let change = ratio / self.output_over_wheel;
-            !change.is_nan() && !PARTED.contains(&change)
-        })
+        turns && self.change_of_ratio(at, rad_s, time_s).is_some_and(|change| !PARTED.contains(&change))
+    }
+
+    /// Whether output and wheel speed have their ratio with a reading of one of them, as near as two readings agree.
+    fn agrees(&self, at: usize, rad_s: f64, time_s: f64) -> bool {
+        self.change_of_ratio(at, rad_s, time_s).is_some_and(|change| (change - 1.0).abs() <= ANOTHER)
+    }
+
+    /// By which factor the ratio of output and wheel speed changes with a reading of one of them.
+    fn change_of_ratio(&self, at: usize, rad_s: f64, time_s: f64) -> Option<f64> {
+        let ratio = match at {
+            OUTPUT => rad_s / self.turning(WHEEL, time_s)?,
+            WHEEL => self.turning(OUTPUT, time_s)? / rad_s,
+            _ => return None,
+        };
+        Some(ratio / self.output_over_wheel).filter(|change| !change.is_nan())
     }
 }
 

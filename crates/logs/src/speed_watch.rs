@@ -114,4 +114,31 @@ mod tests {
             assert_eq!(watch.judge(reading), (Quality::Good, [None; 2]), "{row}");
         }
     }
+
+    #[test]
+    fn an_output_that_shows_the_turbine_is_believed_once_a_shift_has_brought_the_turbine_to_it() {
+        for noise_rad_s in [0.0, 0.2] {
+            let noise = |row: u32, of: f64| noise_rad_s * (f64::from(row) * of).sin();
+            let mut watch = SpeedWatch::of_gearbox(&[2.5, 1.0]);
+            let mut refused = Vec::new();
+            for row in 0..900_u32 {
+                let time_s = 0.01 * f64::from(row);
+                let output = 120.0 + 4.0 * time_s + noise(row, 1.37);
+                let turbine = output * (2.5 - 1.5 * ((time_s - 4.5) / 0.4).clamp(0.0, 1.0)) + noise(row, 2.11);
+                let shows = (4.0..6.0).contains(&time_s);
+                let speeds =
+                    [turbine + 12.0, turbine, if shows { turbine } else { output }, output / 3.0 + noise(row, 0.91)];
+                for (role, value) in Role::SPEEDS.into_iter().zip(speeds) {
+                    let (quality, _) = watch.judge(SpeedReading { role, value, time_s, may_be_held: false });
+                    if quality == Quality::Impossible {
+                        refused.push((role, time_s));
+                    }
+                }
+            }
+            assert!(refused.iter().all(|(role, _)| *role == Role::OutputSpeed), "{noise_rad_s}: {refused:?}");
+            let [first, last] = [refused.first(), refused.last()].map(|found| found.map(|(_, time_s)| *time_s));
+            assert!(first.is_some_and(|time_s| time_s < 4.03), "{noise_rad_s}: {first:?}");
+            assert!(last.is_some_and(|time_s| time_s > 4.8 && time_s < 5.1), "{noise_rad_s}: {last:?}");
+        }
+    }
 }

@@ -210,8 +210,11 @@ pub fn is_of_vehicle(shift: &Shift, ratios: &[f64], vehicle: &Vehicle) -> bool {
     same(of(shift.from), vehicle.shift.ratio_offgoing()) && same(of(shift.to), vehicle.shift.ratio_oncoming())
 }
 
+/// So long before the end of a log a speed must be there again for the speeds to show the new gear, s.
+const SHOWS_GEAR_S: f64 = 0.5;
+
 /// The shift of a vehicle file at the end of the samples that its observer has seen after this time, where the speeds do not show it because one of
-/// them was lost to the end.
+/// them was lost until the end or shortly before it.
 pub fn seen_by_observer_alone(
     recent: &RecentSamples,
     after_s: f64,
@@ -219,10 +222,18 @@ pub fn seen_by_observer_alone(
     vehicle: &Vehicle,
 ) -> Option<Shift> {
     let samples = recent.between([f64::NEG_INFINITY, f64::INFINITY]);
-    samples.last().filter(|sample| is_blind(sample))?;
+    let end_s = samples.last()?.time_s;
+    samples.iter().rev().take_while(|sample| end_s - sample.time_s <= SHOWS_GEAR_S).find(|sample| is_blind(sample))?;
     let is_in = |sample: &LogSample| sample.estimate.phase == Phase::InertiaPhase;
     let last = samples.iter().rposition(is_in)?;
-    let first = last - samples[..last].iter().rev().take_while(|sample| is_in(sample)).count();
+    let back = |from: usize, is_of: &dyn Fn(&LogSample) -> bool| {
+        from - samples[..from].iter().rev().take_while(|sample| is_of(sample)).count()
+    };
+    let seen = back(last, &is_in);
+    // Where both speeds were not there before what the observer saw of it, it may have begun as soon as one of them was lost.
+    let with_torque_phase = back(seen, &|sample| sample.estimate.phase == Phase::TorquePhase);
+    let unseen = back(with_torque_phase, &|sample| !has_both(sample));
+    let first = if unseen < with_torque_phase { unseen } else { seen };
     let inertia_s = [samples[first].time_s, samples.get(last + 1).unwrap_or(&samples[last]).time_s];
     let gears = |from, to| Shift {
         from,
@@ -405,6 +416,12 @@ impl EstimatedShift {
             unhealthy: unhealthy(of_shift),
         })
     }
+}
+
+/// Whether turbine and output speed are there.
+fn has_both(sample: &LogSample) -> bool {
+    let Channels { turbine, output, .. } = sample.estimate.channels;
+    [turbine, output] == [ChannelHealth::Good; 2]
 }
 
 /// Whether turbine or output speed did not come for a while, or was refused.
