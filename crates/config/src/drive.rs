@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use car::{ControllerCalibration, Drive, DriveSegment, ShiftPlan, ShiftSchedule, SpeedTrace};
+use car::{Car, ControllerCalibration, Drive, DriveSegment, ShiftPlan, ShiftSchedule, SpeedTrace};
 use drivetrain::Table1;
 use serde::Deserialize;
 use toml::Spanned;
@@ -19,6 +19,8 @@ const MAX_REPETITIONS: f64 = 1e6;
 /// are taken, rad/s.
 const SCHEDULE: [[f64; 5]; 3] =
     [[0.0, 0.1, 0.3, 0.6, 1.0], [190.0, 200.0, 260.0, 380.0, 560.0], [105.0, 110.0, 140.0, 230.0, 330.0]];
+/// The name of no gear.
+const NEUTRAL: &str = "N";
 /// Minimum time in a gear where a schedule says nothing, s.
 const MIN_TIME_IN_GEAR_S: f64 = 1.0;
 
@@ -57,7 +59,32 @@ impl DriveFile {
         };
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
         let named_at = self.source.place_of("", "vehicle").unwrap_or(0);
-        CarFile::read(&folder.join(vehicle)).map_err(|error| error.named_by(&self.source, "vehicle", named_at))
+        let car = CarFile::read(&folder.join(vehicle));
+        let car = car.map_err(|error| error.named_by(&self.source, "vehicle", named_at))?;
+        self.check_names(&car.car)?;
+        Ok(car)
+    }
+
+    /// Checks that a car has the gears, clutches and brakes that the drive names.
+    ///
+    /// # Errors
+    /// It has no such gear, clutch or brake.
+    pub fn check_names(&self, car: &Car) -> Result<(), ConfigError> {
+        let raw: RawDrive = self.source.parse_as(Kind::Drive)?;
+        let check = Check::of(&self.source);
+        let gear = |key: &str, name: &Word| {
+            let gears = &car.gearbox.gears;
+            if name.get_ref() == NEUTRAL || car.gearbox.gear(name.get_ref()).is_some() {
+                return Ok(());
+            }
+            let names = gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
+            let message = format!("the gearbox has no gear \"{}\"", name.get_ref());
+            Err(check.meaning(key, name.span().start, message, Some(format!("its gears are {names}"))))
+        };
+        raw.start.gear.iter().try_for_each(|name| gear("start.gear", name))?;
+        let listed = raw.shift.iter().flat_map(|shifts| shifts.get_ref());
+        listed.map(|shift| &shift.gear).try_for_each(|name| gear("shift.gear", name))?;
+        raw.fault.iter().try_for_each(|fault| fault.check_elements(&check, &car.gearbox))
     }
 
     /// Checks the text of a drive file.

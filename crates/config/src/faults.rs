@@ -1,6 +1,7 @@
 //! `[[fault]]` of a drive file.
 
 use car::{Fault, FaultKind};
+use geartrain::Gearbox;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -85,6 +86,27 @@ impl RawFault {
             }
         };
         Ok(Fault { kind, from_s: check.number("fault.from_s", &self.from_s, 0.0..=1e9)? })
+    }
+
+    /// Checks that a gearbox has the clutches and brakes that it names.
+    ///
+    /// # Errors
+    /// The gearbox has none of such a name.
+    pub(crate) fn check_elements(&self, check: &Check<'_>, gearbox: &Gearbox) -> Result<(), ConfigError> {
+        let of_one = self.element.iter().map(|name| ("fault.element", name.get_ref(), name.span().start));
+        let of_two = self
+            .elements
+            .iter()
+            .flat_map(|names| names.get_ref().iter().map(|name| ("fault.elements", name, names.span().start)));
+        let known: Vec<&str> = gearbox.with_plates().map(|element| element.name.as_str()).collect();
+        match of_one.chain(of_two).find(|(_, name, _)| !known.contains(&name.as_str())) {
+            None => Ok(()),
+            Some((key, name, at)) => {
+                let message = format!("the gearbox has no clutch or brake \"{name}\"");
+                let hint = format!("its clutches and brakes are {}", known.join(", "));
+                Err(check.meaning(key, at, message, Some(hint)))
+            }
+        }
     }
 
     /// Each key has to be one of this kind, and those of the kind have to be there.

@@ -128,6 +128,11 @@ impl ElementKind {
             Self::Dog => "dog",
         }
     }
+
+    /// Whether it carries its torque by plates.
+    pub fn has_plates(self) -> bool {
+        matches!(self, Self::Clutch | Self::Brake)
+    }
 }
 
 /// An element of a stick diagram.

@@ -104,6 +104,11 @@ impl Gearbox {
         self.elements.is_empty()
     }
 
+    /// The clutches and brakes with plates.
+    pub fn with_plates(&self) -> impl Iterator<Item = &GearboxElement> {
+        self.elements.iter().filter(|element| element.kind.has_plates())
+    }
+
     /// Turbine over output speed in each gear, negative in reverse.
     pub fn ratios(&self) -> Vec<f64> {
         self.gears.iter().map(|gear| gear.ratio).collect()

@@ -25,7 +25,11 @@ const ROW_BYTES: f64 = 500.0;
 pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     let file = DriveFile::read(&options.experiment)?;
     let car = match &options.vehicle {
-        Some(vehicle) => read_car(vehicle)?,
+        Some(vehicle) => {
+            let car = read_car(vehicle)?;
+            file.check_names(&car.car)?;
+            car
+        }
         None => file.read_vehicle().inspect(warn_of_slipping)?,
     };
     if options.scenario.is_some() {

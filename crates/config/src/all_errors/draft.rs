@@ -40,8 +40,9 @@ impl Number {
     }
 }
 
-/// Keys that make up what other keys name.
-const NAMING: [&str; 8] = ["name", "kind", "level", "gearbox", "shaft", "element", "gear", "channel"];
+/// Keys whose values make up what other keys name, and tables that do.
+const NAMING: [&str; 5] = ["name", "kind", "level", "gearbox", "channel"];
+const NAMING_TABLES: [&str; 3] = ["shaft", "element", "gear"];
 
 /// A text that is mended.
 pub(super) struct Draft {
@@ -82,7 +83,9 @@ impl Draft {
 
     /// Whether all that other keys name is that of the file.
     pub(super) fn has_its_names(&self) -> bool {
-        NAMING.iter().all(|key| !self.taken.contains(*key) && !self.guessed.keys().any(|(_, of)| of == key))
+        let is_replaced = |key: &&str| self.guessed.keys().any(|(_, of)| of == key);
+        let mut taken = NAMING.iter().chain(&NAMING_TABLES);
+        !NAMING.iter().any(|key| is_replaced(&key)) && taken.all(|key| !self.taken.contains(*key))
     }
 
     /// The line of the file that is this line of the draft.
@@ -96,6 +99,7 @@ impl Draft {
             Wrong::Range { key, .. }
             | Wrong::Value { key }
             | Wrong::Length { key, .. }
+            | Wrong::Order { key }
             | Wrong::Name { key, .. }
             | Wrong::Meaning { key } => in_table(key),
             // A key that is missing in a table that was put in, or that was taken out.
@@ -123,6 +127,8 @@ impl Draft {
                 self.rename(line, key, name, known, attempts) || self.take_out(line, name) || self.leave_out(line, key)
             }
             Wrong::Length { key, wanted } => self.put_list(line, key, *wanted),
+            Wrong::Order { key } if attempts == 0 => self.put_rising(line, key) || self.leave_out(line, key),
+            Wrong::Order { key } => self.leave_out(line, key),
             Wrong::Value { key } | Wrong::Meaning { key } => {
                 match self.guessed.get(&(line, in_table(key).to_owned())).copied().flatten() {
                     // Another number may go with what is beside it.
@@ -408,6 +414,21 @@ impl Draft {
         let number = self.guess.number.of([1.0, 2.0]);
         let list = format!("[{}]", vec![format!("{number:?}"); length].join(", "));
         self.put(entry.value, &list, (line, in_table(key).to_owned()), Some([1.0, 2.0]))
+    }
+
+    /// Puts a list that rises in place of one that does not, of the same length and between its smallest and its largest number.
+    fn put_rising(&mut self, line: usize, key: &str) -> bool {
+        let Some(entry) = self.entry(line, in_table(key)) else { return false };
+        let number = |place: &Range<usize>| self.text.get(place.clone()).and_then(|text| text.parse::<f64>().ok());
+        let Some(old) = entry.items.iter().map(number).collect::<Option<Vec<f64>>>() else { return false };
+        let low = old.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = old.iter().copied().fold(low, f64::max);
+        let high = if high > low { high } else { low + 1.0 };
+        let steps = (old.len().max(2) - 1) as f64;
+        let rising = (0..old.len()).map(|at| format!("{:?}", low + (high - low) * at as f64 / steps));
+        let list = format!("[{}]", rising.collect::<Vec<_>>().join(", "));
+        // How long it is may be what is wrong with it.
+        self.put(entry.value, &list, (line, in_table(key).to_owned()), None)
     }
 
     fn put(&mut self, place: Range<usize>, new: &str, guessed: (usize, String), within: Option<[f64; 2]>) -> bool {

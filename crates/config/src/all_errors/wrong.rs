@@ -21,6 +21,8 @@ pub(super) enum Wrong {
     Kind,
     /// A list that is not as long as another one.
     Length { key: String, wanted: usize },
+    /// A list that does not rise.
+    Order { key: String },
     /// What this key means beside others.
     Meaning { key: String },
     /// Anything else.
@@ -60,6 +62,9 @@ impl Wrong {
                 Some((table, key)) => Self::Missing { table: Some(table.to_owned()), key: key.to_owned() },
                 None => Self::Missing { table: None, key: key.clone() },
             },
+            ConfigError::Meaning { key, message, .. } if message.contains("above the breakpoint before it") => {
+                Self::Order { key: key.clone() }
+            }
             ConfigError::Meaning { key, message, .. } if is_of_value_alone(message) => Self::Value { key: key.clone() },
             ConfigError::Meaning { key, message, hint, .. } => {
                 let key = key.clone();
@@ -113,7 +118,6 @@ fn is_of_value_alone(message: &str) -> bool {
         " does not contain ",
         "has no such command",
         " must be two numbers",
-        "above the breakpoint before it",
         "expected an integer",
         "a table needs at least",
         "must begin with `car.`",

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use ::car::{Car, CarErrorBounds, ElementErrorBounds, LockUp, ShiftClutch, ratios_alone};
 use drivetrain::{Clutch, ClutchValve, Table1};
-use geartrain::{ElementKind, Gearbox, GearboxElement};
+use geartrain::{Gearbox, GearboxElement};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -332,11 +332,6 @@ fn turbine_inertias(check: &Check<'_>, raw: &RawCar, gearbox: &mut Gearbox) -> R
     Ok(())
 }
 
-/// Whether an element has plates.
-fn is_friction(kind: ElementKind) -> bool {
-    matches!(kind, ElementKind::Clutch | ElementKind::Brake)
-}
-
 /// The friction elements: plates of the gearbox file, friction over slip, drag and valve of the vehicle file.
 fn clutches(
     check: &Check<'_>,
@@ -355,16 +350,15 @@ fn clutches(
         line_pressure_pa,
         oil_degc,
     };
-    let of = |element: &GearboxElement| is_friction(element.kind).then(|| common.clutch(element)).transpose();
+    let of = |element: &GearboxElement| element.kind.has_plates().then(|| common.clutch(element)).transpose();
     gearbox.elements.iter().map(of).collect()
 }
 
 /// Refuses a table of an element that the gearbox does not have.
 fn known_clutches(check: &Check<'_>, raw: &RawCar, gearbox: &Gearbox) -> Result<(), ConfigError> {
-    let with_plates = || gearbox.elements.iter().filter(|element| is_friction(element.kind));
-    let unknown = raw.clutch.keys().find(|name| with_plates().all(|element| element.name != *name.get_ref()));
+    let unknown = raw.clutch.keys().find(|name| gearbox.with_plates().all(|element| element.name != *name.get_ref()));
     let Some(name) = unknown else { return Ok(()) };
-    let names = with_plates().map(|element| element.name.as_str()).collect::<Vec<_>>().join(", ");
+    let names = gearbox.with_plates().map(|element| element.name.as_str()).collect::<Vec<_>>().join(", ");
     let message = format!("the gearbox has no clutch or brake \"{}\"", name.get_ref());
     let hint = match gearbox.has_ratios_alone() {
         true => "its file has ratios alone; with level = \"shares\" or \"stick-diagram\" it has elements".to_owned(),

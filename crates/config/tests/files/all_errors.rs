@@ -210,7 +210,7 @@ fn any_kind(source: Source) -> Result<(), ConfigError> {
         Kind::Vehicle => VehicleFile::from_source(source).map(drop),
         Kind::Car => CarFile::from_source(source).map(drop),
         Kind::Experiment => ExperimentFile::from_source(source)?.read_vehicle().map(drop),
-        Kind::Drive => DriveFile::from_source(source).map(drop),
+        Kind::Drive => DriveFile::from_source(source)?.read_vehicle().map(drop),
         Kind::Study => Study::from_source(source).map(drop),
         Kind::CarStudy => CarStudy::from_source(source).map(drop),
         Kind::Overlay => VehicleFile::check_overlay(&source),
@@ -351,6 +351,9 @@ fn errors_behind_a_value_that_is_wrong_beside_others_are_named() {
         &and("date or time, expected a number"),
     );
     has_all(car, &far, "\n[clutch.Z]\ndrag_n_m = 3\n", &and("no clutch or brake \"Z\""));
+    let own_valve = "\n[clutch.C]\nvalve = { lag = { pressure_pa = [0, 3e5, 1e5], time_constant_s = [0.2, 0.1, 0.08] }, gain = { current_a = \
+                     [0, 1], gain_pa_a = [1e6, 1.5e6] }, delay = { current_a = [0, 1], delay_s = [0.03, 0] } }\n";
+    has_all(car, &far, own_valve, &and("`clutch.C.valve.lag.pressure_pa`: breakpoint 3 is not above"));
     let lock_up = "\n[lock_up]\ncapacity_n_m = -5\nfirst_gear = \"77\"\non_input_rad_s = 1e9\noff_input_rad_s = 110\nramp_s = 99\n";
     let of_lock_up = ["capacity_n_m` is -5", "no gear \"77\"", "on_input_rad_s` is 1000000000", "ramp_s` is 99"];
     has_all(car, &far, lock_up, &[&of_lock_up[..], &of_far].concat());
@@ -369,6 +372,11 @@ fn errors_behind_a_value_that_is_wrong_beside_others_are_named() {
     let kind = [("kind = \"brake\"", "kind = 5"), ("inertia_kg_m2 = 0.004", "inertia_kg_m2 = -4")];
     let words = "the number `5`, expected one of `clutch`, `brake`, `one-way-clutch`, `dog`";
     has_all("gearboxes/8hp.toml", &kind, "", &[words, "sun12.inertia_kg_m2` is -4"]);
+    let faults =
+        "\n[[fault]]\nkind = \"swapped-solenoids\"\nelements = [\"A\", \"Q\"]\nfrom_s = -4\n[start]\ngear = \"11\"\n";
+    let of_faults =
+        ["`fault.elements`: the gearbox has no clutch or brake \"Q\"", "`fault.from_s` is -4", "no gear \"11\""];
+    has_all("drives/city.toml", &[], faults, &of_faults);
     let grade = [("grade_rad = 0.02", "grade_rad = [1, 2, 3]"), ("time_in_gear_s = 1.0", "time_in_gear_s = -1")];
     has_all("drives/city.toml", &grade, "", &["expected a number or [from, to]", "time_in_gear_s` is -1"]);
 }
