@@ -151,3 +151,23 @@ fn a_suggested_map_leads_to_its_dbc_from_any_folder() {
     assert!(error.contains("map.toml: `dbc` names ") && error.contains("counts from the folder of the map"), "{error}");
     said(&wetclutch(&["inspect", &log, "--map", &map, "--dbc", &format!("{DATA}/bus.dbc")]));
 }
+
+#[test]
+fn check_names_the_wrong_units_of_a_map_and_a_database_that_is_not_there() {
+    let folder = Folder::new("map_units");
+    let text = "dbc = \"not_there.dbc\"\n[channel.engine_speed]\nname = \"N\"\nunit = \"furlong\"\n[channel.gear]\nname = \"G\"\nunit = \"A\"\n\
+                [channel.wheel_speed]\nname = \"V\"\nunit = \"km/h\"\n[channel.turbine_speed]\nunit = \"kPa\"\nname = \"T\"\n";
+    let map = folder.write("map.toml", text);
+    let message = refused(&wetclutch(&["check", &map]));
+    let errors: Vec<&str> = message.lines().filter(|line| line.starts_with("error: ")).collect();
+    let parts = [
+        ":1: `dbc`: ",
+        ":4: channel `N` (engine_speed) has the unit `furlong`, which is not known",
+        ":7: channel `G` (gear) is in A, expected a number without a unit",
+        ":12: channel `T` (turbine_speed) is in kPa, expected a unit like rad/s",
+    ];
+    assert!(errors.len() == 4 && errors.iter().zip(parts).all(|(error, part)| error.contains(part)), "{message}");
+    folder.write("not_there.dbc", "VERSION \"\"\n");
+    let right = text.replace("furlong", "rpm").replace("\"A\"", "\"-\"").replace("kPa", "1/min");
+    assert!(printed(&wetclutch(&["check", &folder.write("map.toml", &right)])).contains("a channel map"));
+}

@@ -186,6 +186,19 @@ impl ChannelMap {
         })
     }
 
+    /// The units in the text of the map that are not known or not of their roles: lines, counted from 1, and messages.
+    pub fn wrong_units(&self, text: &str) -> Vec<(usize, String)> {
+        let given = self.channels.iter().filter_map(|entry| Some((entry, entry.unit.as_deref()?)));
+        let wrong = given.filter_map(|(entry, unit)| {
+            let message = wrong_unit(entry, unit, &self.gearbox)?;
+            let table = format!("channel.{}", entry.key());
+            Some((line_of(text, &table, &format!("`{table}.unit`")), message))
+        });
+        let mut wrong: Vec<(usize, String)> = wrong.collect();
+        wrong.sort();
+        wrong
+    }
+
     /// Takes `ROLE=NAME` or `ROLE=NAME [UNIT]`, in place of an entry with this role.
     ///
     /// # Errors
@@ -387,7 +400,7 @@ impl Resolved {
             }
         };
         let (unit_name, size, zero) =
-            conversion(entry, &text, &log.channels()[channels[0]], gearbox).map_err(LogError::map)?;
+            conversion(entry, &text, &log.channels()[channels[0]].name, gearbox).map_err(LogError::map)?;
         Ok(Self { entry: entry.clone(), channels, unit_name, size: Scale::of(size), zero })
     }
 
@@ -418,11 +431,28 @@ fn one_shaft_each(resolved: &[Resolved], log: &Log) -> Result<(), LogError> {
     Ok(())
 }
 
+/// What is wrong with the unit that a map gives, whatever the log is.
+fn wrong_unit(entry: &Mapped, unit: &str, gearbox: &Gearbox) -> Option<String> {
+    let (name, known) = (entry.names.first()?, Unit::parse(unit));
+    if entry.role.quantity().is_none() {
+        let unit = known.filter(|unit| unit.quantity != Quantity::Fraction)?;
+        let key = entry.key();
+        return Some(format!(
+            "channel `{}` ({key}) is in {}, expected a number without a unit\nhint: leave `channel.{key}.unit` out",
+            error::shown(name),
+            unit.name
+        ));
+    }
+    // The vehicle file has the radius of the wheels.
+    let is_of_car = entry.role == Role::WheelSpeed && known.is_some_and(|unit| unit.quantity == Quantity::Velocity);
+    if is_of_car { None } else { conversion(entry, unit, name, gearbox).err() }
+}
+
 /// Name, size and zero of the unit of a role.
-fn conversion(entry: &Mapped, text: &str, channel: &Channel, gearbox: &Gearbox) -> Result<(String, f64, f64), String> {
+fn conversion(entry: &Mapped, text: &str, channel: &str, gearbox: &Gearbox) -> Result<(String, f64, f64), String> {
     let (role, name) = (entry.role, entry.key());
     let Some(wanted) = role.quantity() else { return Ok((String::new(), 1.0, 0.0)) };
-    let channel = error::shown(&channel.name);
+    let channel = error::shown(channel);
     if text.trim().is_empty() && wanted != Quantity::Fraction {
         return Err(format!(
             "channel `{channel}` ({name}) has no unit in the log\nhint: give it, as in `--channel {name}=\"{channel} [{}]\"` or `channel.{name}.unit`",

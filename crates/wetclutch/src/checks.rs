@@ -23,7 +23,32 @@ pub fn check(path: &Path) -> Result<Vec<Error>, Error> {
 
 /// All errors of a file and of those that it names.
 pub fn errors_of(source: &Source) -> Vec<ConfigError> {
+    missing_database(source).into_iter().chain(errors_of_text(source)).collect()
+}
+
+/// The error of a channel map that names a database which cannot be read.
+fn missing_database(source: &Source) -> Option<ConfigError> {
+    if !matches!(source.kind(), Ok(Kind::ChannelMap)) {
+        return None;
+    }
+    let dbc = ChannelMap::of_text(&source.path, &source.text).ok()?.open.dbc?;
+    let error = std::fs::File::open(&dbc).err()?;
+    let line = source.text.lines().position(|line| line.split('=').next().is_some_and(|key| key.trim() == "dbc"));
+    Some(ConfigError::Meaning {
+        path: source.path.clone(),
+        line: line.map_or(1, |line| line + 1),
+        key: "dbc".to_owned(),
+        message: format!("{}: {error}", dbc.shown()),
+        hint: Some("the path counts from the folder of the map; `--dbc` replaces it".to_owned()),
+    })
+}
+
+/// The same, but for a log's database that a channel map names.
+fn errors_of_text(source: &Source) -> Vec<ConfigError> {
     let mut errors = all_errors(source, &|source| read(source.kind()?, source));
+    if matches!(source.kind(), Ok(Kind::ChannelMap)) {
+        errors.extend(wrong_units(source));
+    }
     // A wrong gearbox file, or none, ends the reading of the car that names it.
     let is_of_gearbox = |error: &ConfigError| match error {
         ConfigError::Meaning { key, .. } if key == "gearbox" => true,
@@ -35,6 +60,13 @@ pub fn errors_of(source: &Source) -> Vec<ConfigError> {
         errors.retain(|error| said.insert(error.to_string()));
     }
     errors
+}
+
+/// The wrong units of a channel map that can be read.
+fn wrong_units(source: &Source) -> Vec<ConfigError> {
+    let Ok(map) = ChannelMap::of_text(&source.path, &source.text) else { return Vec::new() };
+    let wrong = map.wrong_units(&source.text).into_iter();
+    wrong.map(|(line, message)| ConfigError::Syntax { path: source.path.clone(), line, message }).collect()
 }
 
 /// The errors of a car's file that it has with any gearbox: keys, types and ranges.
@@ -50,8 +82,8 @@ fn errors_in_any_gearbox(source: &Source) -> Vec<ConfigError> {
 pub fn errors_of_texts(name: &str, text: &str, gearbox: Option<&str>) -> Vec<Error> {
     let source = Source::built_in(name, text);
     let errors = match gearbox.map(|text| gearbox_source(name, text)) {
-        None => errors_of(&source),
-        Some(gearbox) => match errors_of(&gearbox) {
+        None => errors_of_text(&source),
+        Some(gearbox) => match errors_of_text(&gearbox) {
             errors if errors.is_empty() => all_errors(&source, &|draft| match draft.kind()? {
                 Kind::Car => CarFile::from_sources(draft, gearbox.clone()).map(drop),
                 kind => read(kind, draft),
