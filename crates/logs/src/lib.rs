@@ -50,6 +50,7 @@ pub mod speed_watch;
 mod stamp;
 pub mod steps;
 pub mod suggest;
+mod ties;
 mod time_column;
 
 pub use arrays::Arrays;

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use trace::units::Scale;
 use trace::{Quantity, ShownPath as _, Unit};
 
-use crate::{Channel, Log, LogError, OpenOptions, Role, TimeColumn, csv_log, error};
+use crate::{Log, LogError, OpenOptions, Role, TimeColumn, csv_log, error};
 
 /// How several channels become one signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]

@@ -15,6 +15,7 @@
 //! it. The accelerations are bounds for every car, and a fall at low speed, where sensors of toothed wheels rightly read zero, is none.
 
 use crate::Role;
+use crate::copies::Stamped;
 
 /// A fault that the other speeds do not contradict ends after so long, s \[chosen\].
 pub const LONGEST_S: f64 = 2.5;
@@ -43,6 +44,8 @@ const TO_ANOTHER: (f64, f64) = (1000.0, 5.0);
 /// and the engine goes along by this fraction at least, for so long, s, after which the inertia phase is over \[chosen\].
 const SHIFTS_RAD_S2: f64 = 300.0;
 const GOES_ALONG: f64 = 0.5;
+/// Time constant of an acceleration, s.
+const RATE_S: f64 = 0.05;
 pub(crate) const GONE_S: f64 = 0.15;
 /// By this fraction the ratio of two readings may differ from that of the gear: noise, and shafts that twist.
 const BESIDE_GEAR: f64 = 0.02;
@@ -87,6 +90,43 @@ pub struct SpeedFaults {
     /// Since when a speed stands at zero against the others, s.
     stands_since_s: [Option<f64>; WATCHED],
     into_direct: IntoDirect,
+    turbine: TurbineWay,
+}
+
+/// Whether a speed has the ratio to another one that was learnt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fit {
+    /// It has.
+    Known,
+    /// A turbine speed may be in another gear.
+    OtherGear,
+    /// It has not, or the ratio is not known.
+    None,
+}
+
+/// How the turbine speed that was believed last came there.
+#[derive(Debug, Clone, Copy)]
+struct TurbineWay {
+    /// Whether it had the ratio of a gear.
+    fits: bool,
+    /// Its mean acceleration of late, rad/s^2.
+    rad_s2: f64,
+}
+
+impl TurbineWay {
+    const NEW: Self = Self { fits: false, rad_s2: 0.0 };
+
+    fn next(self, before: Latest, [rad_s, time_s]: Stamped, fits: bool) -> Self {
+        let passed_s = time_s - before.time_s;
+        let weight = if passed_s > 0.0 { (passed_s / RATE_S).min(1.0) } else { 0.0 };
+        let rad_s2 = if passed_s > 0.0 { (rad_s - before.rad_s) / passed_s } else { 0.0 };
+        Self { fits, rad_s2: self.rad_s2 + weight * (rad_s2 - self.rad_s2) }
+    }
+
+    /// Whether it was out of the gear without a shift.
+    fn was_off(self) -> bool {
+        !self.fits && self.rad_s2.abs() < SHIFTS_RAD_S2
+    }
 }
 
 /// The ratios of turbine over output speed that a shift into the direct gear passes: those between the gears next to it. Empty in a gearbox
@@ -141,8 +181,7 @@ struct Fault {
     /// What it began with over the speed before, rad/s.
     jump_rad_s: f64,
     newest: Latest,
-    /// Since when a shift may have brought the turbine to the speed of the output, or output and wheels have their ratio again, s; not a number
-    /// before.
+    /// Since when a shift may have brought the turbine to the speed of the output, or it has its ratio to other speeds again, s; not a number before.
     right_since_s: f64,
 }
 
@@ -183,11 +222,13 @@ impl SpeedFaults {
             together_s: f64::NEG_INFINITY,
             stands_since_s: [None; WATCHED],
             into_direct,
+            turbine: TurbineWay::NEW,
         }
     }
 
-    /// Whether the next reading of a speed, in rad/s, is a fault; never of a role that is not watched.
-    pub fn is_fault(&mut self, role: Role, rad_s: f64, time_s: f64) -> bool {
+    /// Whether the next reading of a speed, in rad/s, is a fault; never of a role that is not watched. `fit` says whether it has the ratio to the other
+    /// speeds that was learnt.
+    pub fn is_fault(&mut self, role: Role, [rad_s, time_s]: Stamped, fit: Fit) -> bool {
         let at = role as usize;
         // What is no number, or no speed at all, is refused elsewhere.
         if at >= WATCHED || rad_s.is_nan() || rad_s.abs() > MAX_RAD_S {
@@ -204,18 +245,24 @@ impl SpeedFaults {
             Some(fault) => self.lasts(at, before, rad_s, (fault, time_s)),
         });
         match self.believed[at].filter(|_| is_fault) {
-            Some(before) => self.goes_on(at, before, rad_s, time_s),
-            None => self.believe(at, rad_s, time_s),
+            Some(before) => self.goes_on(at, before, [rad_s, time_s], fit == Fit::Known),
+            None => {
+                if let Some(before) = self.believed[TURBINE].filter(|_| at == TURBINE) {
+                    self.turbine = self.turbine.next(before, [rad_s, time_s], fit != Fit::None);
+                }
+                self.believe(at, rad_s, time_s);
+            }
         }
         is_fault
     }
 
     /// Takes a reading that is a fault.
-    fn goes_on(&mut self, at: usize, before: Latest, rad_s: f64, time_s: f64) {
+    fn goes_on(&mut self, at: usize, before: Latest, [rad_s, time_s]: Stamped, fits: bool) {
         let fault = self.faults[at].unwrap_or_else(|| self.fault(at, before, rad_s, time_s));
         let may_be_right = match at {
-            TURBINE => fault.another == Some(OUTPUT) && self.may_shift(before, rad_s, (fault, time_s)),
-            OUTPUT | WHEEL => self.agrees(at, rad_s, time_s),
+            TURBINE if fault.another == Some(OUTPUT) => self.may_shift(before, rad_s, (fault, time_s)),
+            TURBINE => fits && self.turbine.was_off(),
+            OUTPUT | WHEEL => fits || self.agrees(at, rad_s, time_s),
             _ => false,
         };
         let right_since_s = match fault.right_since_s {

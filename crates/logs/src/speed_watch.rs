@@ -4,6 +4,7 @@ use crate::copies::Copies;
 use crate::frozen::{FrozenSpeed, NO_SPEEDS, SPEEDS, Speeds};
 use crate::held::HeldSpeed;
 use crate::speed_faults::MAX_RAD_S;
+use crate::ties::Ties;
 use crate::{Quality, Role, SpeedFaults};
 
 /// Readings of a speed that were taken as good and are not.
@@ -39,25 +40,27 @@ pub struct SpeedWatch {
     speeds: [(FrozenSpeed, HeldSpeed); SPEEDS],
     faults: SpeedFaults,
     copies: Copies,
+    ties: Ties,
     newest: Speeds,
 }
 
 impl SpeedWatch {
     /// Before the first readings, of a gearbox whose gears are not known.
     pub fn new() -> Self {
-        Self::with(SpeedFaults::new())
+        Self::with(SpeedFaults::new(), Ties::of(&[]))
     }
 
     /// Before the first readings, of a gearbox with gears of these ratios, turbine over output speed; without any they are not known.
     pub fn of_gearbox(ratios: &[f64]) -> Self {
-        Self::with(SpeedFaults::of_gearbox(ratios))
+        Self::with(SpeedFaults::of_gearbox(ratios), Ties::of(ratios))
     }
 
-    fn with(faults: SpeedFaults) -> Self {
+    fn with(faults: SpeedFaults, ties: Ties) -> Self {
         Self {
             speeds: Role::SPEEDS.map(|role| (FrozenSpeed::new(role), HeldSpeed::new())),
             faults,
             copies: Copies::new(),
+            ties,
             newest: NO_SPEEDS,
         }
     }
@@ -70,7 +73,7 @@ impl SpeedWatch {
             // No speed, which is refused elsewhere: it is the start of nothing.
             return (Quality::Good, [None; 2]);
         }
-        let is_fault = self.faults.is_fault(role, value, time_s);
+        let is_fault = self.faults.is_fault(role, [value, time_s], self.ties.fit(role, [value, time_s]));
         let was_frozen = frozen.is_known();
         let is_held = !is_fault && may_be_held && held.is_held(value);
         if !is_fault
@@ -89,8 +92,16 @@ impl SpeedWatch {
         if is_fault || copied.iter().flatten().any(|copied| copied.role == role) {
             return (Quality::Impossible, copied);
         }
+        let mut withdrawn = copied;
+        if let Some((off, [right, after_s])) = self.ties.push(role, [value, time_s]) {
+            self.faults.disbelieve_after(off, right, after_s);
+            withdrawn[0] = Some(Withdrawn { role: off, after_s, quality: Quality::Impossible });
+            if off == role {
+                return (Quality::Impossible, withdrawn);
+            }
+        }
         self.newest[role as usize] = value;
-        (if is_held { Quality::Held } else { Quality::Good }, copied)
+        (if is_held { Quality::Held } else { Quality::Good }, withdrawn)
     }
 }
 
