@@ -118,8 +118,7 @@ struct RawTime {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawGearbox {
-    #[serde(default)]
-    ratios: Vec<f64>,
+    ratios: Option<Vec<f64>>,
     output_rad_per_m: Option<f64>,
     wheel_radius_m: Option<f64>,
 }
@@ -163,38 +162,40 @@ impl ChannelMap {
     /// # Errors
     /// Something in it is wrong; the message begins with file and line.
     pub fn of_text(path: &Path, text: &str) -> Result<Self, LogError> {
-        let at = |line: usize, message: &str| LogError::map(format!("{}:{line}: {message}", path.shown()));
-        let raw: RawMap = toml::from_str(text).map_err(|error| {
-            let begin = error.span().map_or(0, |span| span.start);
-            let line = 1 + text.bytes().take(begin).filter(|byte| *byte == b'\n').count();
-            at(line, &trace::plain_type(error.message()))
-        })?;
-        let of_role = |(role, raw): (String, RawChannel)| {
-            mapped(&role, raw).map_err(|message| at(line_of(text, &format!("channel.{role}"), &message), &message))
-        };
-        let channels = raw.channel.into_iter().map(of_role).collect::<Result<_, _>>()?;
+        let at = |(line, message): (usize, String)| LogError::map(format!("{}:{line}: {message}", path.shown()));
+        let raw = raw_map(text).map_err(at)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let gearbox = raw.gearbox.map_or(Ok(Gearbox::default()), gearbox);
-        let gearbox = gearbox.map_err(|message| at(line_of(text, "gearbox", &message), &message))?;
+        if let Some(wrong) = wrong_values(text, &raw).into_iter().next() {
+            return Err(at(wrong));
+        }
+        let channels = raw.channel.into_iter().map(|(role, raw)| mapped(&role, raw));
         Ok(Self {
-            channels,
+            channels: channels.collect::<Result<_, _>>().map_err(LogError::map)?,
             open: OpenOptions {
                 dbc: raw.dbc.map(|dbc| folder.join(dbc)),
                 time: raw.time.map(|time| TimeColumn { name: time.name, unit: time.unit }),
             },
-            gearbox,
+            gearbox: raw.gearbox.map_or_else(Gearbox::default, Gearbox::from),
         })
     }
 
-    /// The units in the text of the map that are not known or not of their roles: lines, counted from 1, and messages.
-    pub fn wrong_units(&self, text: &str) -> Vec<(usize, String)> {
-        let given = self.channels.iter().filter_map(|entry| Some((entry, entry.unit.as_deref()?)));
-        let wrong = given.filter_map(|(entry, unit)| {
-            let message = wrong_unit(entry, unit, &self.gearbox)?;
+    /// All that is wrong in the text of a map, and its units that are not known or not of their roles: lines, counted from 1, and messages.
+    pub fn all_wrong(text: &str) -> Vec<(usize, String)> {
+        let raw = match raw_map(text) {
+            Ok(raw) => raw,
+            Err(wrong) => return vec![wrong],
+        };
+        let mut wrong = wrong_values(text, &raw);
+        if let Some(message) = raw.time.as_ref().and_then(|time| wrong_time(time.unit.as_deref()?)) {
+            wrong.push((line_of(text, "time", "`time.unit`"), message));
+        }
+        let gearbox = raw.gearbox.map_or_else(Gearbox::default, Gearbox::from);
+        let channels = raw.channel.into_iter().filter_map(|(role, raw)| mapped(&role, raw).ok());
+        wrong.extend(channels.filter_map(|entry| {
+            let message = wrong_unit(&entry, entry.unit.as_deref()?, &gearbox)?;
             let table = format!("channel.{}", entry.key());
             Some((line_of(text, &table, &format!("`{table}.unit`")), message))
-        });
-        let mut wrong: Vec<(usize, String)> = wrong.collect();
+        }));
         wrong.sort();
         wrong
     }
@@ -258,48 +259,66 @@ fn known_role(name: &str) -> Result<(Role, Option<String>), String> {
         .ok_or_else(|| format!("there is no role `{}`\nhint: the roles are {}", error::shown(name), names()))
 }
 
-fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
-    let role_name = role;
-    let (role, element) = known_role(role)?;
-    let key = |key: &str| format!("`channel.{role_name}.{key}`");
-    let names = match (raw.name, raw.names) {
-        (Some(name), None) => vec![name],
-        (None, Some(names)) if !names.is_empty() => names,
-        _ => {
-            return Err(format!(
-                "{} or {} must name the channel\nhint: name = \"N_Eng\", or names = [...] with combine = \"mean\" or \"sum\"",
-                key("name"),
-                key("names")
-            ));
-        }
+/// The text of a map as TOML; or the line, counted from 1, and the message.
+fn raw_map(text: &str) -> Result<RawMap, (usize, String)> {
+    toml::from_str(text).map_err(|error: toml::de::Error| {
+        let begin = error.span().map_or(0, |span| span.start);
+        let line = 1 + text.bytes().take(begin).filter(|byte| *byte == b'\n').count();
+        (line, trace::plain_type(error.message()))
+    })
+}
+
+/// All values of a map that are wrong, whatever the log is: lines, counted from 1, and messages.
+fn wrong_values(text: &str, raw: &RawMap) -> Vec<(usize, String)> {
+    let of_channels = raw.channel.iter().flat_map(|(role, raw)| {
+        let table = format!("channel.{role}");
+        wrong_channel(role, raw).into_iter().map(move |message| (line_of(text, &table, &message), message))
+    });
+    let of_gearbox = raw.gearbox.iter().flat_map(wrong_gearbox);
+    of_channels.chain(of_gearbox.map(|message| (line_of(text, "gearbox", &message), message))).collect()
+}
+
+/// All that is wrong with an entry.
+fn wrong_channel(role_name: &str, raw: &RawChannel) -> Vec<String> {
+    let role = match known_role(role_name) {
+        Ok((role, _)) => role,
+        Err(message) => return vec![message],
     };
+    let key = |key: &str| format!("`channel.{role_name}.{key}`");
+    let mut wrong = Vec::new();
+    let names = match (&raw.name, &raw.names) {
+        (Some(name), None) => std::slice::from_ref(name),
+        (None, Some(names)) => names,
+        _ => &[],
+    };
+    if names.is_empty() || names.iter().any(String::is_empty) {
+        wrong.push(format!(
+            "{} or {} must name the channel\nhint: name = \"N_Eng\", or names = [...] with combine = \"mean\" or \"sum\"",
+            key("name"),
+            key("names")
+        ));
+    }
     if names.len() > 1 && raw.combine.is_none() {
-        return Err(format!(
+        wrong.push(format!(
             "{} is missing\nhint: \"mean\", as for two wheels, or \"sum\", as for a value in two parts",
             key("combine")
         ));
     }
-    let finite =
-        |value: f64, name: &str| if value.is_finite() { Ok(value) } else { Err(format!("{} is {value}", key(name))) };
     if raw.scale == 0.0 {
-        return Err(format!("{} is 0", key("scale")));
+        wrong.push(format!("{} is 0", key("scale")));
     }
+    let infinite = [("scale", raw.scale), ("offset", raw.offset)].into_iter().filter(|(_, value)| !value.is_finite());
+    wrong.extend(infinite.map(|(name, value)| format!("{} is {value}", key(name))));
     if !(0.0..=10.0).contains(&raw.delay_s) {
-        return Err(format!(
-            "{} is {}, expected 0 to 10\nhint: it is in s: 20 ms is 0.02",
-            key("delay_s"),
-            raw.delay_s
-        ));
+        let delay = key("delay_s");
+        wrong.push(format!("{delay} is {}, expected 0 to 10\nhint: it is in s: 20 ms is 0.02", raw.delay_s));
     }
     if !(-10.0..=10.0).contains(&raw.late_s) {
-        return Err(format!(
-            "{} is {}, expected -10 to 10\nhint: it is in s: 100 ms is 0.1",
-            key("late_s"),
-            raw.late_s
-        ));
+        let late = key("late_s");
+        wrong.push(format!("{late} is {}, expected -10 to 10\nhint: it is in s: 100 ms is 0.1", raw.late_s));
     }
     if raw.sent_on_change && !(role.is_command() || role == Role::OncomingPressureCommand) {
-        return Err(format!(
+        wrong.push(format!(
             "{} is for the commands of valves: another signal between two samples is not known\nhint: leave it out",
             key("sent_on_change")
         ));
@@ -307,20 +326,29 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
     if let Some([minimum, maximum]) = raw.valid_range
         && (minimum >= maximum || minimum.is_nan() || maximum.is_nan())
     {
-        return Err(format!(
+        wrong.push(format!(
             "{} is [{minimum}, {maximum}], expected a smaller value first\nhint: [minimum, maximum] in the unit of the channel",
             key("valid_range")
         ));
     }
+    wrong
+}
+
+/// An entry without anything wrong in it.
+fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
+    if let Some(message) = wrong_channel(role, &raw).into_iter().next() {
+        return Err(message);
+    }
+    let (role, element) = known_role(role)?;
     Ok(Mapped {
         role,
         element,
-        names,
+        names: raw.name.into_iter().chain(raw.names.into_iter().flatten()).collect(),
         group: raw.group,
         combine: raw.combine.unwrap_or(Combine::Mean),
         unit: raw.unit,
-        scale: finite(raw.scale, "scale")?,
-        offset: finite(raw.offset, "offset")?,
+        scale: raw.scale,
+        offset: raw.offset,
         delay_s: raw.delay_s,
         late_s: raw.late_s,
         sent_on_change: raw.sent_on_change,
@@ -328,17 +356,34 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
     })
 }
 
-fn gearbox(raw: RawGearbox) -> Result<Gearbox, String> {
-    check_ratios(&raw.ratios).map_err(|message| format!("`gearbox.ratios`: {message}"))?;
-    for (name, value) in [("output_rad_per_m", raw.output_rad_per_m), ("wheel_radius_m", raw.wheel_radius_m)] {
-        if value.is_some_and(|value| !(0.01..=1000.0).contains(&value)) {
-            return Err(format!(
-                "`gearbox.{name}` is {}, expected 0.01 to 1000\nhint: `output_rad_per_m` is final ratio over wheel radius, such as 12.8; `wheel_radius_m` is in m, such as 0.31",
-                value.unwrap_or_default()
-            ));
-        }
+/// All that is wrong with what a map says of the gearbox.
+fn wrong_gearbox(raw: &RawGearbox) -> Vec<String> {
+    let ratios = match raw.ratios.as_deref() {
+        Some([]) => Err("is empty\nhint: turbine speed over output speed, of the forward gears".to_owned()),
+        Some(ratios) => check_ratios(ratios),
+        None => Ok(()),
+    };
+    let of_ratios = ratios.err().map(|message| format!("`gearbox.ratios`: {message}"));
+    let numbers = [("output_rad_per_m", raw.output_rad_per_m), ("wheel_radius_m", raw.wheel_radius_m)];
+    let of_numbers = numbers.into_iter().filter_map(|(name, value)| {
+        let value = value.filter(|value| !(0.01..=1000.0).contains(value))?;
+        Some(format!(
+            "`gearbox.{name}` is {value}, expected 0.01 to 1000\nhint: `output_rad_per_m` is final ratio over wheel radius, such as 12.8; `wheel_radius_m` is in m, such as 0.31"
+        ))
+    });
+    of_ratios.into_iter().chain(of_numbers).collect()
+}
+
+/// What is wrong with a unit of the time.
+fn wrong_time(unit: &str) -> Option<String> {
+    let is_time = Unit::parse(unit).is_some_and(|unit| unit.quantity == Quantity::Time);
+    (!is_time).then(|| format!("`time.unit` is `{}`, expected s, ms, us, ns, min or h", error::shown(unit)))
+}
+
+impl From<RawGearbox> for Gearbox {
+    fn from(RawGearbox { ratios, output_rad_per_m, wheel_radius_m }: RawGearbox) -> Self {
+        Self { ratios: ratios.unwrap_or_default(), output_rad_per_m, wheel_radius_m }
     }
-    Ok(Gearbox { ratios: raw.ratios, output_rad_per_m: raw.output_rad_per_m, wheel_radius_m: raw.wheel_radius_m })
 }
 
 /// Checks ratios of forward gears: positive, falling, told apart by at least 2 %.

@@ -47,7 +47,10 @@ fn missing_database(source: &Source) -> Option<ConfigError> {
 fn errors_of_text(source: &Source) -> Vec<ConfigError> {
     let mut errors = all_errors(source, &|source| read(source.kind()?, source));
     if matches!(source.kind(), Ok(Kind::ChannelMap)) {
-        errors.extend(wrong_units(source));
+        errors.extend(wrong_in_map(source));
+        let mut said = HashSet::new();
+        errors.retain(|error| said.insert(error.to_string()));
+        errors.sort_by_key(ConfigError::line);
     }
     // A wrong gearbox file, or none, ends the reading of the car that names it.
     let is_of_gearbox = |error: &ConfigError| match error {
@@ -62,11 +65,10 @@ fn errors_of_text(source: &Source) -> Vec<ConfigError> {
     errors
 }
 
-/// The wrong units of a channel map that can be read.
-fn wrong_units(source: &Source) -> Vec<ConfigError> {
-    let Ok(map) = ChannelMap::of_text(&source.path, &source.text) else { return Vec::new() };
-    let wrong = map.wrong_units(&source.text).into_iter();
-    wrong.map(|(line, message)| ConfigError::Syntax { path: source.path.clone(), line, message }).collect()
+/// All that is wrong in a channel map that is TOML, with units.
+fn wrong_in_map(source: &Source) -> Vec<ConfigError> {
+    let wrong = ChannelMap::all_wrong(&source.text).into_iter();
+    wrong.map(|(line, message)| error_of_map(source, line, message)).collect()
 }
 
 /// The errors of a car's file that it has with any gearbox: keys, types and ranges.
@@ -123,6 +125,12 @@ fn read_map(source: &Source) -> Result<(), ConfigError> {
     let (path, text) = (source.path.clone(), error.to_string());
     let placed = text.strip_prefix(&format!("{}:", path.shown())).and_then(|rest| rest.split_once(": "));
     let (line, message) = placed.and_then(|(line, message)| Some((line.parse().ok()?, message))).unwrap_or((1, &text));
+    Err(error_of_map(source, line, message.to_owned()))
+}
+
+/// An error of a channel map in the form of those of the other files.
+fn error_of_map(source: &Source, line: usize, message: String) -> ConfigError {
+    let path = source.path.clone();
     let range = || -> Option<ConfigError> {
         let (key, rest) = message.strip_prefix('`')?.split_once("` is ")?;
         let (value, allowed) = rest.split_once(", expected ")?;
@@ -138,5 +146,5 @@ fn read_map(source: &Source) -> Result<(), ConfigError> {
             hint,
         })
     };
-    Err(range().unwrap_or_else(|| ConfigError::Syntax { path: path.clone(), line, message: message.to_owned() }))
+    range().unwrap_or_else(|| ConfigError::Syntax { path: path.clone(), line, message: message.clone() })
 }

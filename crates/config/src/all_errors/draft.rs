@@ -85,7 +85,7 @@ impl Draft {
     pub(super) fn has_its_names(&self) -> bool {
         let is_replaced = |key: &&str| self.guessed.keys().any(|(_, of)| of == key);
         let mut taken = NAMING.iter().chain(&NAMING_TABLES);
-        !NAMING.iter().any(|key| is_replaced(&key)) && taken.all(|key| !self.taken.contains(*key))
+        !NAMING.iter().any(is_replaced) && taken.all(|key| !self.taken.contains(*key))
     }
 
     /// The line of the file that is this line of the draft.
