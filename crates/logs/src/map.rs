@@ -179,12 +179,10 @@ impl ChannelMap {
         })
     }
 
-    /// All that is wrong in the text of a map, and its units that are not known or not of their roles: lines, counted from 1, and messages.
+    /// All values that are wrong in the text of a map, and its units that are not known or not of their roles: lines, counted from 1, and messages.
+    /// None of a text that is no TOML, or has other keys or types.
     pub fn all_wrong(text: &str) -> Vec<(usize, String)> {
-        let raw = match raw_map(text) {
-            Ok(raw) => raw,
-            Err(wrong) => return vec![wrong],
-        };
+        let Ok(raw) = raw_map(text) else { return Vec::new() };
         let mut wrong = wrong_values(text, &raw);
         if let Some(message) = raw.time.as_ref().and_then(|time| wrong_time(time.unit.as_deref()?)) {
             wrong.push((line_of(text, "time", "`time.unit`"), message));

@@ -7,6 +7,7 @@ use toml::de::DeTable;
 
 use super::wrong::Wrong;
 use crate::entries::{Entry, entries_of};
+use crate::near::is_near;
 
 /// What is put in place of what is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -470,9 +471,11 @@ fn guess(expected: &str, old: &str, number: Number) -> Option<String> {
     if let Some(word) = expected.strip_prefix('"').and_then(|word| word.split('"').next()) {
         return Some(format!("\"{word}\"")).filter(|new| new != old);
     }
-    let mut words = expected.split('`').skip(1).step_by(2);
-    let first = words.next();
-    let word = if number == Number::Near { first } else { words.next().or(first) };
+    let words = || expected.split('`').skip(1).step_by(2);
+    // What is spelt nearly as a word is that word.
+    let near = words().find(|word| is_near(old.trim_matches(['"', '\'']), word));
+    let first = words().next();
+    let word = near.or(if number == Number::Near { first } else { words().nth(1).or(first) });
     let new = match word.filter(|_| expected.starts_with("one of") || expected.starts_with('`')) {
         Some(word) => format!("\"{word}\""),
         None if has("text") || has("string") => "\"x\"".to_owned(),

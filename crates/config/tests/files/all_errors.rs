@@ -385,6 +385,14 @@ fn errors_behind_a_value_that_is_wrong_beside_others_are_named() {
 fn what_is_said_of_a_wrong_value_does_not_follow_from_a_guess() {
     let far = ("valve_delay_s = [0.0, 0.03]", "valve_delay_s = [0.5, 0.6]");
     has_all("vehicles/two_speed_at.toml", &[far], "", &["valve_delay_s[1]` is 0.6, expected 0 to 0.5"]);
+    // A word that is spelt nearly as another one is that one.
+    let scaled = ("change = \"scale\"", "change = \"skale\"");
+    has_all(
+        "experiments/settings.toml",
+        &[scaled],
+        "",
+        &["unknown variant `skale`, expected one of `set`, `scale`, `add`"],
+    );
     // The tables that a valve misses are put in, and what they miss is none.
     let valve = "\n[clutch.A]\nvalve = { hysteresis_pa = {} }\n";
     has_all("vehicles/eight_speed.toml", &[], valve, &["invalid type: a table, expected a number"]);
