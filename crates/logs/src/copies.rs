@@ -68,6 +68,14 @@ const PAIRS: [[usize; 2]; 6] = [
     [Role::EngineSpeed as usize, Role::WheelSpeed as usize],
 ];
 
+/// Of each speed the pairs that it is in, and whether it is the first or the second of them.
+const PLACES: [[(usize, usize); 3]; 4] = [
+    [(0, FIRST), (2, FIRST), (5, FIRST)],
+    [(0, SECOND), (1, FIRST), (4, FIRST)],
+    [(1, SECOND), (2, SECOND), (3, FIRST)],
+    [(3, SECOND), (4, SECOND), (5, SECOND)],
+];
+
 /// Those whose shafts a clutch makes one while one of both fails: what is refused for another reason is not compared, but for noisy ones.
 const MAY_JOIN: [[usize; 2]; 2] = [PAIRS[1], PAIRS[3]];
 
@@ -217,7 +225,7 @@ impl Copies {
 
     /// Takes a reading, and whether it is refused for another reason. Returns the speeds whose channel shows another one.
     pub(crate) fn push(&mut self, role: Role, reading: Stamped, is_fault: bool) -> [Option<Copied>; 2] {
-        let at = role as usize;
+        let Some(places) = PLACES.get(role as usize) else { return [None; 2] };
         let (mut found, mut by) = ([None; 2], None);
         for behind in self.behind.iter_mut().filter(|behind| behind.role == role && !is_fault) {
             behind.newest = Some(reading);
@@ -225,33 +233,40 @@ impl Copies {
         if role == Role::TurbineSpeed && !is_fault {
             self.turbine = Some(reading);
         }
-        for (n, (pair, of)) in self.pairs.iter_mut().zip(PAIRS).enumerate() {
-            let Some(which) = of.iter().position(|speed| *speed == at) else { continue };
+        for &(n, which) in places {
+            let (pair, of) = (&mut self.pairs[n], PAIRS[n]);
             if is_fault && MAY_JOIN.contains(&of) && !pair.is_fine() {
                 continue;
             }
             pair.is_fault |= is_fault;
-            pair.newest[which] = Some(reading);
-            if let [Some(one), Some(other)] = pair.newest {
-                pair.newest = [None; 2];
-                let newest = [one, other];
-                let mut copies = pair.compare(newest);
-                if n == DIRECT && pair.turns_with(&self.behind[DIRECT], newest) {
-                    // A shift has brought the turbine to the output that showed it.
-                    copies[SECOND] = None;
+            let Some(other) = pair.newest[1 - which].take() else {
+                pair.newest[which] = Some(reading);
+                continue;
+            };
+            pair.newest[which] = None;
+            let newest = if which == FIRST { [reading, other] } else { [other, reading] };
+            if !pair.are_equal(newest) {
+                if let Some(behind) = self.behind.get_mut(n).filter(|_| pair.before == Some(newest)) {
+                    behind.learn(newest[SECOND]);
                 }
-                if n == THROUGH {
-                    pair.was_together = pair.is_open() && self.turbine.is_some_and(|turbine| is_apart(turbine, one));
-                }
-                if copies == [None; 2]
-                    && let Some(behind) = self.behind.get_mut(n)
-                {
-                    copies = pair.compare_with(behind, newest);
-                }
-                if by.is_none() && copies != [None; 2] {
-                    by = Some(of);
-                    found = [FIRST, SECOND].map(|which| copies[which].map(|right| (Role::SPEEDS[of[which]], right)));
-                }
+                continue;
+            }
+            let mut copies = pair.copies(newest);
+            if n == DIRECT && pair.turns_with(&self.behind[DIRECT], newest) {
+                // A shift has brought the turbine to the output that showed it.
+                copies[SECOND] = None;
+            }
+            if n == THROUGH {
+                pair.was_together = pair.is_open() && self.turbine.is_some_and(|turbine| is_apart(turbine, other));
+            }
+            if copies == [None; 2]
+                && let Some(behind) = self.behind.get(n)
+            {
+                copies = pair.copies_by(behind, newest);
+            }
+            if by.is_none() && copies != [None; 2] {
+                by = Some(of);
+                found = [FIRST, SECOND].map(|which| copies[which].map(|right| (Role::SPEEDS[of[which]], right)));
             }
         }
         for (copied, _) in found.into_iter().flatten() {
@@ -266,14 +281,8 @@ impl Copies {
 }
 
 impl Pair {
-    /// Of the one that is the other's value, its last reading that is right.
-    fn compare(&mut self, newest: [Stamped; 2]) -> [Option<Stamped>; 2] {
-        let copy = self.jumped_copy(newest);
-        [FIRST, SECOND].map(|which| copy.filter(|(copy, _)| *copy == which).map(|(_, right)| right))
-    }
-
-    /// Which of both is the other's value, with its last reading that is right.
-    fn jumped_copy(&mut self, newest: [Stamped; 2]) -> Option<(usize, Stamped)> {
+    /// Takes two readings, and whether they are equal.
+    fn are_equal(&mut self, newest: [Stamped; 2]) -> bool {
         let is_fault = std::mem::take(&mut self.is_fault);
         let [[one, _], [other, _]] = newest;
         if (one - other).abs() > ROUNDING * other.abs() || one.abs() < STANDS_RAD_S {
@@ -283,9 +292,10 @@ impl Pair {
             } else {
                 self.differ(newest);
             }
-            return None;
+            self.is_with_since_s = None;
+            return false;
         }
-        let before = self.before?;
+        let Some(before) = self.before else { return true };
         if self.equal == 0 {
             let jumped = self.jump(before, newest);
             self.needed = if jumped.is_some() { SAMPLES } else { SURE };
@@ -294,9 +304,17 @@ impl Pair {
             self.was_together = self.is_open() && (is_settled || self.closes_at_once(before, newest));
         }
         self.equal = self.equal.saturating_add(1);
-        let which = self.jumped.filter(|_| self.equal >= self.needed)?;
-        let is_short = newest[which][1] - before[which][1] <= LONGEST_S;
-        is_short.then_some((which, before[which]))
+        true
+    }
+
+    /// Of the one that jumped to the other's value, its last reading that is right.
+    fn copies(&self, newest: [Stamped; 2]) -> [Option<Stamped>; 2] {
+        let jumped = self.before.zip(self.jumped.filter(|_| self.equal >= self.needed));
+        let is_short = |before: Stamped, which: usize| newest[which][1] - before[1] <= LONGEST_S;
+        [FIRST, SECOND].map(|which| {
+            let (before, _) = jumped.filter(|(_, jumped)| *jumped == which)?;
+            Some(before[which]).filter(|before| is_short(*before, which))
+        })
     }
 
     /// Whether the second one, which is the first one's value, has turned with the shaft behind it for some time.
@@ -308,13 +326,7 @@ impl Pair {
     }
 
     /// The same of two that turned together, by the shaft behind them.
-    fn compare_with(&self, behind: &mut Behind, newest: [Stamped; 2]) -> [Option<Stamped>; 2] {
-        if self.equal == 0 {
-            if self.before == Some(newest) {
-                behind.learn(newest[SECOND]);
-            }
-            return [None; 2];
-        }
+    fn copies_by(&self, behind: &Behind, newest: [Stamped; 2]) -> [Option<Stamped>; 2] {
         let before = self.before.filter(|_| self.was_together && self.equal >= SURE);
         let Some((before, copies)) = before.zip(behind.copies(newest[SECOND])) else { return [None; 2] };
         let is_short = newest[SECOND][1] - before[SECOND][1] <= LONGEST_S;

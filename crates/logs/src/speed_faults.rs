@@ -228,7 +228,7 @@ impl SpeedFaults {
 
     /// Whether the next reading of a speed, in rad/s, is a fault; never of a role that is not watched. `fit` says whether it has the ratio to the other
     /// speeds that was learnt.
-    pub fn is_fault(&mut self, role: Role, [rad_s, time_s]: Stamped, fit: Fit) -> bool {
+    pub fn is_fault(&mut self, role: Role, [rad_s, time_s]: Stamped, fit: impl Fn() -> Fit) -> bool {
         let at = role as usize;
         // What is no number, or no speed at all, is refused elsewhere.
         if at >= WATCHED || rad_s.is_nan() || rad_s.abs() > MAX_RAD_S {
@@ -245,10 +245,10 @@ impl SpeedFaults {
             Some(fault) => self.lasts(at, before, rad_s, (fault, time_s)),
         });
         match self.believed[at].filter(|_| is_fault) {
-            Some(before) => self.goes_on(at, before, [rad_s, time_s], fit == Fit::Known),
+            Some(before) => self.goes_on(at, before, [rad_s, time_s], fit() == Fit::Known),
             None => {
                 if let Some(before) = self.believed[TURBINE].filter(|_| at == TURBINE) {
-                    self.turbine = self.turbine.next(before, [rad_s, time_s], fit != Fit::None);
+                    self.turbine = self.turbine.next(before, [rad_s, time_s], fit() != Fit::None);
                 }
                 self.believe(at, rad_s, time_s);
             }

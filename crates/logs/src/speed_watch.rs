@@ -73,7 +73,7 @@ impl SpeedWatch {
             // No speed, which is refused elsewhere: it is the start of nothing.
             return (Quality::Good, [None; 2]);
         }
-        let is_fault = self.faults.is_fault(role, [value, time_s], self.ties.fit(role, [value, time_s]));
+        let is_fault = self.faults.is_fault(role, [value, time_s], || self.ties.fit(role, [value, time_s]));
         let was_frozen = frozen.is_known();
         let is_held = !is_fault && may_be_held && held.is_held(value);
         if !is_fault

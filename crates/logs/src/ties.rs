@@ -83,14 +83,14 @@ impl Tie {
 
     /// Takes the ratio of this time, s.
     fn learn(&mut self, ratio: f64, time_s: f64) {
-        let stands = (ratio / self.newest - 1.0).abs() <= STANDS;
+        let stands = (ratio - self.newest).abs() <= STANDS * self.newest.abs();
         let passed_s = (time_s - self.last_s).max(0.0);
         self.last_s = time_s;
         if !stands {
             (self.newest, self.since_s) = (ratio, time_s);
             return;
         }
-        self.newest += (passed_s / FOLLOWS_S).min(1.0) * (ratio - self.newest);
+        self.newest += (passed_s * (1.0 / FOLLOWS_S)).min(1.0) * (ratio - self.newest);
         if time_s - self.since_s >= STANDS_S {
             self.known = Some(self.newest);
         }
@@ -173,7 +173,7 @@ impl Ties {
 
     /// Whether a ratio is that of a gear, in a gearbox whose gears are known.
     fn is_of_gear(&self, ratio: f64) -> bool {
-        self.ratios.iter().any(|gear| (ratio / gear - 1.0).abs() <= OF_GEAR)
+        self.ratios.iter().any(|gear| (ratio - gear).abs() <= OF_GEAR * gear.abs())
     }
 
     /// Compares an output speed with the newest others.
@@ -245,7 +245,7 @@ impl Ties {
     fn learn(&mut self, [output, time_s]: Stamped, [wheel, _]: Stamped, turbine: Option<Stamped>) {
         if let Some([turbine, _]) = turbine {
             let ratio = turbine / output;
-            if self.ratios.iter().all(|gear| gear.is_nan()) || self.is_of_gear(ratio) {
+            if self.ratios[0].is_nan() || self.is_of_gear(ratio) {
                 self.gear.learn(ratio, time_s);
             }
         }
