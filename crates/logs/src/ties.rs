@@ -21,6 +21,8 @@ const WHEEL_OFF: (f64, f64) = (0.2, 6.0);
 /// no gear shows it.
 const TWIST_RAD: f64 = 0.6;
 const TWIST_IN_SHIFT_RAD: f64 = 2.0;
+/// In a shift both part within this time, s: in a curve one wheel does so in more.
+const SHIFT_S: f64 = 1.5;
 /// What moved so many times as much as the other one is the one that parted.
 const MOVED: f64 = 2.0;
 /// So many readings in a row show it.
@@ -219,25 +221,25 @@ impl Ties {
     }
 
     /// Whether the output, and whether the wheels, are shown to be off.
-    fn shown_by(&self, [output, _]: Stamped, [wheel, _]: Stamped, by: (Option<f64>, f64)) -> [bool; 2] {
+    fn shown_by(&self, output: Stamped, [wheel, _]: Stamped, by: (Option<f64>, f64)) -> [bool; 2] {
         let (by_turbine, by_wheel) = by;
-        let moved = self.right.map_or([0.0; 2], |[[output_then, _], [wheel_then, _]]| {
-            [output / output_then - 1.0, wheel / wheel_then - 1.0].map(f64::abs)
-        });
-        let [output_moved, wheel_moved] = moved;
+        let [output, time_s] = output;
+        let Some([[output_then, right_s], [wheel_then, _]]) = self.right else { return [false; 2] };
+        let [output_moved, wheel_moved] = [output / output_then - 1.0, wheel / wheel_then - 1.0].map(f64::abs);
+        // A copy of the turbine is in the direct gear for all that both show.
+        let is_held = by_turbine.is_some_and(|by_turbine| !differ(output, by_turbine, AGREE) && by_turbine != output);
         let parted = differ(output, by_wheel, OFF_IN_SHIFT) && self.turned_rad.abs() > TWIST_IN_SHIFT_RAD;
-        let in_gear = by_turbine.map_or([false; 2], |by_turbine| {
+        if is_held {
+            return [false, parted && differ(output, by_wheel, WHEEL_OFF)];
+        }
+        let leaves_both = by_turbine.is_some_and(|by_turbine| {
             let is_off = differ(output, by_turbine, OFF) && differ(output, by_wheel, OFF);
-            // A copy of the turbine is in the direct gear for all that both show.
-            let is_held = !differ(output, by_turbine, AGREE) && by_turbine != output;
-            [
-                is_off && !differ(by_turbine, by_wheel, AGREE) && self.turned_rad.abs() > TWIST_RAD,
-                is_held && parted && differ(output, by_wheel, WHEEL_OFF),
-            ]
+            is_off && !differ(by_turbine, by_wheel, AGREE) && self.turned_rad.abs() > TWIST_RAD
         });
+        let parts_in_shift = parted && time_s - right_s <= SHIFT_S;
         [
-            in_gear[0] || parted && output_moved > MOVED * wheel_moved,
-            in_gear[1] || parted && wheel_moved > MOVED * output_moved,
+            leaves_both || parts_in_shift && output_moved > MOVED * wheel_moved,
+            parts_in_shift && wheel_moved > MOVED * output_moved,
         ]
     }
 
