@@ -139,7 +139,12 @@ impl Ties {
         }
         match role {
             Role::TurbineSpeed => self.turbine = Some(reading),
-            Role::WheelSpeed => self.wheel = Some(reading),
+            Role::WheelSpeed => {
+                self.wheel = Some(reading);
+                if self.off == Some(Off::Wheel) && self.fit(role, reading) == Fit::Known {
+                    self.off = None;
+                }
+            }
             Role::OutputSpeed => {
                 self.output = Some(reading);
                 self.compare(reading);
@@ -256,5 +261,105 @@ impl Ties {
         if holds || self.wheels.known.is_none() {
             self.wheels.learn(output / wheel, time_s);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The speeds that are off with each reading, and since when, of a car in gear 2 of three with these factors of its speeds.
+    fn off(factors: impl Fn(f64) -> [f64; 3]) -> Vec<(Role, f64, f64)> {
+        let mut ties = Ties::of(&[4.0, 2.0, 1.0]);
+        let mut found = Vec::new();
+        for row in 0..2000_u32 {
+            let time_s = 0.01 * f64::from(row);
+            let noise = |of: f64| 0.2 * (f64::from(row) * of).sin();
+            let output = 120.0 + 2.0 * time_s;
+            let [turbine, shown, wheel] = factors(time_s);
+            let speeds = [
+                (Role::TurbineSpeed, 2.0 * output * turbine + noise(1.3)),
+                (Role::OutputSpeed, output * shown + noise(2.1)),
+                (Role::WheelSpeed, output / 3.0 * wheel + 0.3 * noise(1.7)),
+            ];
+            for (role, value) in speeds {
+                found.extend(ties.push(role, [value, time_s]).map(|(role, [_, right_s])| (role, time_s, right_s)));
+            }
+        }
+        found
+    }
+
+    fn ramp(time_s: f64, [from_s, to_s]: [f64; 2], factor: f64) -> f64 {
+        1.0 + (factor - 1.0) * ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0)
+    }
+
+    #[test]
+    fn an_output_that_drifts_is_refused_from_where_it_left_until_it_is_back() {
+        for (factor, lasts_s) in [(0.7, 0.3), (1.3, 1.0), (0.9, 2.0)] {
+            let out = |time_s: f64| (10.0..14.0).contains(&time_s);
+            let found =
+                off(|time_s| [1.0, if out(time_s) { ramp(time_s, [10.0, 10.0 + lasts_s], factor) } else { 1.0 }, 1.0]);
+            let begins_s = 10.0 + lasts_s * 0.03 / (factor - 1.0_f64).abs();
+            let first = found.first().copied().unwrap_or((Role::WheelSpeed, 0.0, 0.0));
+            assert!(first.0 == Role::OutputSpeed && first.1 < begins_s + 0.4, "{factor}: {first:?}");
+            assert!(
+                found.iter().all(|(role, time_s, right_s)| *role == first.0 && *time_s < 14.0 && *right_s < begins_s),
+                "{factor}"
+            );
+            assert!(found.last().is_some_and(|(_, time_s, _)| *time_s > 13.98), "{factor}: {:?}", found.last());
+        }
+    }
+
+    #[test]
+    fn a_shift_in_which_output_or_wheels_drift_names_the_one_that_moved() {
+        for (at, role) in [(1, Role::OutputSpeed), (2, Role::WheelSpeed)] {
+            let found = off(|time_s| {
+                // From gear 2 to 3.
+                let mut factors = [ramp(time_s, [10.0, 10.6], 0.5), 1.0, 1.0];
+                factors[at] = if time_s < 11.0 { ramp(time_s, [10.1, 10.5], 0.7) } else { 1.0 };
+                factors
+            });
+            assert!(
+                found.len() > 30 && found.iter().all(|(of, time_s, _)| *of == role && *time_s < 11.005),
+                "{at}: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_wheel_in_a_curve_a_shift_and_other_tyres_are_not_off() {
+        // One wheel is 12 % faster than the mean for some seconds, while the car gets slower, too.
+        assert_eq!(off(|time_s| [1.0, 1.0, 1.0 + 0.12 * (1.2 * (time_s - 8.0)).sin().max(0.0)]), []);
+        let slows = |time_s: f64| ramp(time_s, [8.0, 9.5], 0.88);
+        assert_eq!(off(|time_s| [slows(time_s), slows(time_s), 1.0]), []);
+        assert_eq!(off(|time_s| [ramp(time_s, [8.0, 8.5], 0.5), 1.0, 1.0]), []);
+        assert_eq!(off(|_| [1.0, 1.0, 0.9]), []);
+        // Shafts twist back.
+        assert_eq!(
+            off(|time_s| [
+                ramp(time_s, [8.0, 8.5], 0.5),
+                1.0 + 0.1 * ((time_s - 8.0) * 60.0).sin() * f64::from(u8::from(time_s > 8.0 && time_s < 8.4)),
+                1.0
+            ]),
+            []
+        );
+    }
+
+    #[test]
+    fn a_speed_that_has_its_ratio_again_fits() {
+        let mut ties = Ties::of(&[4.0, 2.0, 1.0]);
+        for row in 0..300_u32 {
+            let time_s = 0.01 * f64::from(row);
+            for (role, value) in [(Role::TurbineSpeed, 240.0), (Role::OutputSpeed, 120.0), (Role::WheelSpeed, 40.0)] {
+                ties.push(role, [value, time_s]);
+            }
+        }
+        assert_eq!(ties.fit(Role::TurbineSpeed, [241.0, 3.0]), Fit::Known);
+        assert_eq!(ties.fit(Role::TurbineSpeed, [121.0, 3.0]), Fit::OtherGear);
+        assert_eq!(ties.fit(Role::TurbineSpeed, [200.0, 3.0]), Fit::None);
+        assert_eq!([119.5, 110.0].map(|output| ties.fit(Role::OutputSpeed, [output, 3.0])), [Fit::Known, Fit::None]);
+        assert_eq!([40.2, 45.0].map(|wheel| ties.fit(Role::WheelSpeed, [wheel, 3.0])), [Fit::Known, Fit::None]);
+        assert_eq!(ties.fit(Role::EngineSpeed, [240.0, 3.0]), Fit::None);
+        assert_eq!(ties.fit(Role::TurbineSpeed, [241.0, 4.0]), Fit::None, "the output is too old");
     }
 }
