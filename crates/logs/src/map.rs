@@ -332,11 +332,8 @@ fn wrong_channel(role_name: &str, raw: &RawChannel) -> Vec<String> {
     wrong
 }
 
-/// An entry without anything wrong in it.
+/// An entry; its values are for [`wrong_channel`] to check.
 fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
-    if let Some(message) = wrong_channel(role, &raw).into_iter().next() {
-        return Err(message);
-    }
     let (role, element) = known_role(role)?;
     Ok(Mapped {
         role,

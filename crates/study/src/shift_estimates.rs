@@ -226,14 +226,7 @@ pub fn seen_by_observer_alone(
     samples.iter().rev().take_while(|sample| end_s - sample.time_s <= SHOWS_GEAR_S).find(|sample| is_blind(sample))?;
     let is_in = |sample: &LogSample| sample.estimate.phase == Phase::InertiaPhase;
     let last = samples.iter().rposition(is_in)?;
-    let back = |from: usize, is_of: &dyn Fn(&LogSample) -> bool| {
-        from - samples[..from].iter().rev().take_while(|sample| is_of(sample)).count()
-    };
-    let seen = back(last, &is_in);
-    // Where both speeds were not there before what the observer saw of it, it may have begun as soon as one of them was lost.
-    let with_torque_phase = back(seen, &|sample| sample.estimate.phase == Phase::TorquePhase);
-    let unseen = back(with_torque_phase, &|sample| !has_both(sample));
-    let first = if unseen < with_torque_phase { unseen } else { seen };
+    let first = last - samples[..last].iter().rev().take_while(|sample| is_in(sample)).count();
     let inertia_s = [samples[first].time_s, samples.get(last + 1).unwrap_or(&samples[last]).time_s];
     let gears = |from, to| Shift {
         from,
@@ -416,12 +409,6 @@ impl EstimatedShift {
             unhealthy: unhealthy(of_shift),
         })
     }
-}
-
-/// Whether turbine and output speed are there.
-fn has_both(sample: &LogSample) -> bool {
-    let Channels { turbine, output, .. } = sample.estimate.channels;
-    [turbine, output] == [ChannelHealth::Good; 2]
 }
 
 /// Whether turbine or output speed did not come for a while, or was refused.

@@ -48,8 +48,6 @@ fn errors_of_text(source: &Source) -> Vec<ConfigError> {
     let mut errors = all_errors(source, &|source| read(source.kind()?, source));
     if matches!(source.kind(), Ok(Kind::ChannelMap)) {
         errors.extend(wrong_in_map(source));
-        let mut said = HashSet::new();
-        errors.retain(|error| said.insert(error.to_string()));
         errors.sort_by_key(ConfigError::line);
     }
     // A wrong gearbox file, or none, ends the reading of the car that names it.
@@ -59,9 +57,9 @@ fn errors_of_text(source: &Source) -> Vec<ConfigError> {
     };
     if matches!(source.kind(), Ok(Kind::Car)) && errors.iter().any(is_of_gearbox) {
         errors.extend(errors_in_any_gearbox(source));
-        let mut said = HashSet::new();
-        errors.retain(|error| said.insert(error.to_string()));
     }
+    let mut named = HashSet::new();
+    errors.retain(|error| named.insert(error.to_string()));
     errors
 }
 

@@ -232,7 +232,7 @@ fn a_speed_that_fails_in_a_shift_is_refused() {
     // may send one value from there on.
     let [locked, others] = copies.map(|counts| counts.believed);
     assert!(others[0] * 1000 <= others[1] && locked[0] * 5 <= locked[1], "{copies:?}");
-    // A drift is not told from noise and twist at first, nor at low speed.
+    // The begin of a drift looks like noise and twist of the shafts, and at low speed ratios say nothing.
     assert!(drifts.believed[0] * 5 <= drifts.believed[1] && drifts.refused[0] * 200 <= drifts.refused[1], "{drifts:?}");
 }
 
