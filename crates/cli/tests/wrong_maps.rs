@@ -167,6 +167,20 @@ fn check_names_the_wrong_units_of_a_map_and_a_database_that_is_not_there() {
         ":12: channel `T` (turbine_speed) is in kPa, expected a unit like rad/s",
     ];
     assert!(errors.len() == 4 && errors.iter().zip(parts).all(|(error, part)| error.contains(part)), "{message}");
+    // Behind an unknown key and a value of another type as well.
+    let behind = text.replace("name = \"N\"\n", "colour = 1\nname = \"N\"\nscale = \"x\"\n");
+    let message = refused(&wetclutch(&["check", &folder.write("map.toml", &behind)]));
+    let errors: Vec<&str> = message.lines().filter(|line| line.starts_with("error: ")).collect();
+    let all = [
+        ":3: unknown field `colour`",
+        ":1: `dbc`: ",
+        ":5: invalid type: the text \"x\"",
+        ":6: channel `N`",
+        ":9: channel `G`",
+        ":14: channel `T`",
+    ];
+    assert!(all.iter().all(|part| errors.iter().any(|error| error.contains(part))), "{message}");
+    assert_eq!(errors.len(), all.len(), "{message}");
     folder.write("not_there.dbc", "VERSION \"\"\n");
     let right = text.replace("furlong", "rpm").replace("\"A\"", "\"-\"").replace("kPa", "1/min");
     assert!(printed(&wetclutch(&["check", &folder.write("map.toml", &right)])).contains("a channel map"));

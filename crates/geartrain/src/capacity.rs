@@ -1,6 +1,6 @@
 //! What the engaged elements hold, and what is asked of them.
 
-use crate::finding::{Fault, Finding, Part};
+use crate::finding::{Fault, Finding, Findings, Part};
 use crate::gearbox::{Gear, GearboxElement};
 
 /// Capacity of an element beside the largest torque that it must hold.
@@ -50,27 +50,29 @@ fn of_element(element: &GearboxElement, at: usize, gears: &[Gear], line_pressure
     Capacity::where_most_is_asked(at, capacity_n_m, gears, |gear| gears[gear].turbine_max_n_m)
 }
 
-/// The capacity of every element for which it is known; an error if one slips.
+/// The capacity of every element for which it is known, with a finding for each that slips.
 pub(crate) fn check(
     elements: &[GearboxElement],
     gears: &[Gear],
     line_pressure_pa: Option<f64>,
-) -> Result<Vec<Capacity>, Finding> {
+    findings: &mut Findings,
+) -> Vec<Capacity> {
     let needed = elements.iter().any(|element| element.pack.is_some())
         && gears.iter().any(|gear| gear.turbine_max_n_m.is_some());
     let Some(line_pressure_pa) = line_pressure_pa else {
         let why = "the capacity of the elements is checked at this pressure; 1.0e6 to 2.0e6 are usual";
-        let missing = Finding { part: Part::Gearbox, key: "line_pressure_pa", fault: Fault::Missing(why) };
-        return if needed { Err(missing) } else { Ok(Vec::new()) };
+        if needed {
+            findings.0.push(Finding { part: Part::Gearbox, key: "line_pressure_pa", fault: Fault::Missing(why) });
+        }
+        return Vec::new();
     };
     let of = |(at, element)| of_element(element, at, gears, line_pressure_pa);
     let capacities: Vec<Capacity> = elements.iter().enumerate().filter_map(of).collect();
-    match capacities.iter().find(|capacity| !capacity.holds()) {
-        None => Ok(capacities),
-        Some(&Capacity { element, gear, capacity_n_m, wanted_n_m }) => {
-            let (name, gear) = (elements[element].name.clone(), gears[gear].name.clone());
-            let fault = Fault::Capacity { element: name, gear, capacity_n_m, wanted_n_m, line_pressure_pa };
-            Err(Finding { part: Part::Element(element), key: "pack", fault })
-        }
-    }
+    findings.0.extend(capacities.iter().filter(|capacity| !capacity.holds()).map(|capacity| {
+        let &Capacity { element, gear, capacity_n_m, wanted_n_m } = capacity;
+        let (name, gear) = (elements[element].name.clone(), gears[gear].name.clone());
+        let fault = Fault::Capacity { element: name, gear, capacity_n_m, wanted_n_m, line_pressure_pa };
+        Finding { part: Part::Element(element), key: "pack", fault }
+    }));
+    capacities
 }

@@ -34,6 +34,28 @@ pub struct Finding {
     pub fault: Fault,
 }
 
+/// What is wrong with a description, in the order in which it is checked: what does not follow from something else that is wrong.
+#[derive(Debug, Default)]
+pub(crate) struct Findings(pub(crate) Vec<Finding>);
+
+impl Findings {
+    /// What a check gives, or none and its finding among the others.
+    pub(crate) fn keep<T>(&mut self, checked: Result<T, Finding>) -> Option<T> {
+        checked.map_err(|finding| self.0.push(finding)).ok()
+    }
+
+    /// The same of the parts of a list; none unless each is right.
+    pub(crate) fn keep_all<T>(&mut self, checked: impl Iterator<Item = Result<T, Finding>>) -> Option<Vec<T>> {
+        // Each is checked, also behind a wrong one.
+        let parts: Vec<Option<T>> = checked.map(|part| self.keep(part)).collect();
+        parts.into_iter().collect()
+    }
+
+    pub(crate) fn are_none(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
 /// What can be wrong.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message of each variant says what it is")]

@@ -3,10 +3,10 @@
 use drivetrain::{Clutch, ReducedShift};
 
 use crate::capacity::{self, Capacity};
-use crate::description::{Description, ElementKind, Given, Ratios, Shares, ShiftMass, StickDiagram};
-use crate::finding::{Fault, Finding, Part};
+use crate::description::{Description, ElementKind, EngagedGear, Given, Ratios, Shares, ShiftMass, StickDiagram};
+use crate::finding::{Fault, Finding, Findings, Part};
 use crate::inertia;
-use crate::resolve::{engaged, names, place, positive, train};
+use crate::resolve::{element_names, engaged, names, place, positive, train};
 use crate::shift::{Change, Shift, change};
 use crate::train::{GearTrain, NoGear, ZERO};
 use crate::unusual;
@@ -76,22 +76,39 @@ impl Gearbox {
     /// # Errors
     /// The first thing that is wrong, with its place and what to do about it.
     pub fn new(description: &Description) -> Result<Self, Finding> {
+        Self::checked(description).map_err(|mut findings| findings.swap_remove(0))
+    }
+
+    /// The same, with all that is wrong: what follows from something else that is wrong is none of it.
+    ///
+    /// # Errors
+    /// At least one finding, in the order in which the parts are checked.
+    pub fn checked(description: &Description) -> Result<Self, Vec<Finding>> {
+        let mut findings = Findings::default();
+        match Self::with(description, &mut findings) {
+            Some(gearbox) if findings.are_none() => Ok(gearbox),
+            _ => Err(findings.0),
+        }
+    }
+
+    /// A gearbox, with the findings of a wrong one; none where parts of it are missing.
+    fn with(description: &Description, findings: &mut Findings) -> Option<Self> {
         let mut gearbox = match &description.given {
-            Given::StickDiagram(diagram) => from_stick_diagram(diagram)?,
-            Given::Shares(shares) => from_shares(shares)?,
-            Given::Ratios(ratios) => from_ratios(ratios)?,
-        };
+            Given::StickDiagram(diagram) => from_stick_diagram(diagram, findings),
+            Given::Shares(shares) => from_shares(shares, findings),
+            Given::Ratios(ratios) => from_ratios(ratios, findings),
+        }?;
         gearbox.name.clone_from(&description.name);
         if gearbox.gears.iter().all(|gear| gear.ratio < 0.0) {
-            return Err(Finding { part: Part::Gearbox, key: "gear", fault: Fault::NoForward });
+            findings.0.push(Finding { part: Part::Gearbox, key: "gear", fault: Fault::NoForward });
         }
-        gearbox.check_one_way()?;
+        gearbox.check_one_way(findings);
         if let Some(line_pressure_pa) = description.line_pressure_pa {
-            positive(Part::Gearbox, "line_pressure_pa", line_pressure_pa)?;
+            findings.keep(positive(Part::Gearbox, "line_pressure_pa", line_pressure_pa))?;
         }
-        gearbox.capacities = capacity::check(&gearbox.elements, &gearbox.gears, description.line_pressure_pa)?;
+        gearbox.capacities = capacity::check(&gearbox.elements, &gearbox.gears, description.line_pressure_pa, findings);
         gearbox.warnings.extend(unusual::find(&gearbox));
-        Ok(gearbox)
+        Some(gearbox)
     }
 
     fn of(elements: Vec<GearboxElement>, gears: Vec<Gear>) -> Self {
@@ -164,23 +181,20 @@ impl Gearbox {
     }
 
     /// A one-way clutch carries only a positive torque.
-    fn check_one_way(&self) -> Result<(), Finding> {
+    fn check_one_way(&self, findings: &mut Findings) {
         for (at, gear) in self.gears.iter().enumerate() {
+            let mut about = |fault| findings.0.push(Finding { part: Part::Gear(at), key: "engaged", fault });
             let backwards = |holding: &&Holding| {
                 self.elements[holding.element].kind == ElementKind::OneWayClutch && holding.per_turbine_torque < -ZERO
             };
             if let Some(holding) = gear.holding.iter().find(backwards) {
                 let element = self.elements[holding.element].name.clone();
-                let fault = Fault::OneWay { element, gear: gear.name.clone() };
-                return Err(Finding { part: Part::Gear(at), key: "engaged", fault });
-            }
-            if let Some(element) = self.train.as_ref().and_then(|train| self.blocking(train, gear)) {
+                about(Fault::OneWay { element, gear: gear.name.clone() });
+            } else if let Some(element) = self.train.as_ref().and_then(|train| self.blocking(train, gear)) {
                 let element = self.elements[element].name.clone();
-                let fault = Fault::OneWayBlocks { element, gear: gear.name.clone() };
-                return Err(Finding { part: Part::Gear(at), key: "engaged", fault });
+                about(Fault::OneWayBlocks { element, gear: gear.name.clone() });
             }
         }
-        Ok(())
     }
 
     /// A one-way clutch that would turn in the direction in which it holds.
@@ -210,39 +224,28 @@ impl Gearbox {
     }
 }
 
-fn from_stick_diagram(diagram: &StickDiagram) -> Result<Gearbox, Finding> {
-    let (train, warnings) = train(diagram)?;
-    names((Part::Gearbox, "gear"), Part::Gear, diagram.gears.iter().map(|gear| gear.name.as_str()))?;
-    let element_names = || train.elements.iter().map(|element| element.name.as_str());
-    // With dogs the idle shafts of a gear are free or not: there is no one number.
-    let has_dogs = train.pairs.iter().any(|pair| pair.dog.is_some());
-    let wanted = (!has_dogs).then(|| train.degrees_of_freedom() - 1);
-    let mut gears = Vec::new();
-    for (at, gear) in diagram.gears.iter().enumerate() {
-        let about = |key, fault| Finding { part: Part::Gear(at), key, fault };
-        let engaged = engaged(at, gear.engaged.iter().map(String::as_str), element_names())?;
-        let wrong = |no_gear| about("engaged", no_gear_fault(no_gear, &gear.name, &gear.engaged, wanted));
-        let motion = train.gear(&engaged).map_err(wrong)?;
-        let torques = train.holding_torques(&engaged, motion.ratio);
-        // A gear that turns has torques that hold it: both follow from the same rows.
-        let (torques, holding_is_unique) = torques.ok_or_else(|| wrong(NoGear::Open))?;
-        if let Some(stated) = gear.stated_ratio.filter(|stated| !stated.prints(motion.ratio)) {
-            let fault = Fault::StatedRatio { gear: gear.name.clone(), found: motion.ratio, stated: stated.value };
-            return Err(about("stated_ratio", fault));
-        }
+fn from_stick_diagram(diagram: &StickDiagram, findings: &mut Findings) -> Option<Gearbox> {
+    let train = train(diagram, findings);
+    let has_teeth = findings.are_none();
+    let gear_names = diagram.gears.iter().map(|gear| gear.name.as_str());
+    names((Part::Gearbox, "gear"), Part::Gear, gear_names, findings);
+    let of_gear = |(at, gear): (usize, &EngagedGear)| {
+        let names = gear.engaged.iter().map(String::as_str);
+        let engaged = engaged(at, names, element_names(diagram), findings);
         if let Some(torque) = gear.turbine_max_n_m {
-            positive(Part::Gear(at), "turbine_max_n_m", torque)?;
+            findings.keep(positive(Part::Gear(at), "turbine_max_n_m", torque));
         }
-        let holding =
-            engaged.iter().zip(torques).map(|(&element, per_turbine_torque)| Holding { element, per_turbine_torque });
-        gears.push(Gear {
-            name: gear.name.clone(),
-            ratio: motion.ratio,
-            holding: holding.collect(),
-            holding_is_unique,
-            shaft_speeds: motion.speeds,
-            turbine_max_n_m: gear.turbine_max_n_m,
-        });
+        let engaged = engaged?;
+        match &train {
+            Some((train, _)) => findings.keep(in_train(train, (at, gear), &engaged, has_teeth)),
+            None => findings.keep(enough_engaged(diagram, (at, gear))).and(None),
+        }
+    };
+    let gears: Vec<Option<Gear>> = diagram.gears.iter().enumerate().map(of_gear).collect();
+    let (train, warnings) = train?;
+    let gears: Vec<Gear> = gears.into_iter().collect::<Option<_>>()?;
+    if !findings.are_none() {
+        return None;
     }
     let elements = (train.elements.iter())
         .map(|element| GearboxElement { name: element.name.clone(), kind: element.kind, pack: element.pack })
@@ -259,7 +262,54 @@ fn from_stick_diagram(diagram: &StickDiagram) -> Result<Gearbox, Finding> {
         },
     );
     gearbox.train = Some(train);
-    Ok(gearbox)
+    Some(gearbox)
+}
+
+/// Refuses a gear that engages too few elements, by the numbers of shafts and sets alone: those of another gear are enough.
+fn enough_engaged(diagram: &StickDiagram, (at, gear): (usize, &EngagedGear)) -> Result<(), Finding> {
+    let wanted = diagram.shafts.len().checked_sub(diagram.sets.len() + diagram.pairs.len() + 1);
+    let has_dogs = diagram.pairs.iter().any(|pair| pair.dog.is_some());
+    let is_open =
+        |wanted: usize| gear.engaged.len() < wanted && diagram.gears.iter().any(|other| other.engaged.len() == wanted);
+    match wanted.filter(|&wanted| !has_dogs && is_open(wanted)) {
+        None => Ok(()),
+        wanted => {
+            let fault = no_gear_fault(NoGear::Open, &gear.name, &gear.engaged, wanted);
+            Err(Finding { part: Part::Gear(at), key: "engaged", fault })
+        }
+    }
+}
+
+/// A gear with its engaged elements in a train; its ratio is not compared unless the teeth are right.
+fn in_train(
+    train: &GearTrain,
+    (at, gear): (usize, &EngagedGear),
+    engaged: &[usize],
+    has_teeth: bool,
+) -> Result<Gear, Finding> {
+    let about = |key, fault| Finding { part: Part::Gear(at), key, fault };
+    // With dogs the idle shafts of a gear are free or not: there is no one number.
+    let has_dogs = train.pairs.iter().any(|pair| pair.dog.is_some());
+    let wanted = (!has_dogs).then(|| train.degrees_of_freedom() - 1);
+    let wrong = |no_gear| about("engaged", no_gear_fault(no_gear, &gear.name, &gear.engaged, wanted));
+    let motion = train.gear(engaged).map_err(wrong)?;
+    let torques = train.holding_torques(engaged, motion.ratio);
+    // A gear that turns has torques that hold it: both follow from the same rows.
+    let (torques, holding_is_unique) = torques.ok_or_else(|| wrong(NoGear::Open))?;
+    if let Some(stated) = gear.stated_ratio.filter(|stated| has_teeth && !stated.prints(motion.ratio)) {
+        let fault = Fault::StatedRatio { gear: gear.name.clone(), found: motion.ratio, stated: stated.value };
+        return Err(about("stated_ratio", fault));
+    }
+    let holding =
+        engaged.iter().zip(torques).map(|(&element, per_turbine_torque)| Holding { element, per_turbine_torque });
+    Ok(Gear {
+        name: gear.name.clone(),
+        ratio: motion.ratio,
+        holding: holding.collect(),
+        holding_is_unique,
+        shaft_speeds: motion.speeds,
+        turbine_max_n_m: gear.turbine_max_n_m,
+    })
 }
 
 fn no_gear_fault(no_gear: NoGear, gear: &str, engaged: &[String], wanted: Option<usize>) -> Fault {
@@ -280,20 +330,21 @@ fn check_ratio(gear: usize, ratio: f64) -> Result<(), Finding> {
     if valid { Ok(()) } else { Err(Finding { part: Part::Gear(gear), key: "ratio", fault }) }
 }
 
-fn from_shares(shares: &Shares) -> Result<Gearbox, Finding> {
+fn from_shares(shares: &Shares, findings: &mut Findings) -> Option<Gearbox> {
     let element_names = || shares.elements.iter().map(|element| element.0.as_str());
-    names((Part::Gearbox, "element"), Part::Element, element_names())?;
-    names((Part::Gearbox, "gear"), Part::Gear, shares.gears.iter().map(|gear| gear.name.as_str()))?;
+    names((Part::Gearbox, "element"), Part::Element, element_names(), findings);
+    names((Part::Gearbox, "gear"), Part::Gear, shares.gears.iter().map(|gear| gear.name.as_str()), findings);
     let mut gears = Vec::new();
     for (at, gear) in shares.gears.iter().enumerate() {
-        check_ratio(at, gear.ratio)?;
-        let places = engaged(at, gear.shares.iter().map(|share| share.0.as_str()), element_names())?;
+        findings.keep(check_ratio(at, gear.ratio));
+        let names = gear.shares.iter().map(|share| share.0.as_str());
+        let places = engaged(at, names, element_names(), findings).unwrap_or_default();
         if let Some((_, value)) = gear.shares.iter().find(|share| !share.1.is_finite()) {
             let fault = Fault::Number { value: *value, expected: "torque of the element per turbine torque" };
-            return Err(Finding { part: Part::Gear(at), key: "shares", fault });
+            findings.0.push(Finding { part: Part::Gear(at), key: "shares", fault });
         }
         if let Some(torque) = gear.turbine_max_n_m {
-            positive(Part::Gear(at), "turbine_max_n_m", torque)?;
+            findings.keep(positive(Part::Gear(at), "turbine_max_n_m", torque));
         }
         let holding =
             places.iter().zip(&gear.shares).map(|(&element, share)| Holding { element, per_turbine_torque: share.1 });
@@ -303,7 +354,10 @@ fn from_shares(shares: &Shares) -> Result<Gearbox, Finding> {
             ..ratio_only(&gear.name, gear.ratio)
         });
     }
-    let masses = masses(&shares.masses, &gears)?;
+    let masses = masses(&shares.masses, &gears, findings);
+    if !findings.are_none() {
+        return None;
+    }
     let elements = shares.elements.iter().map(|(name, kind, pack)| GearboxElement {
         name: name.clone(),
         kind: *kind,
@@ -327,16 +381,17 @@ fn from_shares(shares: &Shares) -> Result<Gearbox, Finding> {
             _ => None,
         },
     );
-    Ok(gearbox)
+    Some(gearbox)
 }
 
-fn from_ratios(ratios: &Ratios) -> Result<Gearbox, Finding> {
-    names((Part::Gearbox, "gear"), Part::Gear, ratios.gears.iter().map(|gear| gear.name.as_str()))?;
-    for (at, gear) in ratios.gears.iter().enumerate() {
-        check_ratio(at, gear.ratio)?;
-    }
+fn from_ratios(ratios: &Ratios, findings: &mut Findings) -> Option<Gearbox> {
+    names((Part::Gearbox, "gear"), Part::Gear, ratios.gears.iter().map(|gear| gear.name.as_str()), findings);
+    findings.keep_all(ratios.gears.iter().enumerate().map(|(at, gear)| check_ratio(at, gear.ratio)));
     let gears: Vec<Gear> = ratios.gears.iter().map(|gear| ratio_only(&gear.name, gear.ratio)).collect();
-    let masses = masses(&ratios.masses, &gears)?;
+    let masses = masses(&ratios.masses, &gears, findings);
+    if !findings.are_none() {
+        return None;
+    }
     let mut gearbox = Gearbox::of(Vec::new(), gears);
     let forward = gearbox.forward_gears();
     let up = forward.windows(2).map(|pair| (pair[0], pair[1]));
@@ -350,7 +405,7 @@ fn from_ratios(ratios: &Ratios) -> Result<Gearbox, Finding> {
         Shift { from, to, change: Change::Unknown, reduced }
     });
     gearbox.shifts = shifts.collect();
-    Ok(gearbox)
+    Some(gearbox)
 }
 
 fn ratio_only(name: &str, ratio: f64) -> Gear {
@@ -367,28 +422,30 @@ fn ratio_only(name: &str, ratio: f64) -> Gear {
 /// Two gears and the mass of the shift between them.
 type Mass = ([usize; 2], [[f64; 2]; 2]);
 
-fn masses(masses: &[ShiftMass], gears: &[Gear]) -> Result<Vec<Mass>, Finding> {
+fn masses(masses: &[ShiftMass], gears: &[Gear], findings: &mut Findings) -> Vec<Mass> {
     let mut checked: Vec<Mass> = Vec::new();
     for (at, mass) in masses.iter().enumerate() {
         let about = |key, fault| Finding { part: Part::Mass(at), key, fault };
         let gear =
-            |name: &str| place((Part::Mass(at), "gears"), "gear", name, gears.iter().map(|gear| gear.name.as_str()));
+            |name: &String| place((Part::Mass(at), "gears"), "gear", name, gears.iter().map(|gear| gear.name.as_str()));
         let [a, b] = &mass.gears;
-        let between = [gear(a)?, gear(b)?];
-        let again = checked.iter().any(|(other, _)| *other == between || *other == [between[1], between[0]]);
-        if between[0] == between[1] || again {
-            return Err(about("gears", Fault::Repeated(format!("{a}, {b}"))));
+        let between = findings.keep_all(mass.gears.iter().map(gear)).map(|between| [between[0], between[1]]);
+        let is_between = |other: &Mass| between.is_some_and(|[a, b]| other.0 == [a, b] || other.0 == [b, a]);
+        if between.is_some_and(|[a, b]| a == b) || checked.iter().any(is_between) {
+            findings.0.push(about("gears", Fault::Repeated(format!("{a}, {b}"))));
         }
-        positive(Part::Mass(at), "turbine_kg_m2", mass.turbine_kg_m2)?;
-        positive(Part::Mass(at), "output_kg_m2", mass.output_kg_m2)?;
+        let diagonal = [("turbine_kg_m2", mass.turbine_kg_m2), ("output_kg_m2", mass.output_kg_m2)];
+        let diagonal = diagonal.into_iter().map(|(key, mass)| positive(Part::Mass(at), key, mass));
+        let is_positive = findings.keep_all(diagonal).is_some();
         let coupling = mass.coupling_kg_m2;
         let is_definite = mass.turbine_kg_m2 * mass.output_kg_m2 > coupling * coupling;
-        if !is_definite {
-            return Err(about("coupling_kg_m2", Fault::Mass(a.clone(), b.clone())));
+        if is_positive && !is_definite {
+            findings.0.push(about("coupling_kg_m2", Fault::Mass(a.clone(), b.clone())));
         }
-        checked.push((between, [[mass.turbine_kg_m2, coupling], [coupling, mass.output_kg_m2]]));
+        let matrix = [[mass.turbine_kg_m2, coupling], [coupling, mass.output_kg_m2]];
+        checked.extend(between.map(|between| (between, matrix)));
     }
-    Ok(checked)
+    checked
 }
 
 fn mass_of(masses: &[Mass], from: usize, to: usize) -> Option<[[f64; 2]; 2]> {

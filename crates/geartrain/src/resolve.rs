@@ -1,7 +1,7 @@
 //! From names to places in lists, and the checks of single parts.
 
 use crate::description::{Element, ElementKind, GearPair, HOUSING, PlanetarySet, StickDiagram};
-use crate::finding::{Fault, Finding, Part};
+use crate::finding::{Fault, Finding, Findings, Part};
 use crate::teeth;
 use crate::train::{Connection, GearTrain, Member, TrainElement};
 
@@ -11,20 +11,21 @@ const MAXIMUM: usize = 32;
 /// Numbers of teeth.
 const TEETH: std::ops::RangeInclusive<u32> = 1..=10_000;
 
-/// Refuses an empty list, one that is too long, and names that are empty, reserved or repeated.
+/// Refuses an empty list, one that is too long, and names that are empty, reserved or repeated; whether all are right.
 pub(crate) fn names<'n>(
     list: (Part, &'static str),
     part: fn(usize) -> Part,
     names: impl ExactSizeIterator<Item = &'n str> + Clone,
-) -> Result<(), Finding> {
+    findings: &mut Findings,
+) -> Option<()> {
     let count = names.len();
     let about = |fault| Err(Finding { part: list.0, key: list.1, fault });
-    match count {
-        0 => return about(Fault::None),
-        _ if count > MAXIMUM => return about(Fault::TooMany { count, maximum: MAXIMUM }),
-        _ => (),
-    }
-    for (at, name) in names.clone().enumerate() {
+    findings.keep(match count {
+        0 => about(Fault::None),
+        _ if count > MAXIMUM => about(Fault::TooMany { count, maximum: MAXIMUM }),
+        _ => Ok(()),
+    })?;
+    let checked = names.clone().enumerate().map(|(at, name)| {
         let wrong = |fault| Err(Finding { part: part(at), key: "name", fault });
         if name == HOUSING {
             return wrong(Fault::HousingAsName);
@@ -32,8 +33,9 @@ pub(crate) fn names<'n>(
         if names.clone().take(at).any(|earlier| earlier == name) {
             return wrong(Fault::Repeated(name.to_owned()));
         }
-    }
-    Ok(())
+        Ok(())
+    });
+    findings.keep_all(checked).map(drop)
 }
 
 /// The place of a name.
@@ -56,32 +58,33 @@ pub(crate) fn positive(part: Part, key: &'static str, value: f64) -> Result<(), 
     if valid { Ok(()) } else { Err(Finding { part, key, fault }) }
 }
 
-/// The places of the engaged elements of a gear.
+/// The places of the engaged elements of a gear; none if one of them does not exist, or is named twice.
 pub(crate) fn engaged<'n, 'e>(
     gear: usize,
     engaged: impl Iterator<Item = &'n str>,
     elements: impl Iterator<Item = &'e str> + Clone,
-) -> Result<Vec<usize>, Finding> {
-    let mut places = Vec::new();
-    for name in engaged {
+    findings: &mut Findings,
+) -> Option<Vec<usize>> {
+    let mut named = Vec::new();
+    findings.keep_all(engaged.map(|name| {
         let at = place((Part::Gear(gear), "engaged"), "element", name, elements.clone())?;
-        if places.contains(&at) {
+        if named.contains(&at) {
             return Err(Finding { part: Part::Gear(gear), key: "engaged", fault: Fault::Repeated(name.to_owned()) });
         }
-        places.push(at);
-    }
-    Ok(places)
+        named.push(at);
+        Ok(at)
+    }))
 }
 
-/// The gear train of a stick diagram, and what is unusual about it.
-pub(crate) fn train(diagram: &StickDiagram) -> Result<(GearTrain, Vec<Finding>), Finding> {
+/// The gear train of a stick diagram, and what is unusual about it; none if its parts do not make one. Its numbers of teeth may be among the findings.
+pub(crate) fn train(diagram: &StickDiagram, findings: &mut Findings) -> Option<(GearTrain, Vec<Finding>)> {
     let shaft_names = || diagram.shafts.iter().map(|shaft| shaft.name.as_str());
-    names((Part::Gearbox, "shaft"), Part::Shaft, shaft_names())?;
+    let named = names((Part::Gearbox, "shaft"), Part::Shaft, shaft_names(), findings);
     for (at, shaft) in diagram.shafts.iter().enumerate() {
         let valid = shaft.inertia_kg_m2.is_finite() && shaft.inertia_kg_m2 > 0.0;
         if !valid {
             let fault = Fault::Number { value: shaft.inertia_kg_m2, expected: "a finite inertia above 0" };
-            return Err(Finding { part: Part::Shaft(at), key: "inertia_kg_m2", fault });
+            findings.0.push(Finding { part: Part::Shaft(at), key: "inertia_kg_m2", fault });
         }
     }
     let shaft = |part: Part, key: &'static str, name: &str| place((part, key), "shaft", name, shaft_names());
@@ -91,63 +94,91 @@ pub(crate) fn train(diagram: &StickDiagram) -> Result<(GearTrain, Vec<Finding>),
     };
     for (list, count) in [("planetary_set", diagram.sets.len()), ("gear_pair", diagram.pairs.len())] {
         if count > MAXIMUM {
-            return Err(Finding { part: Part::Gearbox, key: list, fault: Fault::TooMany { count, maximum: MAXIMUM } });
+            findings.0.push(Finding {
+                part: Part::Gearbox,
+                key: list,
+                fault: Fault::TooMany { count, maximum: MAXIMUM },
+            });
+            return None;
         }
     }
-    let (sets, unusual) = sets(diagram, member)?;
-    let pairs = pairs(diagram, shaft)?;
-    let elements = elements(diagram, member)?;
-    let (input, output) =
-        (shaft(Part::Gearbox, "input", &diagram.input)?, shaft(Part::Gearbox, "output", &diagram.output)?);
-    if input == output {
+    let sets = sets(diagram, member, findings);
+    let pairs = pairs(diagram, shaft, findings);
+    let elements = elements(diagram, member, findings);
+    let ends = [("input", &diagram.input), ("output", &diagram.output)];
+    let ends = findings.keep_all(ends.into_iter().map(|(key, name)| shaft(Part::Gearbox, key, name)));
+    if diagram.input == diagram.output {
         let fault = Fault::InputIsOutput(diagram.input.clone());
-        return Err(Finding { part: Part::Gearbox, key: "output", fault });
+        findings.0.push(Finding { part: Part::Gearbox, key: "output", fault });
+        return None;
     }
-    let train = GearTrain::new(diagram.shafts.clone(), [input, output], sets, pairs, elements);
+    named?;
+    let ((sets, unusual), pairs, elements, ends) = (sets?, pairs?, elements?, ends?);
+    let train = GearTrain::new(diagram.shafts.clone(), [ends[0], ends[1]], sets, pairs, elements);
     let key = if diagram.sets.is_empty() { "gear_pair" } else { "planetary_set" };
-    let train = train.ok_or(Finding { part: Part::Gearbox, key, fault: Fault::DependentSets })?;
-    connected(&train)?;
+    let train = findings.keep(train.ok_or(Finding { part: Part::Gearbox, key, fault: Fault::DependentSets }))?;
+    findings.keep_all(loose(&train).map(Err::<(), _>))?;
     let freedom = train.degrees_of_freedom();
     if freedom < 2 {
-        return Err(Finding { part: Part::Gearbox, key: "shaft", fault: Fault::Freedom(freedom) });
+        findings.0.push(Finding { part: Part::Gearbox, key: "shaft", fault: Fault::Freedom(freedom) });
+        return None;
     }
-    match train.gear(&[]) {
-        Ok(motion) => Err(Finding { part: Part::Gearbox, key: "output", fault: Fault::NoNeutral(motion.ratio) }),
-        Err(_) => Ok((train, unusual)),
+    if let Ok(motion) = train.gear(&[]) {
+        findings.0.push(Finding { part: Part::Gearbox, key: "output", fault: Fault::NoNeutral(motion.ratio) });
+        return None;
     }
+    Some((train, unusual))
 }
 
-/// The planetary sets, and what is unusual about their teeth.
+/// The planetary sets, and what is unusual about their teeth; none if they connect what does not exist, or nothing.
 fn sets(
     diagram: &StickDiagram,
     member: impl Fn(Part, &'static str, &str) -> Result<Member, Finding>,
-) -> Result<(Vec<PlanetarySet<Member>>, Vec<Finding>), Finding> {
-    let (mut sets, mut unusual) = (Vec::new(), Vec::new());
-    for (at, set) in diagram.sets.iter().enumerate() {
-        let part = Part::Set(at);
-        let of = |key: &'static str, name: &str| member(part, key, name);
-        let members = [of("sun", &set.sun)?, of("carrier", &set.carrier)?, of("ring", &set.ring)?];
-        sets.push(checked_set(set, part, members)?);
-        let findings = teeth::check(set).map_err(|(key, fault)| Finding { part, key, fault })?;
-        unusual.extend(findings.into_iter().map(|(key, fault)| Finding { part, key, fault }));
-    }
-    Ok((sets, unusual))
+    findings: &mut Findings,
+) -> Option<(Vec<PlanetarySet<Member>>, Vec<Finding>)> {
+    let mut unusual = Vec::new();
+    let sets: Vec<Option<PlanetarySet<Member>>> = diagram
+        .sets
+        .iter()
+        .enumerate()
+        .map(|(at, set)| {
+            let part = Part::Set(at);
+            let members = [("sun", &set.sun), ("carrier", &set.carrier), ("ring", &set.ring)];
+            let members = findings.keep_all(members.into_iter().map(|(key, name)| member(part, key, name)));
+            let teeth = [("sun_teeth", set.sun_teeth), ("ring_teeth", set.ring_teeth)];
+            let in_range = findings.keep_all(teeth.into_iter().map(|(key, teeth)| teeth_in_range(part, key, teeth)));
+            if in_range.is_some() {
+                let teeth = teeth::check(set).map_err(|(key, fault)| Finding { part, key, fault });
+                let of_set = findings.keep(teeth).unwrap_or_default().into_iter();
+                unusual.extend(of_set.map(|(key, fault)| Finding { part, key, fault }));
+            }
+            in_range?;
+            let members = members?;
+            findings.keep(differing(set, part, [members[0], members[1], members[2]]))
+        })
+        .collect();
+    Some((sets.into_iter().collect::<Option<_>>()?, unusual))
 }
 
 /// The gear pairs.
 fn pairs(
     diagram: &StickDiagram,
     shaft: impl Fn(Part, &'static str, &str) -> Result<usize, Finding>,
-) -> Result<Vec<GearPair<usize>>, Finding> {
-    let pair = |(at, pair): (usize, &GearPair<String>)| {
+    findings: &mut Findings,
+) -> Option<Vec<GearPair<usize>>> {
+    let mut pair = |(at, pair): (usize, &GearPair<String>)| {
         let part = Part::Pair(at);
-        let (driver, driven) = (shaft(part, "driver", &pair.driver)?, shaft(part, "driven", &pair.driven)?);
-        teeth_in_range(part, "driver_teeth", pair.driver_teeth)?;
-        teeth_in_range(part, "driven_teeth", pair.driven_teeth)?;
+        let shafts = [("driver", &pair.driver), ("driven", &pair.driven)];
+        let shafts = findings.keep_all(shafts.into_iter().map(|(key, name)| shaft(part, key, name)));
+        let teeth = [("driver_teeth", pair.driver_teeth), ("driven_teeth", pair.driven_teeth)];
+        let in_range = findings.keep_all(teeth.into_iter().map(|(key, teeth)| teeth_in_range(part, key, teeth)));
+        let (driver, driven) = shafts.map(|shafts| (shafts[0], shafts[1]))?;
         if driver == driven {
-            return Err(Finding { part, key: "driven", fault: Fault::SameSides(pair.driven.clone()) });
+            findings.0.push(Finding { part, key: "driven", fault: Fault::SameSides(pair.driven.clone()) });
+            return None;
         }
-        Ok(GearPair {
+        in_range?;
+        Some(GearPair {
             driver,
             driven,
             driver_teeth: pair.driver_teeth,
@@ -156,7 +187,8 @@ fn pairs(
             dog: pair.dog.clone(),
         })
     };
-    diagram.pairs.iter().enumerate().map(pair).collect()
+    let pairs: Vec<Option<GearPair<usize>>> = diagram.pairs.iter().enumerate().map(&mut pair).collect();
+    pairs.into_iter().collect()
 }
 
 fn teeth_in_range(part: Part, key: &'static str, teeth: u32) -> Result<(), Finding> {
@@ -164,13 +196,12 @@ fn teeth_in_range(part: Part, key: &'static str, teeth: u32) -> Result<(), Findi
     if TEETH.contains(&teeth) { Ok(()) } else { Err(Finding { part, key, fault }) }
 }
 
-fn checked_set(
+/// A set with its members, each of them another one.
+fn differing(
     set: &PlanetarySet<String>,
     part: Part,
     [sun, carrier, ring]: [Member; 3],
 ) -> Result<PlanetarySet<Member>, Finding> {
-    teeth_in_range(part, "sun_teeth", set.sun_teeth)?;
-    teeth_in_range(part, "ring_teeth", set.ring_teeth)?;
     let same = [
         (sun == carrier, "carrier", "sun and carrier"),
         (sun == ring, "ring", "sun and ring"),
@@ -192,31 +223,54 @@ fn checked_set(
     })
 }
 
-/// The elements of the list, then the dogs of the gear pairs.
+/// The elements of the list, then the dogs of the gear pairs; none if one of them is wrong.
 fn elements(
     diagram: &StickDiagram,
     member: impl Fn(Part, &'static str, &str) -> Result<Member, Finding>,
-) -> Result<Vec<TrainElement>, Finding> {
+    findings: &mut Findings,
+) -> Option<Vec<TrainElement>> {
     let dogs = diagram.pairs.iter().enumerate().filter_map(|(at, pair)| Some((at, pair.dog.as_deref()?)));
-    let names_of: Vec<&str> =
-        diagram.elements.iter().map(|element| &*element.name).chain(dogs.clone().map(|dog| dog.1)).collect();
-    for (nth, (at, dog)) in dogs.clone().enumerate() {
-        if dog == HOUSING || names_of.iter().take(diagram.elements.len() + nth).any(|&name| name == dog) {
+    let names_of: Vec<&str> = element_names(diagram).collect();
+    let dog = |(nth, (at, dog)): (usize, (usize, &str))| {
+        let is_taken = names_of.iter().take(diagram.elements.len() + nth).any(|&name| name == dog);
+        if dog == HOUSING || is_taken {
             return Err(Finding { part: Part::Pair(at), key: "dog", fault: Fault::Repeated(dog.to_owned()) });
         }
-    }
-    names((Part::Gearbox, "element"), Part::Element, names_of.iter().copied())?;
-    let between = diagram.elements.iter().enumerate().map(|(at, element)| {
-        let part = Part::Element(at);
-        let sides = (member(part, "input", &element.input)?, member(part, "output", &element.output)?);
-        check_sides(element, part, sides)?;
-        let connection = Connection::Sides(sides.0, sides.1);
-        Ok(TrainElement { name: element.name.clone(), kind: element.kind, connection, pack: element.pack })
-    });
+        Ok(())
+    };
+    let dogs_named = findings.keep_all(dogs.clone().enumerate().map(dog));
+    // A dog with the name of an element is one finding.
+    let named =
+        dogs_named.and_then(|_| names((Part::Gearbox, "element"), Part::Element, names_of.iter().copied(), findings));
+    let between: Vec<Option<TrainElement>> = diagram
+        .elements
+        .iter()
+        .enumerate()
+        .map(|(at, element)| {
+            let part = Part::Element(at);
+            let sides = [("input", &element.input), ("output", &element.output)];
+            let sides = findings.keep_all(sides.into_iter().map(|(key, name)| member(part, key, name)))?;
+            findings.keep(check_sides(element, part, (sides[0], sides[1])))?;
+            let connection = Connection::Sides(sides[0], sides[1]);
+            Some(TrainElement { name: element.name.clone(), kind: element.kind, connection, pack: element.pack })
+        })
+        .collect();
+    named?;
     let of_pairs = dogs.map(|(at, dog)| {
-        Ok(TrainElement { name: dog.to_owned(), kind: ElementKind::Dog, connection: Connection::Pair(at), pack: None })
+        Some(TrainElement {
+            name: dog.to_owned(),
+            kind: ElementKind::Dog,
+            connection: Connection::Pair(at),
+            pack: None,
+        })
     });
-    between.chain(of_pairs).collect()
+    between.into_iter().chain(of_pairs).collect()
+}
+
+/// Names of the elements of the list, then of the dogs of the gear pairs.
+pub(crate) fn element_names(diagram: &StickDiagram) -> impl Iterator<Item = &str> + Clone {
+    let dogs = diagram.pairs.iter().filter_map(|pair| pair.dog.as_deref());
+    diagram.elements.iter().map(|element| &*element.name).chain(dogs)
 }
 
 fn check_sides(element: &Element, part: Part, (input, output): (Member, Member)) -> Result<(), Finding> {
@@ -231,8 +285,8 @@ fn check_sides(element: &Element, part: Part, (input, output): (Member, Member))
     }
 }
 
-/// Every shaft is a member of something.
-fn connected(train: &GearTrain) -> Result<(), Finding> {
+/// The shafts that are a member of nothing.
+fn loose(train: &GearTrain) -> impl Iterator<Item = Finding> {
     let sets = train.sets.iter().flat_map(|set| [set.sun, set.carrier, set.ring]);
     let pairs = train.pairs.iter().flat_map(|pair| [pair.driver, pair.driven].map(Member::Shaft));
     let sides = train.elements.iter().flat_map(|element| match element.connection {
@@ -240,11 +294,8 @@ fn connected(train: &GearTrain) -> Result<(), Finding> {
         Connection::Pair(_) => Vec::new(),
     });
     let named: Vec<Member> = sets.chain(pairs).chain(sides).collect();
-    match (0..train.shafts.len()).find(|&shaft| !named.contains(&Member::Shaft(shaft))) {
-        None => Ok(()),
-        Some(shaft) => {
-            let fault = Fault::Loose(train.shafts[shaft].name.clone());
-            Err(Finding { part: Part::Shaft(shaft), key: "name", fault })
-        }
-    }
+    (0..train.shafts.len()).filter(move |&shaft| !named.contains(&Member::Shaft(shaft))).map(|shaft| {
+        let fault = Fault::Loose(train.shafts[shaft].name.clone());
+        Finding { part: Part::Shaft(shaft), key: "name", fault }
+    })
 }

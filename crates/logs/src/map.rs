@@ -179,6 +179,12 @@ impl ChannelMap {
         })
     }
 
+    /// The DBC that the text of a map names, also where something else in it is wrong.
+    pub fn database(path: &Path, text: &str) -> Option<PathBuf> {
+        let table: toml::Table = toml::from_str(text).ok()?;
+        Some(path.parent().unwrap_or(Path::new("")).join(table.get("dbc")?.as_str()?))
+    }
+
     /// All values that are wrong in the text of a map, and its units that are not known or not of their roles: lines, counted from 1, and messages.
     /// None of a text that is no TOML, or has other keys or types.
     pub fn all_wrong(text: &str) -> Vec<(usize, String)> {

@@ -31,7 +31,7 @@ fn missing_database(source: &Source) -> Option<ConfigError> {
     if !matches!(source.kind(), Ok(Kind::ChannelMap)) {
         return None;
     }
-    let dbc = ChannelMap::of_text(&source.path, &source.text).ok()?.open.dbc?;
+    let dbc = ChannelMap::database(&source.path, &source.text)?;
     let error = std::fs::File::open(&dbc).err()?;
     let line = source.text.lines().position(|line| line.split('=').next().is_some_and(|key| key.trim() == "dbc"));
     Some(ConfigError::Meaning {
@@ -45,11 +45,7 @@ fn missing_database(source: &Source) -> Option<ConfigError> {
 
 /// The same, but for a log's database that a channel map names.
 fn errors_of_text(source: &Source) -> Vec<ConfigError> {
-    let mut errors = all_errors(source, &|source| read(source.kind()?, source));
-    if matches!(source.kind(), Ok(Kind::ChannelMap)) {
-        errors.extend(wrong_in_map(source));
-        errors.sort_by_key(ConfigError::line);
-    }
+    let mut errors = all_errors(source, &|source| read(source.kind().map_err(alone)?, source));
     // A wrong gearbox file, or none, ends the reading of the car that names it.
     let is_of_gearbox = |error: &ConfigError| match error {
         ConfigError::Meaning { key, .. } if key == "gearbox" => true,
@@ -63,16 +59,11 @@ fn errors_of_text(source: &Source) -> Vec<ConfigError> {
     errors
 }
 
-/// All that is wrong in a channel map that is TOML, with units.
-fn wrong_in_map(source: &Source) -> Vec<ConfigError> {
-    let wrong = ChannelMap::all_wrong(&source.text).into_iter();
-    wrong.map(|(line, message)| error_of_map(source, line, message)).collect()
-}
-
 /// The errors of a car's file that it has with any gearbox: keys, types and ranges.
 fn errors_in_any_gearbox(source: &Source) -> Vec<ConfigError> {
     let Ok(CarFile { gearbox_source, .. }) = CarFile::eight_speed() else { return Vec::new() };
-    let errors = all_errors(source, &|draft| CarFile::from_sources(draft, gearbox_source.clone()).map(drop));
+    let of_draft = |draft| CarFile::from_sources(draft, gearbox_source.clone()).map(drop).map_err(alone);
+    let errors = all_errors(source, &of_draft);
     let is_of_any = |error: &ConfigError| matches!(error, ConfigError::Syntax { .. } | ConfigError::Range { .. });
     errors.into_iter().filter(is_of_any).collect()
 }
@@ -84,8 +75,8 @@ pub fn errors_of_texts(name: &str, text: &str, gearbox: Option<&str>) -> Vec<Err
     let errors = match gearbox.map(|text| gearbox_source(name, text)) {
         None => errors_of_text(&source),
         Some(gearbox) => match errors_of_text(&gearbox) {
-            errors if errors.is_empty() => all_errors(&source, &|draft| match draft.kind()? {
-                Kind::Car => CarFile::from_sources(draft, gearbox.clone()).map(drop),
+            errors if errors.is_empty() => all_errors(&source, &|draft| match draft.kind().map_err(alone)? {
+                Kind::Car => CarFile::from_sources(draft, gearbox.clone()).map(drop).map_err(alone),
                 kind => read(kind, draft),
             }),
             errors => errors,
@@ -94,21 +85,27 @@ pub fn errors_of_texts(name: &str, text: &str, gearbox: Option<&str>) -> Vec<Err
     errors.into_iter().map(Error::from).collect()
 }
 
+/// The error of a reader that ends at the first one.
+fn alone(error: ConfigError) -> Vec<ConfigError> {
+    vec![error]
+}
+
 /// Reads a file of a kind, and the files that it names.
-fn read(kind: Kind, source: Source) -> Result<(), ConfigError> {
+fn read(kind: Kind, source: Source) -> Result<(), Vec<ConfigError>> {
     match kind {
-        Kind::Gearbox => GearboxFile::from_source(source).map(drop),
+        Kind::Gearbox => return GearboxFile::checked(source).map(drop),
+        Kind::ChannelMap => return read_map(&source),
         Kind::Car => CarFile::from_source(source).map(drop),
         Kind::CarStudy => CarStudy::from_source(source).map(drop),
         Kind::Drive => read_drive(source),
         Kind::Vehicle => VehicleFile::from_source(source).map(drop),
-        Kind::Experiment => ExperimentFile::from_source(source)?.read_vehicle().map(drop),
+        Kind::Experiment => ExperimentFile::from_source(source).and_then(|file| file.read_vehicle().map(drop)),
         Kind::Overlay => VehicleFile::check_overlay(&source),
         Kind::Sensors => config::sensors_of(&source).map(drop),
         Kind::Study => Study::from_source(source).map(drop),
         Kind::Learnt => check_learnt(&source),
-        Kind::ChannelMap => read_map(&source),
     }
+    .map_err(alone)
 }
 
 /// Reads a drive file, and the vehicle file if it names one.
@@ -118,12 +115,16 @@ fn read_drive(source: Source) -> Result<(), ConfigError> {
 }
 
 /// Reads a channel map; its errors have the form of those of the other files.
-fn read_map(source: &Source) -> Result<(), ConfigError> {
+fn read_map(source: &Source) -> Result<(), Vec<ConfigError>> {
+    let wrong = ChannelMap::all_wrong(&source.text);
+    if !wrong.is_empty() {
+        return Err(wrong.into_iter().map(|(line, message)| error_of_map(source, line, message)).collect());
+    }
     let Err(error) = ChannelMap::of_text(&source.path, &source.text) else { return Ok(()) };
     let (path, text) = (source.path.clone(), error.to_string());
     let placed = text.strip_prefix(&format!("{}:", path.shown())).and_then(|rest| rest.split_once(": "));
     let (line, message) = placed.and_then(|(line, message)| Some((line.parse().ok()?, message))).unwrap_or((1, &text));
-    Err(error_of_map(source, line, message.to_owned()))
+    Err(alone(error_of_map(source, line, message.to_owned())))
 }
 
 /// An error of a channel map in the form of those of the other files.

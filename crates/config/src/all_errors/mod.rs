@@ -31,8 +31,8 @@ fn readings(text: &str) -> usize {
 /// Most times that one place is mended.
 const MENDED_MAX: usize = 6;
 
-/// Reads a file of a kind, or of any.
-type Reader<'r> = dyn Fn(Source) -> Result<(), ConfigError> + 'r;
+/// Reads a file of a kind, or of any. Its errors, at least one, do not follow from each other; the first is one at which it would end.
+type Reader<'r> = dyn Fn(Source) -> Result<(), Vec<ConfigError>> + 'r;
 
 /// The errors of a file by its reader, and those of a file that it names and that the reader can read: unknown keys first, then in the order of
 /// their lines; empty for a file without any.
@@ -70,6 +70,25 @@ struct Shown {
     unsure: Vec<String>,
     /// Whether the reader came to the end.
     is_whole: bool,
+}
+
+impl Shown {
+    /// Adds an error at a line of a draft, unless it follows from what was put into it.
+    fn add(&mut self, error: ConfigError, line: usize, wrong: &Wrong, draft: &Draft) {
+        let (is_of_file, is_sure) = match wrong {
+            _ if draft.is_unchanged() => (true, true),
+            Wrong::Name { .. } => (draft.has_its_names(), true),
+            Wrong::Length { .. } | Wrong::Meaning { .. } | Wrong::Other => (draft.differs_in_numbers(), false),
+            _ => (true, true),
+        };
+        if is_of_file && !draft.is_guessed(line, wrong) {
+            let error = error.with_line(draft.line_of_file(line));
+            if !is_sure {
+                self.unsure.push(error.to_string());
+            }
+            self.errors.push(error);
+        }
+    }
 }
 
 /// What is found with both guesses of a number.
@@ -151,34 +170,29 @@ fn search(guess: Guess, source: &Source, read: &Reader<'_>) -> Found {
     let mut shown = Shown { errors: Vec::new(), unsure: Vec::new(), is_whole: false };
     let mut mended: Vec<String> = Vec::new();
     for _ in 0..readings(&source.text) {
-        let Err(error) = read(Source { path: source.path.clone(), text: draft.text.clone() }) else {
+        let Err(errors) = read(Source { path: source.path.clone(), text: draft.text.clone() }) else {
             shown.is_whole = true;
             break;
         };
-        let place = error.line().filter(|_| error.path() == source.path);
-        let Some(line) = place else {
-            // The error of another file, which this one names.
-            shown.errors.push(error);
-            break;
-        };
-        let wrong = Wrong::of(&error);
-        if let Some(key) = Misspelt::of(&draft, line, &wrong) {
-            let error = key.named_by(error);
-            return Found::Misspelt { key, error };
-        }
-        let (is_of_file, is_sure) = match wrong {
-            _ if draft.is_unchanged() => (true, true),
-            Wrong::Name { .. } => (draft.has_its_names(), true),
-            Wrong::Length { .. } | Wrong::Meaning { .. } | Wrong::Other => (draft.differs_in_numbers(), false),
-            _ => (true, true),
-        };
-        if is_of_file && !draft.is_guessed(line, &wrong) {
-            let error = error.with_line(draft.line_of_file(line));
-            if !is_sure {
-                shown.unsure.push(error.to_string());
+        let place = |error: &ConfigError| error.line().filter(|_| error.path() == source.path);
+        let mut first = None;
+        for error in errors {
+            let Some(line) = place(&error) else {
+                // The error of another file, which this one names.
+                shown.errors.push(error);
+                continue;
+            };
+            let wrong = Wrong::of(&error);
+            if first.is_none() {
+                if let Some(key) = Misspelt::of(&draft, line, &wrong) {
+                    let error = key.named_by(error);
+                    return Found::Misspelt { key, error };
+                }
+                first = Some((line, wrong.clone()));
             }
-            shown.errors.push(error);
+            shown.add(error, line, &wrong, &draft);
         }
+        let Some((line, wrong)) = first else { break };
         let attempt = format!("{line} {wrong:?}");
         let attempts = mended.iter().filter(|other| **other == attempt).count();
         if attempts >= MENDED_MAX || !draft.mend(line, &wrong, attempts) {

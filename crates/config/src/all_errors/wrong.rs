@@ -85,13 +85,15 @@ impl Wrong {
                     names.next().map_or(Self::Other, |key| Self::Unknown { key, known: names.collect() })
                 }
                 message if message.starts_with("this looks like a") => Self::Kind,
-                message if message.ends_with(" must name the channel") => {
-                    let table = quoted(message).and_then(|key| Some(key.rsplit_once('.')?.0.to_owned()));
-                    Self::Missing { table, key: "name".to_owned() }
-                }
-                message if message.starts_with('`') && message.contains("` is ") => {
-                    quoted(message).map_or(Self::Other, |key| Self::Range { key, within: [1.0, 2.0] })
-                }
+                message if message.starts_with("channel `") => Self::Value { key: "unit".to_owned() },
+                // A value of a channel map.
+                message if message.starts_with('`') => quoted(message).map_or(Self::Other, |key| {
+                    let value = message.split_once("` is ").and_then(|(_, rest)| rest.split([',', '\n']).next());
+                    match value.and_then(|value| value.trim().parse::<f64>().ok()) {
+                        Some(_) => Self::Range { key, within: [1.0, 2.0] },
+                        None => Self::Value { key },
+                    }
+                }),
                 message if message.starts_with("missing field `") => {
                     quoted(message).map_or(Self::Other, |key| Self::Missing { table: None, key })
                 }
@@ -118,6 +120,9 @@ fn is_of_value_alone(message: &str) -> bool {
         " does not contain ",
         "has no such command",
         " must be two numbers",
+        "` must be above 0",
+        "`levels` must be",
+        "`chance` must be",
         "expected an integer",
         "a table needs at least",
         "must begin with `car.`",

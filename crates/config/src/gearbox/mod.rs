@@ -61,24 +61,39 @@ impl GearboxFile {
     /// # Errors
     /// What is wrong, with its line and a hint.
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
+        Self::checked(source).map_err(|mut errors| errors.swap_remove(0))
+    }
+
+    /// The same, with all that is wrong with a gearbox whose keys, types and numbers are right.
+    ///
+    /// # Errors
+    /// At least one.
+    pub fn checked(source: Source) -> Result<Self, Vec<ConfigError>> {
+        let Read { description, spans } = read(&source).map_err(|error| vec![error])?;
         let check = Check::of(&source);
-        let head: RawHead = source.parse()?;
-        let level = head.level.as_ref().and_then(|level| level.get_ref().as_str());
-        let read = match level {
-            Some("stick-diagram") => convert::stick_diagram(&check, &source.parse::<RawStickDiagram>()?)?,
-            Some("shares") => convert::shares(&check, &source.parse::<RawShares>()?)?,
-            Some("ratios") => convert::ratios(&check, &source.parse::<RawRatios>()?)?,
-            _ => {
-                let at = head.level.as_ref().map_or(0, |level| level.span().start);
-                let message = if head.level.is_some() { "there is no such level" } else { "missing `level`" };
-                let error = check.meaning("level", at, message.to_owned(), Some(LEVELS.to_owned()));
-                return Err(source.unless_other(Kind::Gearbox, error));
-            }
-        };
-        let Read { description, spans } = read;
-        let gearbox = Gearbox::new(&description).map_err(|finding| meaning(&check, &spans, &finding))?;
-        let warnings = gearbox.warnings.iter().map(|finding| meaning(&check, &spans, finding).to_string()).collect();
+        let placed = |finding: &Finding| meaning(&check, &spans, finding);
+        let gearbox =
+            Gearbox::checked(&description).map_err(|findings| findings.iter().map(placed).collect::<Vec<_>>())?;
+        let warnings = gearbox.warnings.iter().map(|finding| placed(finding).to_string()).collect();
         Ok(Self { source, gearbox, warnings })
+    }
+}
+
+/// What a file describes, and where.
+fn read(source: &Source) -> Result<Read, ConfigError> {
+    let check = Check::of(source);
+    let head: RawHead = source.parse()?;
+    let level = head.level.as_ref().and_then(|level| level.get_ref().as_str());
+    match level {
+        Some("stick-diagram") => convert::stick_diagram(&check, &source.parse::<RawStickDiagram>()?),
+        Some("shares") => convert::shares(&check, &source.parse::<RawShares>()?),
+        Some("ratios") => convert::ratios(&check, &source.parse::<RawRatios>()?),
+        _ => {
+            let at = head.level.as_ref().map_or(0, |level| level.span().start);
+            let message = if head.level.is_some() { "there is no such level" } else { "missing `level`" };
+            let error = check.meaning("level", at, message.to_owned(), Some(LEVELS.to_owned()));
+            Err(source.unless_other(Kind::Gearbox, error))
+        }
     }
 }
 

@@ -10,7 +10,12 @@ use super::{BENCH, EXPERIMENT, VEHICLE, line_of};
 type Reader = dyn Fn(Source) -> Result<(), ConfigError>;
 
 fn errors(text: &str, read: &Reader) -> Vec<String> {
-    all_errors(&Source::built_in("f.toml", text), read).iter().map(ToString::to_string).collect()
+    all_of(&Source::built_in("f.toml", text), read).iter().map(ToString::to_string).collect()
+}
+
+/// All errors by a reader that ends at the first one.
+fn all_of(source: &Source, read: &(dyn Fn(Source) -> Result<(), ConfigError> + '_)) -> Vec<ConfigError> {
+    all_errors(source, &|source| read(source).map_err(|error| vec![error]))
 }
 
 /// Whether one of the errors is at the line of a part of the text, and begins so.
@@ -69,7 +74,7 @@ fn values_that_are_far_off_in_many_tables_are_all_named() {
     let read = |source: Source| CarFile::from_source(Source { path: car.clone().into(), ..source }).map(drop);
     let of_car = |text: &str| {
         let source = Source { path: car.clone().into(), text: text.to_owned() };
-        all_errors(&source, &|source| read(source)).iter().map(ToString::to_string).collect::<Vec<_>>()
+        all_of(&source, &|source| read(source)).iter().map(ToString::to_string).collect::<Vec<_>>()
     };
     let far = [
         ("mass_kg = 1500", "mass_kg = -1"),
@@ -175,14 +180,54 @@ fn every_kind_of_file_names_all_of_its_errors() {
 }
 
 #[test]
+fn a_gearbox_file_names_all_that_is_wrong_with_its_parts() {
+    let file = include_str!("../../../../gearboxes/8hp.toml");
+    let of_gears = [
+        ("engaged = [\"A\", \"B\", \"E\"]", "engaged = [\"A\"]"),
+        ("stated_ratio = 2.1039", "stated_ratio = 2.3"),
+        ("engaged = [\"B\", \"D\", \"E\"]", "engaged = [\"B\", \"D\", \"Q\"]"),
+        ("sun_teeth = 69, ring_teeth = 111", "sun_teeth = 111, ring_teeth = 69"),
+        (
+            "kind = \"brake\"\ninput = \"housing\"\noutput = \"sun12\"",
+            "kind = \"brake\"\ninput = \"c3\"\noutput = \"sun12\"",
+        ),
+        ("sun = \"sun12\", carrier = \"c1\"", "sun = \"sun13\", carrier = \"c1\""),
+        ("inertia_kg_m2 = 0.0085", "inertia_kg_m2 = -1"),
+        ("mean_radius_m = 0.095", "mean_radius_m = 95"),
+        ("return_spring_n = 1500", "return_spring = 1500"),
+    ];
+    let read = |text: &str| {
+        let errors = all_errors(&Source::built_in("f.toml", text), &|source| GearboxFile::checked(source).map(drop));
+        errors.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let alone = |&(of, to): &(&str, &str)| {
+        let found = read(&changed(file, &[(of, to)]));
+        assert_eq!(found.len(), 1, "{to}: {found:#?}");
+        found[0].clone()
+    };
+    let alone: Vec<String> = of_gears.iter().map(alone).collect();
+    for (i, one) in of_gears.iter().enumerate() {
+        for (k, other) in of_gears.iter().enumerate().take(i) {
+            let found = read(&changed(file, &[*one, *other]));
+            // The ratio of a gear is known only where its shafts and teeth are.
+            let has_ratio = |nth: usize| nth != 1 || [i, k].iter().all(|nth| [0, 1, 2, 6, 7, 8].contains(nth));
+            let expected: Vec<&String> =
+                [i, k].into_iter().filter(|&nth| has_ratio(nth)).map(|nth| &alone[nth]).collect();
+            assert!(expected.iter().all(|error| found.contains(error)), "{one:?} {other:?}: {found:#?}");
+            assert_eq!(found.len(), expected.len(), "{one:?} {other:?}: {found:#?}");
+        }
+    }
+}
+
+#[test]
 fn the_errors_of_a_file_that_another_one_names_are_said_once() {
     let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml"));
     let source = Source::read(path).unwrap();
     let read = |source| CarFile::from_source(source).map(drop);
     let text = source.text.replacen("mass_kg = ", "mas_kg = ", 1).replacen("8hp.toml", "none.toml", 1);
-    let found = all_errors(&Source { text, ..source.clone() }, &read);
+    let found = all_of(&Source { text, ..source.clone() }, &read);
     assert_eq!(found.len(), 2, "{found:#?}");
-    assert!(all_errors(&source, &read).is_empty());
+    assert!(all_of(&source, &read).is_empty());
 }
 
 /// Cut, doubled and garbled files end, and every error is of a line that the file has.
@@ -197,7 +242,7 @@ fn files_with_any_damage_have_errors_at_their_lines() {
             format!("{head} 1e999 {tail}"),
         ] {
             let lines = text.lines().count().max(1);
-            for error in all_errors(&Source::built_in("f.toml", &text), &vehicle) {
+            for error in all_of(&Source::built_in("f.toml", &text), &vehicle) {
                 assert!(error.line().is_some_and(|line| (1..=lines).contains(&line)), "{error}");
             }
         }
@@ -296,7 +341,7 @@ fn a_misspelt_key_is_the_only_error_of_a_file_of_any_kind() {
 }
 
 fn errors_of(path: &str, text: &str) -> Vec<String> {
-    all_errors(&Source::built_in(path, text), &any_kind).iter().map(ToString::to_string).collect()
+    all_of(&Source::built_in(path, text), &any_kind).iter().map(ToString::to_string).collect()
 }
 
 #[test]
