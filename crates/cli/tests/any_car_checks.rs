@@ -1,7 +1,7 @@
 //! What is said of a log of a drive that is not as it should be: channels, rows, gears.
 
 use crate::any_car::{column, estimate, numbers, simulated, with_column};
-use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, refused, said, wetclutch};
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, refused, said, stderr, stdout, wetclutch};
 
 #[test]
 fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
@@ -40,9 +40,12 @@ fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
     folder.write("log.csv", first);
     said(&estimate(&folder, "log.csv", &["-o", &folder.path("row.csv")]));
     assert_eq!(folder.read("row.csv").lines().count(), 2);
-    for option in [["--observer", "rigid"], ["--method", "iss"]] {
-        let error = refused(&estimate(&folder, "log.csv", &option));
-        assert!(error.contains("has no effect with the vehicle file of a car with a gearbox"), "{error}");
+    let plain = stdout(&estimate(&folder, "log.csv", &[]));
+    for option in [["--observer", "rigid"], ["--method", "iss"], ["--observer", "gearbox"]] {
+        let output = estimate(&folder, "log.csv", &option);
+        let warning = format!("warning: {} has no effect: a car with a gearbox has the gearbox filter", option[0]);
+        assert!(stderr(&output).contains(&warning), "{}", stderr(&output));
+        assert_eq!(stdout(&output), plain);
     }
 }
 

@@ -66,7 +66,7 @@ fn an_output_that_cannot_be_is_answered() {
     let folder = Folder::new("outputs");
     let log = folder.write("log.csv", text(&rows(&folder), ","));
     let out = |name: &str| folder.path(name);
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 5] = [
         (
             &["-o", &out("x.xlsx")],
             "no table is written as .xlsx\nhint: estimates are CSV (.csv), Parquet (.parquet) or MDF (.mf4)",
@@ -75,10 +75,6 @@ fn an_output_that_cannot_be_is_answered() {
         (&["-o", &out("x.csv"), "--format", "parquet"], "the name is not that of a file in --format parquet"),
         (&["-o", &out("x.mf4"), "--format", "csv"], "the name is not that of a file in --format csv"),
         (&["--format", "mf4"], "--format mf4 needs a file"),
-        (
-            &["-o", &out("x.csv"), "--sensors", &format!("{ROOT}experiments/bench.toml"), "--observer", "rigid"],
-            "--sensors has no effect with this observer",
-        ),
     ];
     for (options, message) in cases {
         let text = refused(&estimate(&log, options));

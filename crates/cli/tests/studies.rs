@@ -198,6 +198,10 @@ fn a_run_can_be_made_again_with_all_its_signals() {
     assert!(!printed.contains("pressure_rms_pa"), "{printed}");
     assert!(Path::new(&again).join(format!("run_{number}.svg")).exists());
     assert!(Path::new(&again).join(format!("run_{number}_peak-to-peak.csv")).exists());
+    // A car of a study of any gearbox has many shifts: `demo` shows one.
+    let of_cars = format!("{}experiments/eight_speed_ftp_75.toml", support::ROOT);
+    let message = refused(&["study", &of_cars, "--run", "0", "-o", &study.path("cars")]);
+    assert!(message.contains("--run is for a study of one shift\nhint: `wetclutch demo --vehicle"), "{message}");
 }
 
 #[test]

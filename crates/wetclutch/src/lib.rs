@@ -43,8 +43,8 @@ pub use table::{Column, Table, Values};
 pub use text::{grouped, shell_quoted};
 pub use trace::{Cell, TableRows};
 pub use vehicle::{
-    TemplateNumbers, VehicleFile, drive_of, gearboxes, learnt_without_effect, method_named, observer_named, read_drive,
-    read_sensors, sensors_of, simulated_sensors_of,
+    TemplateNumbers, VehicleFile, drive_of, gearboxes, method_named, observer_named, read_drive, read_sensors,
+    sensors_of, simulated_sensors_of,
 };
 pub use words::{Codes, Words};
 

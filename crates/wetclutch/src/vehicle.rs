@@ -259,7 +259,7 @@ pub(crate) fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
 }
 
 /// Refuses what was learnt with a vehicle file that does not use it.
-pub fn learnt_without_effect() -> Error {
+pub(crate) fn learnt_without_effect() -> Error {
     Error::Input(
         "--learnt has no effect with the vehicle file of one shift\n\
          hint: leave it out; the filter of a car with a gearbox, such as vehicles/eight_speed.toml, keeps what it learns"

@@ -82,7 +82,7 @@ fn check_file(options: &Check, file: &Path) -> Result<(), Failure> {
         return Err(Failure::Input(message));
     }
     if options.sensors.is_some() && kind != Kind::Car {
-        return Err(super::sensors_without_effect());
+        super::warn_of_sensors();
     }
     if options.all && !matches!(kind, Kind::Car | Kind::Vehicle) {
         super::warn_without_effect(

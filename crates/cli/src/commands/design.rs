@@ -12,6 +12,7 @@ use wetclutch::gains::{GainUse, PhaseDesign, design_shift};
 use super::design_car::of_car;
 use super::page::{check_page, write_page};
 use crate::args::Design;
+use crate::commands::warn_without_effect;
 use crate::failure::Failure;
 use crate::output;
 
@@ -21,8 +22,7 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
         return of_car(options);
     }
     if options.shift.is_some() {
-        let message = "--shift has an effect with the vehicle file of a car with a gearbox alone\nhint: leave it out";
-        return Err(Failure::Input(message.to_owned()));
+        warn_without_effect("--shift", "the vehicle file is of one shift");
     }
     let vehicle = match &options.bounds {
         Some(bounds) => VehicleFile::read_with(&options.vehicle, bounds)?,
@@ -39,7 +39,7 @@ pub(super) fn of_vehicle(
     options: &Design,
     about: &[String],
 ) -> Result<Vec<OffsetMissed>, Failure> {
-    options_apply(options)?;
+    warn_of_unused(options);
     let designed = design_shift(vehicle, options.phases(), &options.library())?;
     let text: Vec<String> = designed.phases.iter().flat_map(|(phase, design)| lines(*phase, design)).collect();
     if options.json {
@@ -82,23 +82,20 @@ fn lines(phase: Phase, design: &PhaseDesign) -> Vec<String> {
     }
 }
 
-/// Refuses an option that the method does not use.
-pub(super) fn options_apply(options: &Design) -> Result<(), Failure> {
-    let Some(unused) = options.library().without_effect() else { return Ok(()) };
-    let option = match unused {
-        "kappa1_per_s" => "kappa1",
-        "kappa2_per_s" => "kappa2",
-        "offset_max_pa" => "offset-max",
-        "error_bound" => "error-bound",
-        "quantity" => "bound-on",
-        "sample_time_s" => "sample-time",
-        other => other,
-    };
-    Err(Failure::Input(format!(
-        "--{option} has no effect with this observer and method\n\
-         hint: --kappa1, --kappa2, --error-bound and --offset-max are for `--method iss`; --bound-on and --sample-time are \
-         for the other methods; `--observer sliding` uses none of them"
-    )))
+/// Warns of the options that the observer and the method do not use.
+pub(super) fn warn_of_unused(options: &Design) {
+    for unused in options.library().without_effect() {
+        let (option, used_by) = match unused {
+            "kappa1_per_s" => ("--kappa1", "`--method iss`"),
+            "kappa2_per_s" => ("--kappa2", "`--method iss`"),
+            "offset_max_pa" => ("--offset-max", "`--method iss`"),
+            "error_bound" => ("--error-bound", "`--method iss`"),
+            "quantity" => ("--bound-on", "the methods in discrete time"),
+            "sample_time_s" => ("--sample-time", "the methods in discrete time"),
+            _ => ("--method", "the rigid and the compliant observer"),
+        };
+        warn_without_effect(option, &format!("it is for {used_by}"));
+    }
 }
 
 /// In place of a bound on the offset, which leaves out the errors of the valve, if they are all that there is.

@@ -8,7 +8,7 @@ use report::tables::phase_name;
 use serde_json::{Map, Value, json};
 use trace::{ShownPath as _, units};
 
-use super::design::{not_met, of_vehicle, options_apply};
+use super::design::{not_met, of_vehicle, warn_of_unused};
 use super::progress;
 use crate::args::{Design, DesignChoice, MethodChoice};
 use crate::failure::Failure;
@@ -156,7 +156,7 @@ fn model_of(options: &Design, method: MethodChoice) -> Result<Model, Failure> {
     if method == MethodChoice::Iss {
         return Err(Failure::Input(format!("`--method iss` has no bound for a sample time{hint}")));
     }
-    options_apply(&Design { method: Some(method), ..options.clone() })?;
+    warn_of_unused(&Design { method: Some(method), ..options.clone() });
     Ok(model)
 }
 

@@ -95,10 +95,9 @@ fn without_effect(option: &str, why: &str) -> String {
     format!("warning: {option} has no effect: {why}\nhint: leave it out")
 }
 
-/// `--sensors` where nothing is read by sensors.
-fn sensors_without_effect() -> Failure {
-    let message = "--sensors has an effect with the vehicle file of a car with a gearbox alone\nhint: leave it out";
-    Failure::Input(message.to_owned())
+/// Warns of `--sensors` where nothing is read by sensors.
+fn warn_of_sensors() {
+    warn_without_effect("--sensors", "it is for the vehicle file of a car with a gearbox");
 }
 
 /// Writes rows of named cells as a comma-separated file, whole or not at all.

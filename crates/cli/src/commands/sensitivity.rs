@@ -16,7 +16,7 @@ use super::car::no_shift;
 use super::matrix::sensors_or_bench;
 use crate::args::SensitivityOptions;
 use crate::browser;
-use crate::commands::{read_car, replaceable, sensors_without_effect, write_text};
+use crate::commands::{read_car, replaceable, warn_of_sensors, write_text};
 use crate::failure::Failure;
 use crate::output;
 use trace::quantity;
@@ -26,10 +26,12 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
     options.output.as_deref().map(|folder| replaceable(folder, &["sensitivity.html"])).transpose()?;
     let vehicle = match &options.vehicle {
         Some(path) if Source::read(path)?.kind()? == Kind::Car => return of_car(options, path),
-        _ if options.sensors.is_some() => return Err(sensors_without_effect()),
         Some(path) => VehicleFile::read(path)?,
         None => VehicleFile::built_in()?,
     };
+    if options.sensors.is_some() {
+        warn_of_sensors();
+    }
     let (phases, valve, shaft) = (find(&vehicle), valve_alone(&vehicle), shaft_level(&vehicle));
     if let Some(page) = page_of(options) {
         write_text(&page, &sensitivity_page(&phases, &valve, &shaft, &vehicle)?)?;

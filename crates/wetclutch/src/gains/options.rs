@@ -90,8 +90,8 @@ impl DesignOptions {
         }
     }
 
-    /// The first option that is given and has no effect with this observer and method, by its name here.
-    pub fn without_effect(&self) -> Option<&'static str> {
+    /// The options that are given and have no effect with this observer and method, by their names here.
+    pub fn without_effect(&self) -> impl Iterator<Item = &'static str> {
         let is_sliding = self.observer == DesignObserver::Sliding;
         let is_discrete = self.method.unwrap_or_default() != GainMethod::Iss;
         let required = [
@@ -107,12 +107,12 @@ impl DesignOptions {
             ("sample_time_s", self.sample_time_s.is_some() && is_continuous),
             ("method", self.method.is_some() && is_sliding),
         ];
-        required.into_iter().chain(sampled).find_map(|(name, is_unused)| is_unused.then_some(name))
+        required.into_iter().chain(sampled).filter_map(|(name, is_unused)| is_unused.then_some(name))
     }
 
     /// Refuses what is out of range or has no effect.
     pub(super) fn check(&self) -> Result<(), Error> {
-        if let Some(option) = self.without_effect() {
+        if let Some(option) = self.without_effect().next() {
             let message = format!("{option} has no effect with this observer and method\nhint: leave it out");
             return Err(Error::Input(message));
         }
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn options_without_effect_are_named() {
         let rigid = DesignOptions::of(DesignObserver::Rigid);
-        assert_eq!(rigid.without_effect(), None);
+        assert_eq!(rigid.without_effect().next(), None);
         let sampled = DesignOptions { method: Some(GainMethod::Interval), ..rigid.clone() };
         let sliding = DesignOptions::of(DesignObserver::Sliding);
         for (options, expected) in [
@@ -191,7 +191,7 @@ mod tests {
             (DesignOptions { method: Some(GainMethod::Iss), ..sliding.clone() }, Some("method")),
             (sliding, None),
         ] {
-            assert_eq!(options.without_effect(), expected, "{options:?}");
+            assert_eq!(options.without_effect().next(), expected, "{options:?}");
         }
     }
 

@@ -4,28 +4,20 @@ use std::path::Path;
 
 use config::CarFile;
 use report::drive_page::{findings, shift_cells, shift_rows, shift_words};
-use trace::{Cell, ShownPath as _};
+use trace::Cell;
 use wetclutch::EstimateOptions;
 use wetclutch::estimate::gearbox::{self, DriveEstimates};
 
 use super::learnt::{self, Kept};
 use super::outputs::beside;
 use super::{Messages, SHOWN, Setup, destination, finish, shift_lines};
-use crate::args::Estimate;
 use crate::commands::{JsonObject, write_cells, write_json_list};
 use crate::failure::Failure;
 
-/// Refuses options that have no effect with such a car.
-pub(super) fn check(arguments: &Estimate, file: &CarFile, options: &EstimateOptions) -> Result<(), Failure> {
+/// Refuses options that cannot be used with such a car.
+pub(super) fn check(learnt: Option<&Path>, file: &CarFile, options: &EstimateOptions) -> Result<(), Failure> {
     gearbox::Setup::new(file, options)?;
-    let Some(path) = &arguments.learnt else { return Ok(()) };
-    if file.gearbox.has_ratios_alone() {
-        let vehicle = arguments.vehicle.shown();
-        let message = format!("--learnt has no effect with {vehicle}: the ratios alone are known of its gearbox");
-        let hint = "leave it out; what is learnt is of clutches and valves, which such a gearbox file does not have";
-        return Err(Failure::Input(format!("{message}\nhint: {hint}")));
-    }
-    learnt::check(path, file)
+    learnt.map_or(Ok(()), |path| learnt::check(path, file))
 }
 
 /// Estimates a log, and says what was found and where it is.
@@ -36,7 +28,7 @@ pub(super) fn estimate(
     output: Option<&Path>,
     say: &mut Messages,
 ) -> Result<(), Failure> {
-    let learnt_file = setup.arguments.learnt.as_deref();
+    let learnt_file = setup.learnt;
     let learnt = learnt_file.map(|path| learnt::read(path, file)).transpose()?.flatten();
     let options = EstimateOptions { learnt, ..setup.options_for(output) };
     let prepared = gearbox::Setup::new(file, &options)?;

@@ -12,11 +12,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use config::{Kind, Source};
 use logs::ChannelMap;
 use serde_json::{Value, json};
 use trace::{Cell, ShownPath as _};
 use wetclutch::estimate::LogInput;
+use wetclutch::estimate::one_shift::observer::{has_gains, is_filter};
 use wetclutch::{Destination, EstimateOptions, VehicleFile};
 
 use self::earlier::replaces_only_estimates;
@@ -24,7 +24,9 @@ use self::outputs::{beside, remove_old};
 use crate::args::{Estimate, FormatChoice};
 use crate::browser;
 use crate::commands::assumed::{detail_of_map, detail_of_vehicle};
-use crate::commands::{JsonObject, channel_map_of_car, check_output, not_an_input, without_effect, write_text};
+use crate::commands::{
+    JsonObject, channel_map_of_car, check_output, not_an_input, warn_without_effect, without_effect, write_text,
+};
 use crate::failure::Failure;
 use crate::output;
 use crate::signals::stop_then_end;
@@ -35,6 +37,8 @@ const SHOWN: usize = 40;
 /// What is common to all logs of a command.
 struct Setup<'a> {
     arguments: &'a Estimate,
+    /// The file of what was learnt, where the car uses it.
+    learnt: Option<&'a Path>,
     vehicle: VehicleFile,
     map: ChannelMap,
     options: EstimateOptions,
@@ -181,9 +185,6 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
             format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.shown());
         return Err(Failure::Input(message));
     }
-    if Source::read(&options.vehicle)?.kind()? != Kind::Car && options.learnt.is_some() {
-        return Err(wetclutch::learnt_without_effect());
-    }
     each_log(options, || setup(options), estimate_log)
 }
 
@@ -228,7 +229,8 @@ fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
 }
 
 fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
-    let options = EstimateOptions {
+    let vehicle = VehicleFile::read(&arguments.vehicle)?;
+    let mut options = EstimateOptions {
         observer: arguments.observer.kind(),
         method: arguments.method.map(Into::into),
         sensors: arguments.sensors.as_deref().map(wetclutch::read_sensors).transpose()?,
@@ -241,15 +243,50 @@ fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
         rows_done: None,
         follow: stop(arguments)?,
     };
-    let vehicle = VehicleFile::read(&arguments.vehicle)?;
+    let mut learnt = arguments.learnt.as_deref();
+    without_unused(&mut options, &mut learnt, &vehicle);
     match &vehicle {
-        VehicleFile::Gearbox(file) => gearbox::check(arguments, file, &options)?,
+        VehicleFile::Gearbox(file) => gearbox::check(learnt, file, &options)?,
         VehicleFile::OneShift(file) => drop(wetclutch::estimate::one_shift::Setup::new(file, &options)?),
     }
     let map = channel_map_of_car(&arguments.mapping, vehicle.wheel_radius_m())?;
     detail_of_vehicle(&vehicle);
     detail_of_map(&map);
-    Ok(Setup { arguments, vehicle, map, options })
+    Ok(Setup { arguments, learnt, vehicle, map, options })
+}
+
+/// Takes out the options that have no effect with a car, and warns of them.
+fn without_unused(options: &mut EstimateOptions, learnt: &mut Option<&Path>, vehicle: &VehicleFile) {
+    let mut unused: Vec<(&str, &str)> = Vec::new();
+    let mut take = |is_given: bool, option, why| {
+        if is_given {
+            unused.push((option, why));
+        }
+    };
+    match vehicle {
+        VehicleFile::Gearbox(file) => {
+            let only =
+                "a car with a gearbox has the gearbox filter, which also writes the estimate of the valve model alone";
+            take(options.observer.take().is_some(), "--observer", only);
+            take(options.method.take().is_some(), "--method", only);
+            if file.gearbox.has_ratios_alone() {
+                let why = "what is learnt is of clutches and valves, and the ratios alone are known of this gearbox";
+                take(learnt.take().is_some(), "--learnt", why);
+            }
+        }
+        VehicleFile::OneShift(_) => {
+            let why = "a vehicle file of one shift keeps nothing that is learnt; the file of a car with a gearbox does";
+            take(learnt.take().is_some(), "--learnt", why);
+            if !options.observer.is_some_and(has_gains) {
+                take(options.method.take().is_some(), "--method", "it is for `--observer rigid` and `compliant`");
+            }
+            if options.observer.is_some_and(|observer| !is_filter(observer)) {
+                let why = "it is for `--observer` gearbox, kalman, extended and unscented";
+                take(options.sensors.take().is_some(), "--sensors", why);
+            }
+        }
+    }
+    unused.into_iter().for_each(|(option, why)| warn_without_effect(option, why));
 }
 
 /// What is set when a log that is followed is to end.

@@ -27,7 +27,7 @@ const PAGE: &str = "study.html";
 
 pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
     if options.run.is_some() {
-        let message = "--run has no effect on a study of a car with a gearbox\nhint: `wetclutch demo --vehicle CAR --drive DRIVE --seed N` shows one car with every shift";
+        let message = "--run is for a study of one shift\nhint: `wetclutch demo --vehicle CAR --drive DRIVE --seed N` shows one car with every shift";
         return Err(Failure::Input(message.to_owned()));
     }
     let _lock = lock(&options.output)?;

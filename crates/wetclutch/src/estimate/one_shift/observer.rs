@@ -21,8 +21,7 @@ pub(crate) struct Chosen {
 
 /// Refuses options that have no effect together.
 pub(crate) fn check_options(options: &EstimateOptions) -> Result<(), Error> {
-    let designed = matches!(options.observer, Some(ObserverKind::Rigid | ObserverKind::Compliant));
-    if options.method.is_some() && !designed {
+    if options.method.is_some() && !options.observer.is_some_and(has_gains) {
         return Err(Error::Input(
             "--method has no effect with this observer\n\
              hint: use it with `--observer rigid` or `--observer compliant`"
@@ -46,7 +45,13 @@ fn sensors_without_effect() -> Error {
     )
 }
 
-fn is_filter(kind: ObserverKind) -> bool {
+/// Whether its gains come from a design method that a caller may choose.
+pub fn has_gains(kind: ObserverKind) -> bool {
+    matches!(kind, ObserverKind::Rigid | ObserverKind::Compliant)
+}
+
+/// Whether it is a filter, which knows how the speeds are read.
+pub fn is_filter(kind: ObserverKind) -> bool {
     [ObserverKind::Gearbox, ObserverKind::Kalman, ObserverKind::Extended, ObserverKind::Unscented].contains(&kind)
 }
 
