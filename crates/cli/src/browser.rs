@@ -14,11 +14,21 @@ pub(crate) fn open_if(is_wanted: bool, page: &Path) {
     }
 }
 
+/// The same of a page with an address.
+pub(crate) fn open_address_if(is_wanted: bool, address: &str) {
+    if is_wanted {
+        open_place(Path::new(address));
+    }
+}
+
 fn open(page: &Path) {
     // The whole path: a name may begin with a dash.
-    let place = std::fs::canonicalize(page).unwrap_or_else(|_| page.to_owned());
-    let opened = has_desktop()
-        && opener(&place).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().is_ok();
+    open_place(&std::fs::canonicalize(page).unwrap_or_else(|_| page.to_owned()));
+}
+
+fn open_place(place: &Path) {
+    let opened =
+        has_desktop() && opener(place).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().is_ok();
     if !opened {
         output::note(&format!(
             "--open: there is no desktop to open the page on\nhint: open {} in a browser",

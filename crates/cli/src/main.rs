@@ -78,6 +78,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Inspect(options) => commands::inspect(&options),
         Command::Convert(options) => commands::convert(&options),
         Command::Estimate(options) => commands::estimate(&options),
+        Command::Watch(options) => commands::watch(&options),
         Command::Fit(options) => commands::fit(&options),
         Command::Init(options) => commands::init(&options),
         Command::Reproduce(options) => commands::reproduce(&options),

@@ -14,7 +14,7 @@ use crate::failure::Failure;
 /// Removes unfinished files when an interrupt, SIGTERM, SIGQUIT or the end of its terminal (SIGHUP) ends the program. A log that is
 /// followed ends on the first of them as if it were complete, see [`stop_then_end`].
 pub(crate) fn end_cleanly(command: &Command) -> Result<(), Failure> {
-    if matches!(command, Command::Estimate(options) if options.follow) {
+    if matches!(command, Command::Estimate(options) if options.follow) || matches!(command, Command::Watch(_)) {
         return Ok(());
     }
     let mut signals = signals()?;

@@ -52,5 +52,6 @@ mod studies;
 mod support;
 mod tables;
 mod units;
+mod watch;
 mod write_map;
 mod wrong_maps;

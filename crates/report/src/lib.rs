@@ -10,6 +10,7 @@ pub mod fit_page;
 pub mod gearbox_figure;
 mod interactive;
 mod legend;
+mod live_page;
 pub mod log_page;
 pub mod map_figures;
 pub mod matrix_page;
@@ -29,6 +30,7 @@ mod svg_text;
 pub mod tables;
 mod words;
 
+pub use live_page::live_page;
 pub use log_page::LogPage;
 pub use page::{Page, PageError};
 pub use reproduction::Reproduction;

@@ -26,7 +26,7 @@ pub struct Page {
 }
 
 /// The templates of all pages.
-fn templates() -> Result<Environment<'static>, minijinja::Error> {
+pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
     let mut environment = Environment::new();
     environment.add_template("base.html", include_str!("../templates/base.html"))?;
     environment.add_template("style.css", include_str!("../templates/style.css"))?;
@@ -43,12 +43,13 @@ fn templates() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_template("sensitivity.html", include_str!("../templates/sensitivity.html"))?;
     environment.add_template("speeds.html", include_str!("../templates/speeds.html"))?;
     environment.add_template("study.html", include_str!("../templates/study.html"))?;
+    environment.add_template("watch.html", include_str!("../templates/watch.html"))?;
     Ok(environment)
 }
 
 /// The library that draws figures.
-const PLOTS: &str = include_str!("../vendor/uplot/uPlot.iife.min.js");
-const PLOTS_STYLE: &str = include_str!("../vendor/uplot/uPlot.min.css");
+pub(crate) const PLOTS: &str = include_str!("../vendor/uplot/uPlot.iife.min.js");
+pub(crate) const PLOTS_STYLE: &str = include_str!("../vendor/uplot/uPlot.min.css");
 /// What the page does with it, and with tables.
 const SCRIPT: &str = concat!(
     "(() => {\n\"use strict\";\n",

@@ -10,7 +10,7 @@ use wetclutch::estimate::{GearPair, ShiftChoice};
 use super::{MethodChoice, ObserverChoice, OpenOutput, PageChoice, Threads, within};
 
 /// Which channels of a log are which signals.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct Mapping {
     /// Messages and signals of a CAN log; replaces `dbc` of the map
     #[arg(long, value_name = "FILE.dbc")]
@@ -133,6 +133,55 @@ pub(crate) struct Estimate {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) threads: Threads,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Watch {
+    /// Log that is being written: CSV or a bus log as text; `-` is standard input
+    #[arg(value_name = "LOG")]
+    pub(crate) log: PathBuf,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
+    /// Vehicle file
+    #[arg(long)]
+    pub(crate) vehicle: PathBuf,
+    /// File whose table `sensors` describes the sensors of the log
+    #[arg(long, value_name = "SENSORS.toml")]
+    pub(crate) sensors: Option<PathBuf>,
+    /// Seconds that the figures show
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = within(1.0..=600.0))]
+    pub(crate) window: f64,
+    /// Also show a page in browsers on this computer, at this port of 127.0.0.1 [default: one that is free]
+    #[arg(long, value_name = "PORT", num_args = 0..=1)]
+    #[expect(clippy::option_option, reason = "the option may be given without a port")]
+    pub(crate) serve: Option<Option<u16>>,
+    /// With --serve: open the page in the browser
+    #[arg(long, requires = "serve")]
+    pub(crate) open: bool,
+}
+
+impl Watch {
+    /// The estimate that is watched.
+    pub(crate) fn estimate(&self) -> Estimate {
+        Estimate {
+            logs: vec![self.log.clone()],
+            mapping: self.mapping.clone(),
+            vehicle: self.vehicle.clone(),
+            observer: ObserverChoice::Best,
+            method: None,
+            sensors: self.sensors.clone(),
+            output: None,
+            open: OpenOutput { is_wanted: false },
+            learnt: None,
+            columns: Vec::new(),
+            shift: None,
+            shifts: Vec::new(),
+            follow: true,
+            format: None,
+            json: false,
+            threads: Threads::ALL,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

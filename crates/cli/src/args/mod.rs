@@ -14,7 +14,7 @@ use trace::ShownUnits;
 use crate::message::Colors;
 
 pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
-pub(crate) use logs::{Convert, Estimate, Fit, FormatChoice, Init, Inspect, LaunchChoice, Mapping};
+pub(crate) use logs::{Convert, Estimate, Fit, FormatChoice, Init, Inspect, LaunchChoice, Mapping, Watch};
 pub(crate) use studies::{
     Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,
     WorstCaseOptions, available_threads,
@@ -33,6 +33,7 @@ Examples:
   wetclutch design vehicles/eight_speed.toml                  in which upshifts the pressure is not observable
   wetclutch inspect drive.mf4                                 channels, units, rates and gaps of a log
   wetclutch estimate log.csv --vehicle my_car.toml            pressure from measured signals
+  wetclutch watch log.csv --vehicle my_car.toml               the same while the log is written
   wetclutch fit log.csv --vehicle my_car.toml -o fitted.toml  a vehicle file that fits the car
   wetclutch compare my_car.toml fitted.toml                   what differs between two files, or two runs
 
@@ -195,6 +196,19 @@ pub(crate) enum Command {
     /// its samples, or if the values of a signal contradict its unit.
     #[command(verbatim_doc_comment)]
     Estimate(Estimate),
+    /// Show the estimate of a log while it is written: in the terminal, and on a page
+    ///
+    /// Estimates a log that grows, or a pipe, as `estimate --follow` does, and shows the latest speeds, pressures and torques with
+    /// their ranges, the health, the last seconds as a figure, and the shifts. The screen is redrawn 20 times a second. The estimate is about
+    /// half a second behind the log: wrong readings are recognised by those after them. Ctrl-C ends it and prints the table of shifts.
+    ///
+    /// --serve shows the same on a page, to browsers on this computer alone: at 127.0.0.1, without requests of other sites, and nothing
+    /// can be changed there. With it no terminal is needed.
+    ///
+    ///   wetclutch watch drive.csv --vehicle car.toml
+    ///   candump -L can0 | wetclutch watch - --map map.toml --vehicle car.toml --serve --open
+    #[command(verbatim_doc_comment)]
+    Watch(Watch),
     /// Fit a vehicle file to logs of measured shifts
     ///
     /// Fits converter, clutches, valves, inertias, shafts, mass and delays to the logs. For a car with a gearbox it uses every

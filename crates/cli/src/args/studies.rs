@@ -145,6 +145,9 @@ pub(crate) fn available_threads() -> usize {
 }
 
 impl Threads {
+    /// As many as the machine has.
+    pub(crate) const ALL: Self = Self { threads: None };
+
     /// Whether a number was given.
     pub(crate) fn is_given(&self) -> bool {
         self.threads.is_some()

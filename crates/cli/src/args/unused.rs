@@ -53,7 +53,7 @@ impl Command {
             Self::Compare(of) => of.json,
             Self::Check(of) => of.json,
             Self::Export(of) => of.json,
-            Self::Completions(_) | Self::Man(_) => false,
+            Self::Watch(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
 
@@ -71,7 +71,7 @@ impl Command {
             Self::Design(of) => of.page.page.is_some(),
             Self::Fit(of) => of.page.page.is_some(),
             Self::Simulate(_) | Self::Convert(_) | Self::Init(_) | Self::Export(_) => false,
-            Self::Completions(_) | Self::Man(_) => false,
+            Self::Watch(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
 

@@ -36,6 +36,7 @@ mod simulate;
 mod simulate_drive;
 mod study;
 mod suggested;
+mod watch;
 mod worst_case;
 mod worst_case_page;
 mod written;
@@ -59,6 +60,7 @@ pub(crate) use sensitivity::sensitivity;
 pub(crate) use shell::{completions, man};
 pub(crate) use simulate::simulate;
 pub(crate) use study::{merge, study};
+pub(crate) use watch::watch;
 pub(crate) use worst_case::worst_case;
 pub(crate) use written::replace_any;
 

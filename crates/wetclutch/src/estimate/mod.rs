@@ -2,7 +2,8 @@
 
 pub mod gearbox;
 mod input;
-pub(crate) mod log_checks;
+pub(crate) mod live;
+mod log_checks;
 pub mod one_shift;
 pub(crate) mod output;
 pub mod selection;
@@ -12,6 +13,7 @@ use observer::gearbox::Learnt;
 use report::drive_page::shift_cells;
 
 pub use self::input::{EstimateOptions, InMemory, LogInput, shown_from_s};
+pub use self::live::{LiveCell, LiveRows};
 pub use self::log_checks::WITHOUT_SENSORS;
 pub use self::output::Destination;
 pub use self::selection::{GearPair, ShiftChoice};

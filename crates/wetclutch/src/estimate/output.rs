@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use trace::{Cell, ColumnKind, CsvWriter, TableWriter};
 
+use super::live::{LiveCell, LiveRows};
 use crate::memory_writer::MemoryWriter;
 use crate::{Error, Table};
 
@@ -17,9 +18,16 @@ pub enum Destination<'p> {
     Standard,
     /// A [`Table`].
     Memory,
+    /// Those who look at the rows as they come.
+    Live(&'p dyn LiveRows),
 }
 
 impl<'p> Destination<'p> {
+    /// Whether measured channels are columns without being named.
+    pub(crate) fn is_live(self) -> bool {
+        matches!(self, Self::Live(_))
+    }
+
     /// The file, if it is one.
     pub fn file(self) -> Option<&'p Path> {
         if let Self::File(path) = self { Some(path) } else { None }
@@ -27,19 +35,25 @@ impl<'p> Destination<'p> {
 }
 
 /// The table of the estimates.
-pub(crate) enum Output {
+pub(crate) enum Output<'p> {
     File(TableWriter, PathBuf),
     Standard(Box<CsvWriter<BufWriter<io::Stdout>>>),
     Memory(Box<MemoryWriter>),
+    Live(&'p dyn LiveRows, Vec<LiveCell>),
 }
 
-impl Output {
+impl<'p> Output<'p> {
     /// Begins a table with these columns.
     pub(crate) fn named<'a>(
-        destination: Destination<'_>,
+        destination: Destination<'p>,
         named: impl Iterator<Item = (&'a str, ColumnKind)>,
     ) -> Result<Self, Error> {
         match destination {
+            Destination::Live(rows) => {
+                let names: Vec<&str> = named.map(|(name, _)| name).collect();
+                rows.begin(&names);
+                Ok(Self::Live(rows, vec![LiveCell::Number(f64::NAN); names.len()]))
+            }
             Destination::Memory => Ok(Self::Memory(Box::new(MemoryWriter::new(named)))),
             Destination::File(path) => {
                 let writer = TableWriter::create(path, named).map_err(|error| Error::writing(path, &error))?;
@@ -67,6 +81,11 @@ impl Output {
                 writer.push(time_s, cells);
                 Ok(())
             }
+            Self::Live(rows, latest) => {
+                latest.iter_mut().zip(cells).for_each(|(cell, new)| cell.set(new));
+                rows.row(time_s, latest);
+                Ok(())
+            }
         }
     }
 
@@ -79,6 +98,7 @@ impl Output {
                 writer.push(time_s, numbers.iter().map(|number| Cell::Number(*number)).chain([Cell::SameWords]));
                 Ok(())
             }
+            Self::Live(..) => self.cells(time_s, numbers.iter().map(|number| Cell::Number(*number))),
         }
     }
 
@@ -87,7 +107,7 @@ impl Output {
         match self {
             Self::File(writer, path) => writer.flush().map_err(|error| Error::writing(path, &error)),
             Self::Standard(writer) => Ok(writer.flush()?),
-            Self::Memory(_) => Ok(()),
+            Self::Memory(_) | Self::Live(..) => Ok(()),
         }
     }
 
@@ -103,6 +123,7 @@ impl Output {
                 Ok(None)
             }
             Self::Memory(writer) => Ok(Some(writer.finish())),
+            Self::Live(..) => Ok(None),
         }
     }
 }

@@ -10,7 +10,7 @@ use wetclutch::estimate::gearbox::{self, DriveEstimates};
 
 use super::learnt::{self, Kept};
 use super::outputs::beside;
-use super::{Messages, SHOWN, Setup, destination, finish, shift_lines};
+use super::{Messages, SHOWN, Setup, finish, shift_lines};
 use crate::commands::{JsonObject, write_cells, write_json_list};
 use crate::failure::Failure;
 
@@ -32,7 +32,7 @@ pub(super) fn estimate(
     let learnt = learnt_file.map(|path| learnt::read(path, file)).transpose()?.flatten();
     let options = EstimateOptions { learnt, ..setup.options_for(output) };
     let prepared = gearbox::Setup::new(file, &options)?;
-    let found = gearbox::estimate(&prepared, setup.log(path), destination(output), &mut |note| say.note(note))?;
+    let found = gearbox::estimate(&prepared, setup.log(path), setup.destination(output), &mut |note| say.note(note))?;
     let places = output.and_then(beside).filter(|_| !found.drive.shifts.is_empty());
     let shifts = found.drive.shifts.iter();
     let cells: Vec<Vec<(String, Cell<'_>)>> = shifts.map(|shift| shift_cells(shift, file)).collect();
@@ -44,7 +44,7 @@ pub(super) fn estimate(
     let found = found.with_times_from_origin();
     report(&found, file, setup.is_output_free(output), say)?;
     found.said_of_sensors().into_iter().for_each(|sentence| say.note(sentence));
-    finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open.is_wanted, say)?;
+    finish(setup, output, places.as_ref(), || found.page(file, path), say)?;
     learnt_file.map_or(Ok(()), |path| Kept::of(path, file, &found.learnt).write(say))
 }
 

@@ -15,8 +15,8 @@ use std::sync::{Mutex, PoisonError};
 use logs::ChannelMap;
 use serde_json::{Value, json};
 use trace::{Cell, ShownPath as _};
-use wetclutch::estimate::LogInput;
 use wetclutch::estimate::one_shift::observer::{has_gains, is_filter};
+use wetclutch::estimate::{LiveRows, LogInput};
 use wetclutch::{Destination, EstimateOptions, VehicleFile};
 
 use self::earlier::replaces_only_estimates;
@@ -39,6 +39,8 @@ struct Setup<'a> {
     arguments: &'a Estimate,
     /// The file of what was learnt, where the car uses it.
     learnt: Option<&'a Path>,
+    /// Those who look at the rows, in place of standard output.
+    live: Option<&'a dyn LiveRows>,
     vehicle: VehicleFile,
     map: ChannelMap,
     options: EstimateOptions,
@@ -49,9 +51,17 @@ impl Setup<'_> {
         LogInput { path, memory: None, map: &self.map }
     }
 
+    fn destination<'o>(&'o self, output: Option<&'o Path>) -> Destination<'o> {
+        match (output, self.live) {
+            (Some(output), _) => Destination::File(output),
+            (None, Some(live)) => Destination::Live(live),
+            (None, None) => Destination::Standard,
+        }
+    }
+
     /// Whether the table of shifts goes to standard output.
     fn is_output_free(&self, output: Option<&Path>) -> bool {
-        output.is_some() && !self.arguments.json
+        (output.is_some() || self.live.is_some()) && !self.arguments.json
     }
 
     /// The shifts of a log in JSON, where they are wanted.
@@ -81,10 +91,6 @@ fn estimate_log(setup: &Setup<'_>, path: &Path, output: Option<&Path>, say: &mut
     }
 }
 
-fn destination(output: Option<&Path>) -> Destination<'_> {
-    output.map_or(Destination::Standard, Destination::File)
-}
-
 /// The table of shifts, its lines with the titles, and how many more there are.
 fn shift_lines(titles: &[String], rows: &[Vec<String>], more: usize) -> Vec<String> {
     let mut lines = output::titled_lines(3, titles, rows);
@@ -92,16 +98,20 @@ fn shift_lines(titles: &[String], rows: &[Vec<String>], more: usize) -> Vec<Stri
     lines
 }
 
-/// Writes the page beside the tables of shifts, or removes what an earlier estimate left there, and says where all is; `opens` the page.
+/// Writes the page beside the tables of shifts, or removes what an earlier estimate left there, says where all is, and opens the page where that
+/// is wanted.
 fn finish(
+    setup: &Setup<'_>,
     output: Option<&Path>,
     places: Option<&[PathBuf; 3]>,
     page: impl FnOnce() -> Result<Option<String>, Failure>,
-    opens: bool,
     say: &mut Messages,
 ) -> Result<(), Failure> {
+    let opens = setup.arguments.open.is_wanted;
     let Some(output) = output else {
-        say.note("estimate: on standard output");
+        if setup.live.is_none() {
+            say.note("estimate: on standard output");
+        }
         return Ok(());
     };
     say.note(&format!("estimate: {}", output.shown()));
@@ -141,7 +151,7 @@ impl Messages {
     }
 
     /// That are shown together.
-    fn held() -> Self {
+    pub(super) fn held() -> Self {
         Self { held: Some(Held::default()), result: None }
     }
 
@@ -164,7 +174,7 @@ impl Messages {
     }
 
     /// Shows what was held, of the log with this name.
-    fn show(self, log: &Path) -> Result<(), Failure> {
+    pub(super) fn show(self, log: &Path) -> Result<(), Failure> {
         let Held { notes, lines } = self.held.unwrap_or_default();
         if !notes.is_empty() {
             output::say(&format!("log: {}\n{}\n", log.shown(), notes.join("\n")));
@@ -185,7 +195,19 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
             format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.shown());
         return Err(Failure::Input(message));
     }
-    each_log(options, || setup(options), estimate_log)
+    let stop = stop(options)?;
+    each_log(options, || setup(options, None, stop.as_ref()), estimate_log)
+}
+
+/// Estimates a log while it is written, for those who look at the rows, until `stop` is set or the log ends.
+pub(super) fn live(
+    arguments: &Estimate,
+    (rows, stop): (&dyn LiveRows, &Arc<AtomicBool>),
+    say: &mut Messages,
+) -> Result<(), Failure> {
+    let [log] = arguments.logs.as_slice() else { return Ok(()) };
+    let setup = setup(arguments, Some(rows), Some(stop))?;
+    estimate_log(&setup, log, None, say)
 }
 
 /// Estimates the logs; `prepare` makes what is common to them.
@@ -228,7 +250,11 @@ fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
     options.sensors.iter().chain([&options.vehicle]).chain(&options.learnt).chain(options.mapping.files())
 }
 
-fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
+fn setup<'a>(
+    arguments: &'a Estimate,
+    live: Option<&'a dyn LiveRows>,
+    stop: Option<&Arc<AtomicBool>>,
+) -> Result<Setup<'a>, Failure> {
     let vehicle = VehicleFile::read(&arguments.vehicle)?;
     let mut options = EstimateOptions {
         observer: arguments.observer.kind(),
@@ -241,7 +267,7 @@ fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
         with_page: false,
         interrupt: None,
         rows_done: None,
-        follow: stop(arguments)?,
+        follow: stop.cloned(),
     };
     let mut learnt = arguments.learnt.as_deref();
     without_unused(&mut options, &mut learnt, &vehicle);
@@ -252,7 +278,7 @@ fn setup(arguments: &Estimate) -> Result<Setup<'_>, Failure> {
     let map = channel_map_of_car(&arguments.mapping, vehicle.wheel_radius_m())?;
     detail_of_vehicle(&vehicle);
     detail_of_map(&map);
-    Ok(Setup { arguments, learnt, vehicle, map, options })
+    Ok(Setup { arguments, learnt, live, vehicle, map, options })
 }
 
 /// Takes out the options that have no effect with a car, and warns of them.

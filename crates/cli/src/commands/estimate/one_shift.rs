@@ -8,7 +8,7 @@ use wetclutch::estimate::WITHOUT_SENSORS;
 use wetclutch::estimate::one_shift::{self, ShiftEstimates};
 
 use super::outputs::beside;
-use super::{Messages, SHOWN, Setup, destination, finish, shift_lines};
+use super::{Messages, SHOWN, Setup, finish, shift_lines};
 use crate::commands::{JsonObject, write_cells, write_json_list};
 use crate::failure::Failure;
 
@@ -22,7 +22,7 @@ pub(super) fn estimate(
 ) -> Result<(), Failure> {
     let options = setup.options_for(output);
     let prepared = one_shift::Setup::new(file, &options)?;
-    let found = one_shift::estimate(&prepared, setup.log(path), destination(output), &mut |note| say.note(note))?;
+    let found = one_shift::estimate(&prepared, setup.log(path), setup.destination(output), &mut |note| say.note(note))?;
     let places = output.and_then(beside).filter(|_| !found.shifts.is_empty());
     let cells = found.shift_cells();
     say.result = setup.result((path, output), &cells);
@@ -43,7 +43,7 @@ pub(super) fn estimate(
              train the torque of a clutch in another place differs by a constant factor",
         );
     }
-    finish(output, places.as_ref(), || found.page(file, path), setup.arguments.open.is_wanted, say)
+    finish(setup, output, places.as_ref(), || found.page(file, path), say)
 }
 
 /// The shifts as a table, if there are any.

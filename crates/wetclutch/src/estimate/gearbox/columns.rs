@@ -338,12 +338,19 @@ fn of(value: Option<f64>) -> Cell<'static> {
     Cell::Number(value.unwrap_or(f64::NAN))
 }
 
-/// The columns of these names in their order, also those of readings, or all but those of readings.
-pub(crate) fn chosen(mut all: Vec<Column>, measured: Vec<Column>, names: &[String]) -> Result<Vec<Column>, Error> {
-    if names.is_empty() {
+/// The columns of these names in their order, also those of readings. Without names all, those of readings only with `with_measured`.
+pub(crate) fn chosen(
+    mut all: Vec<Column>,
+    measured: Vec<Column>,
+    (names, with_measured): (&[String], bool),
+) -> Result<Vec<Column>, Error> {
+    if names.is_empty() && !with_measured {
         return Ok(all);
     }
     all.extend(measured);
+    if names.is_empty() {
+        return Ok(all);
+    }
     let mut chosen = Vec::new();
     for name in names.iter().map(|name| name.trim()).filter(|name| *name != signal::TIME) {
         let Some(at) = all.iter().position(|column| column.name == name) else {

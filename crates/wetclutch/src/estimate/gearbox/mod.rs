@@ -135,7 +135,8 @@ pub fn estimate(
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
     let numbers = GearNumbers::of(car);
-    let columns = chosen(columns(&places, Knows::of(car)), measured(car, tables), &options.columns)?;
+    let names = (&options.columns[..], destination.is_live());
+    let columns = chosen(columns(&places, Knows::of(car)), measured(car, tables), names)?;
     let (before_readings, mut said, mut named_before) = (before_readings(&columns), None, None);
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(destination, named)?;

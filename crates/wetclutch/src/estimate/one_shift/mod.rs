@@ -117,7 +117,8 @@ pub fn estimate(
     let log = open((setup, input), &mut opened, say)?;
     let observer = observer::choose(options, vehicle, &log, say)?;
     let columns = observer.observer.columns(log.has_wheel_speed());
-    let columns = chosen(columns, vehicle.settings.valve.command_kind(), &options.columns)?;
+    let names = (&options.columns[..], destination.is_live());
+    let columns = chosen(columns, vehicle.settings.valve.command_kind(), names)?;
     let rows = Rows {
         table: EstimateTable::create(destination, columns)?,
         shifts: Shifts::new(&options.shifts, vehicle, &log.ratios),
@@ -229,7 +230,7 @@ fn check_findings(
 
 /// What becomes of the steps of a log.
 struct Rows<'a> {
-    table: EstimateTable,
+    table: EstimateTable<'a>,
     shifts: Shifts<'a>,
     findings: Findings,
     /// Of shifts that lie close together, a row is written once: the last one that was, s.

@@ -69,14 +69,21 @@ impl Column {
     }
 }
 
-/// The columns of these names, also those of readings, or all but those of readings.
-pub(crate) fn chosen(estimates: EstimateColumns, valve: CommandKind, names: &[String]) -> Result<Vec<Column>, Error> {
+/// The columns of these names, also those of readings. Without names all, those of readings only with `with_measured`.
+pub(crate) fn chosen(
+    estimates: EstimateColumns,
+    valve: CommandKind,
+    (names, with_measured): (&[String], bool),
+) -> Result<Vec<Column>, Error> {
     let estimated = estimates.columns().into_iter().map(Column::Estimated);
-    if names.is_empty() {
+    if names.is_empty() && !with_measured {
         return Ok(estimated.collect());
     }
     let measured = MEASURED.into_iter().chain(commands(valve)).map(Column::Measured);
     let mut all: Vec<Column> = estimated.chain(measured).collect();
+    if names.is_empty() {
+        return Ok(all);
+    }
     let mut chosen = Vec::new();
     for name in names.iter().map(|name| name.trim()).filter(|name| *name != signal::TIME) {
         let Some(at) = all.iter().position(|column| column.name() == name) else {
@@ -93,8 +100,8 @@ pub(crate) fn chosen(estimates: EstimateColumns, valve: CommandKind, names: &[St
 }
 
 /// The table of the estimates of one observer.
-pub(crate) struct EstimateTable {
-    output: Output,
+pub(crate) struct EstimateTable<'p> {
+    output: Output<'p>,
     columns: Vec<Column>,
     /// Whether all columns of numbers stand before all columns of words, of which there are some.
     is_in_order: bool,
@@ -104,9 +111,9 @@ pub(crate) struct EstimateTable {
     said: Option<(Phase, Health, Channels<ChannelHealth>)>,
 }
 
-impl EstimateTable {
+impl<'p> EstimateTable<'p> {
     /// Begins it.
-    pub(crate) fn create(destination: Destination<'_>, columns: Vec<Column>) -> Result<Self, Error> {
+    pub(crate) fn create(destination: Destination<'p>, columns: Vec<Column>) -> Result<Self, Error> {
         let output = Output::named(destination, columns.iter().map(|column| (column.name(), column.kind())))?;
         let is_word = |column: &Column| column.kind() == ColumnKind::Word;
         let is_in_order = columns.is_sorted_by_key(is_word) && columns.last().is_some_and(is_word);

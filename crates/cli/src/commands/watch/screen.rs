@@ -1,0 +1,269 @@
+//! The picture in the terminal.
+
+use anstream::ColorChoice;
+use anstyle::{AnsiColor, Style};
+use console::Term;
+use trace::printable;
+
+use super::view::{self, CURVES, DRIVELINE, PANELS, PRESSURE, SPEED, State, TORQUE, Value};
+
+/// Height of the figure, lines.
+const FIGURE: usize = 8;
+/// Shifts that are listed.
+const SHIFTS: usize = 4;
+/// Width of the labels of the figure.
+const LABELS: usize = 8;
+/// Dots of a character: columns and rows.
+const DOTS: [usize; 2] = [2, 4];
+/// The first of the 256 characters with dots, and the bits of the dots of a character, row by row.
+const NO_DOT: u32 = 0x2800;
+const BITS: [[u32; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+
+const OFFGOING: Style = AnsiColor::Yellow.on_default();
+const ONCOMING: Style = AnsiColor::Cyan.on_default();
+const WARNING: Style = AnsiColor::Red.on_default().bold();
+const TITLE: Style = Style::new().bold();
+
+/// The picture, which is drawn over the one before it.
+pub(super) struct Screen<'a> {
+    terminal: Term,
+    title: &'a str,
+    page: Option<&'a str>,
+    is_coloured: bool,
+    /// Lines of the picture before.
+    lines: usize,
+}
+
+impl<'a> Screen<'a> {
+    pub(super) fn new(terminal: Term, title: &'a str, page: Option<&'a str>) -> Self {
+        let is_coloured = anstream::AutoStream::choice(&std::io::stdout()) != ColorChoice::Never;
+        Self { terminal, title, page, is_coloured, lines: 0 }
+    }
+
+    /// Draws the picture. A terminal that cannot be written to gets none.
+    pub(super) fn draw(&mut self, state: &State) {
+        let (rows, columns) = self.terminal.size_checked().unwrap_or((24, 80));
+        let mut lines = picture(state, (self.title, self.page), (usize::from(columns), self.is_coloured));
+        lines.truncate(usize::from(rows).saturating_sub(1).max(1));
+        // In one piece, so that no half of a picture is seen. What is left of the one before is removed.
+        let mut text = if self.lines > 1 { format!("\r\x1b[{}A", self.lines - 1) } else { "\r".to_owned() };
+        text += &lines.join("\x1b[K\n");
+        text += "\x1b[J";
+        self.lines = lines.len();
+        let _ = self.terminal.write_str(&text).and_then(|()| self.terminal.flush());
+    }
+}
+
+impl Drop for Screen<'_> {
+    fn drop(&mut self) {
+        if self.lines > 0 {
+            let _ = self.terminal.write_line("");
+        }
+    }
+}
+
+/// Text in a style, where there are colours.
+fn styled(text: &str, style: Style, is_coloured: bool) -> String {
+    if is_coloured { format!("{style}{text}{style:#}") } else { text.to_owned() }
+}
+
+/// The lines of the picture.
+fn picture(state: &State, (title, page): (&str, Option<&str>), (width, is_coloured): (usize, bool)) -> Vec<String> {
+    let style = |text: &str, style: Style| styled(text, style, is_coloured);
+    let values = state.values();
+    let mut lines = vec![cut(&printable(title), width)];
+    let health = state.word("health");
+    let health = match health {
+        "" => String::new(),
+        "good" => "health good".to_owned(),
+        other => format!("health {}", style(&plain(other), WARNING)),
+    };
+    let rate = if state.rate > 0.0 { format!(", {:.0} rows/s", state.rate) } else { String::new() };
+    lines.push(format!(
+        "{}  {}{health}",
+        style(&format!("{:.2} s", state.time_s - state.origin_s), TITLE),
+        gear_words(state)
+    ));
+    lines[0] += &rate;
+    lines.push(of_panel(state, &values, SPEED));
+    lines.push(of_panel(state, &values, DRIVELINE));
+    lines.push(String::new());
+    lines.extend(clutches(state, &values, is_coloured));
+    let elements = state.elements();
+    if !elements.is_empty() {
+        let decimals = PANELS[PRESSURE].decimals.min(2);
+        let all = elements.iter().map(|(name, value)| format!("{name} {}", number(value.value, decimals)));
+        lines.push(format!("by the command   {}", all.collect::<Vec<_>>().join("   ")));
+    }
+    lines.push(String::new());
+    lines.extend(figure(state, width, is_coloured));
+    let shifts = state.shifts.iter().rev().take(SHIFTS);
+    let shifts: Vec<String> = shifts
+        .map(|shift| {
+            let time = shift.end_s.map_or("goes on".to_owned(), |end_s| format!("{:.2} s", end_s - shift.begin_s));
+            let health = if shift.health.is_empty() { "good".to_owned() } else { shift.health.join(", ") };
+            format!(
+                "shift {:<4} {:<6} at {:>9.2} s   {time:<8} {}",
+                shift.number,
+                shift.gears,
+                shift.begin_s - state.origin_s,
+                plain(&health)
+            )
+        })
+        .collect();
+    if !shifts.is_empty() {
+        lines.push(String::new());
+        lines.extend(shifts);
+    }
+    lines.push(match page {
+        Some(page) => format!("Ctrl-C ends it   page: {page}"),
+        None => "Ctrl-C ends it".to_owned(),
+    });
+    lines
+}
+
+/// A word of a table in plain words.
+fn plain(word: &str) -> String {
+    word.replace('_', " ")
+}
+
+/// A text that is no wider.
+fn cut(text: &str, width: usize) -> String {
+    text.chars().take(width.saturating_sub(20)).collect()
+}
+
+fn gear_words(state: &State) -> String {
+    let [gear, target, phase] = ["gear", "target_gear", "phase"].map(|column| state.word(column));
+    let gears = match (gear, target) {
+        ("", "") if !state.has("gear") => String::new(),
+        ("", "") => "neutral   ".to_owned(),
+        (gear, target) if gear == target => format!("gear {gear}   "),
+        (gear, "") => format!("gear {gear} to neutral   "),
+        ("", target) => format!("neutral to gear {target}   "),
+        (gear, target) => format!("gear {gear} to {target}   "),
+    };
+    let phase = if phase.is_empty() { String::new() } else { format!("{}   ", plain(phase)) };
+    gears + &phase
+}
+
+fn number(value: f64, decimals: usize) -> String {
+    if value.is_finite() { format!("{value:.decimals$}") } else { "-".to_owned() }
+}
+
+/// The unit of a panel.
+fn unit(panel: usize) -> String {
+    let label = view::label(panel);
+    label.split_once('(').map_or(String::new(), |(_, unit)| unit.trim_end_matches(')').to_owned())
+}
+
+/// The latest values of curves of a panel on a line.
+fn of_panel(state: &State, values: &[Value], panel: usize) -> String {
+    let of = |(curve, value): (&view::Curve, &Value)| {
+        (curve.panel == panel && state.has_curve(curve))
+            .then(|| format!("{} {:>6}", curve.name, number(value.value, PANELS[panel].decimals)))
+    };
+    let shown: Vec<String> = CURVES.iter().zip(values).filter_map(of).collect();
+    let quantity = if panel == SPEED { "speeds" } else { "torques" };
+    format!("{quantity:<8} {}  {}", shown.join("   "), unit(panel))
+}
+
+/// The latest pressures and torques of both clutches.
+fn clutches(state: &State, values: &[Value], is_coloured: bool) -> Vec<String> {
+    let cell = |name: &str, panel: usize| {
+        let at = CURVES.iter().position(|curve| curve.panel == panel && curve.name == name);
+        let Value { value, range: [low, high] } = at.map(|at| values[at]).filter(|value| value.value.is_finite())?;
+        let of = |value| number(value, PANELS[panel].decimals);
+        Some(format!("{} ({} to {})", of(value), of(low), of(high)))
+    };
+    let titles = format!("{:<16} {:<30} {}", "", view::label(PRESSURE), view::label(TORQUE));
+    let rows = [("offgoing", OFFGOING), ("oncoming", ONCOMING)].map(|(name, style)| {
+        let is_known =
+            CURVES.iter().any(|curve| curve.panel == PRESSURE && curve.name == name && state.has_curve(curve));
+        is_known.then(|| {
+            let [pressure, torque] =
+                [PRESSURE, TORQUE].map(|panel| cell(name, panel).unwrap_or_else(|| "-".to_owned()));
+            let key = styled(&format!("{name:<9}"), style, is_coloured);
+            format!("{key}{:<7} {pressure:<30} {torque}", state.word(name))
+        })
+    });
+    std::iter::once(titles).chain(rows.into_iter().flatten()).collect()
+}
+
+/// The pressures of both clutches over the last seconds, in dots.
+fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
+    let of = |name: &str| CURVES.iter().position(|curve| curve.panel == PRESSURE && curve.name == name);
+    let curves = [("offgoing", OFFGOING), ("oncoming", ONCOMING)];
+    let curves: Vec<(usize, Style)> = curves.into_iter().filter_map(|(name, style)| Some((of(name)?, style))).collect();
+    let (Some(first), Some(last)) = (state.samples.front(), state.samples.back()) else { return Vec::new() };
+    let span_s = (last.time_s - first.time_s).max(1e-9);
+    let values = || state.samples.iter().flat_map(|sample| curves.iter().map(|(at, _)| sample.values[*at].value));
+    let largest = values().filter(|value| value.is_finite()).fold(0.0, f64::max);
+    let columns = width.saturating_sub(LABELS + 3).clamp(10, 200);
+    let end = round_above(largest);
+    // Which dots of a character are set, and by which curve last.
+    let mut dots = vec![[(0_u32, None); 1]; columns * FIGURE];
+    for sample in &state.samples {
+        let x = ((sample.time_s - first.time_s) / span_s * (columns * DOTS[0] - 1) as f64).round() as usize;
+        for (at, style) in &curves {
+            let value = sample.values[*at].value;
+            if !value.is_finite() {
+                continue;
+            }
+            let height = (FIGURE * DOTS[1] - 1) as f64;
+            let y = (height * (1.0 - (value / end).clamp(0.0, 1.0))).round() as usize;
+            let [cell] = &mut dots[y / DOTS[1] * columns + x / DOTS[0]];
+            cell.0 |= BITS[y % DOTS[1]][x % DOTS[0]];
+            cell.1 = Some(*style);
+        }
+    }
+    let decimals = PANELS[PRESSURE].decimals.min(2);
+    let line = |row: usize| {
+        let label = match row {
+            0 => number(end, decimals),
+            row if row + 1 == FIGURE => number(0.0, decimals),
+            _ => String::new(),
+        };
+        let cells = dots[row * columns..(row + 1) * columns].iter().map(|[(bits, style)]| {
+            let dots = char::from_u32(NO_DOT + bits).unwrap_or(' ').to_string();
+            style.map_or(dots.clone(), |style| styled(&dots, style, is_coloured))
+        });
+        format!("{label:>LABELS$} |{}", cells.collect::<String>())
+    };
+    let title = format!(
+        "{}, last {span_s:.0} s: {}, {}",
+        view::label(PRESSURE),
+        styled("offgoing", OFFGOING, is_coloured),
+        styled("oncoming", ONCOMING, is_coloured)
+    );
+    std::iter::once(title).chain((0..FIGURE).map(line)).collect()
+}
+
+/// The end of an axis from zero.
+fn round_above(largest: f64) -> f64 {
+    const ENDS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
+    if !(largest > 0.0 && largest.is_finite()) {
+        return 1.0;
+    }
+    let mut decade = 1.0;
+    while decade > largest {
+        decade /= 10.0;
+    }
+    while decade * 10.0 < largest {
+        decade *= 10.0;
+    }
+    ENDS.into_iter().map(|end| end * decade).find(|end| *end >= largest).unwrap_or(largest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_axis_ends_at_a_round_number_above() {
+        for (largest, end) in
+            [(0.0, 1.0), (f64::NAN, 1.0), (0.31, 0.5), (1.0, 1.0), (1.76, 2.0), (16.0, 20.0), (99.0, 100.0)]
+        {
+            assert!((round_above(largest) - end).abs() < 1e-9, "{largest}: {}", round_above(largest));
+        }
+    }
+}
