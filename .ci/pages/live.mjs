@@ -207,9 +207,9 @@ for (const [width, scheme] of [[390, "light"], [390, "dark"], [1000, "light"], [
 const measured = ask({ ask: "measured", settings: { car: "six_speed", shift: "all" } });
 const LOG = join(folder, "<img src=x onerror=alert(1)>.csv");
 writeFileSync(LOG, measured);
-const drop = async (page, file) => {
+const drop = async (page, ...files) => {
   const input = await page.$("#file");
-  await input.uploadFile(file);
+  await input.uploadFile(...files);
   await page.waitForFunction(() => document.querySelector("#log-messages p b, #log-messages [role=alert]"), { timeout: 20000 });
 };
 
@@ -236,6 +236,37 @@ test("a log with other names is mapped by suggestion", () => on(async (page) => 
   await page.waitForFunction(() => !document.querySelector("#log-map").hidden, { timeout: 20000 });
   assert.match(await page.$eval("#log-map textarea", (map) => map.value), /TurbineSpeed/);
 }));
+
+test("a CAN log with its DBC is estimated as the program does", async () => {
+  // Every row as frames with two floats each.
+  const [head, ...rows] = measured.trim().split("\n").map((row) => row.split(","));
+  const wanted = head.map((name, at) => [name, at]).filter(([name]) => /^(engine|turbine|output|wheel)_speed_rad_s$|^element_._current_a$|^(target_)?gear$/.test(name));
+  const unit = (name) => (name.endsWith("_a") ? "A" : name.endsWith("gear") ? "" : "rad/s");
+  const messages = [];
+  for (let at = 0; at < wanted.length; at += 2) messages.push(wanted.slice(at, at + 2));
+  const signal = ([name], place) => ` SG_ ${name} : ${32 * place}|32@1- (1,0) [0|0] "${unit(name)}" ECU`;
+  const dbc = ["VERSION \"\"", "BU_: ECU", ...messages.flatMap((of, k) => [`BO_ ${256 + k} M${k}: 8 ECU`, ...of.map(signal)]),
+    ...messages.flatMap((of, k) => of.map(([name]) => `SIG_VALTYPE_ ${256 + k} ${name} : 1;`)), ""].join("\n");
+  const hex = (value) => { const bytes = Buffer.alloc(4); bytes.writeFloatLE(Number(value) || 0); return bytes.toString("hex").toUpperCase(); };
+  const frames = rows.flatMap((row) => messages.map((of, k) =>
+    `(${Number(row[0]).toFixed(6)}) can0 ${(256 + k).toString(16)}#${of.map(([, at]) => hex(row[at])).join("")}`));
+  const map = wanted.map(([name]) => `[channel.${name.replace(/_rad_s$|_a$/, "")}]\nname = "${name}"\n`).join("");
+  const [log, database, mapping] = ["bus.log", "bus.dbc", "bus_map.toml"].map((name) => join(folder, name));
+  writeFileSync(log, frames.join("\n") + "\n");
+  writeFileSync(database, dbc);
+  writeFileSync(mapping, map);
+  program("estimate", log, "--vehicle", resolve(import.meta.dirname, "../../vehicles/six_speed.toml"), "--dbc", database, "--map", mapping, "-o", "bus_estimates.csv");
+  const ours = ask({ ask: "log_estimates", car: "six_speed", name: "bus.log", map, dbc: { name: "bus.dbc", text: dbc } }, Buffer.from(frames.join("\n") + "\n"));
+  assert(ours === readFileSync(join(folder, "bus_estimates.csv"), "utf8"), "the estimates differ");
+  await on(async (page) => {
+    await page.select("#set-car", "six_speed");
+    await drop(page, log);
+    assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /drop its DBC on this page too/);
+    await drop(page, log, database);
+    await page.waitForFunction(() => !document.querySelector("#log-map").hidden, { timeout: 20000 });
+    assert.match(await page.$eval("#log-map textarea", (map) => map.value), /turbine_speed_rad_s/);
+  });
+});
 
 test("what is no log is refused with a hint", () => on(async (page) => {
   const file = join(folder, "none.csv");

@@ -68,16 +68,44 @@ enum Question {
     /// The estimates of that, as CSV.
     Estimates { settings: Settings },
     /// A first channel map for the log.
-    Map { name: String },
+    Map(OfLog),
     /// Figures and tables of the log.
-    Log { car: String, name: String, map: Option<String> },
+    Log(OfLog),
     /// The estimates of the log, as CSV.
-    LogEstimates { car: String, name: String, map: Option<String> },
+    LogEstimates(OfLog),
 }
+
+/// What is asked of a log, which follows the question.
+#[derive(Deserialize)]
+struct OfLog {
+    #[serde(default)]
+    car: String,
+    name: String,
+    map: Option<String>,
+    dbc: Option<Dbc>,
+}
+
+/// The DBC of a CAN log.
+#[derive(Deserialize)]
+pub(crate) struct Dbc {
+    name: String,
+    text: String,
+}
+
+impl OfLog {
+    fn asked<'a>(&'a self, text: &'a [u8]) -> Asked<'a> {
+        Asked { car: &self.car, name: &self.name, map: self.map.as_deref(), dbc: self.dbc.as_ref(), text }
+    }
+}
+
+/// What to do about a CAN log without its DBC: of the command, and of the page.
+const WITHOUT_DBC: [&str; 2] = ["give it with --dbc", "drop its DBC on this page too"];
 
 /// The answer to a question in bytes: JSON, or CSV where it was asked for. An error is JSON with `error` and `hint`.
 pub fn answer_to(question: &[u8]) -> Vec<u8> {
-    answered(question).unwrap_or_else(|error| text_of(&json!({ "error": error.message(), "hint": error.hint() })))
+    let [of_command, of_page] = WITHOUT_DBC;
+    let hint = |error: &Error| error.hint().map(|hint| hint.replace(of_command, of_page));
+    answered(question).unwrap_or_else(|error| text_of(&json!({ "error": error.message(), "hint": hint(&error) })))
 }
 
 fn answered(question: &[u8]) -> Result<Vec<u8>, Error> {
@@ -89,11 +117,9 @@ fn answered(question: &[u8]) -> Result<Vec<u8>, Error> {
         Question::Run { settings } => text_of(&page::of_run(settings)?),
         Question::Measured { settings } => page::measured(settings)?.csv()?,
         Question::Estimates { settings } => page::estimates(settings)?.csv()?,
-        Question::Map { name } => text_of(&log::suggested(&Asked { car: "", name, map: None, text })?),
-        Question::Log { car, name, map } => text_of(&log::drawn(&Asked { car, name, map: map.as_deref(), text })?),
-        Question::LogEstimates { car, name, map } => {
-            log::estimates(&Asked { car, name, map: map.as_deref(), text })?.csv()?
-        }
+        Question::Map(of) => text_of(&log::suggested(&of.asked(text))?),
+        Question::Log(of) => text_of(&log::drawn(&of.asked(text))?),
+        Question::LogEstimates(of) => log::estimates(&of.asked(text))?.csv()?,
     })
 }
 

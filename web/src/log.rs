@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use wetclutch::estimate::gearbox::{DriveEstimates, Setup, estimate};
 use wetclutch::{Destination, Error, EstimateOptions, InMemory, LogInput, Table};
 
+use crate::Dbc;
 use crate::cars::ShippedCar;
 use crate::page::page;
 
@@ -20,8 +21,18 @@ pub(crate) struct Asked<'a> {
     pub(crate) name: &'a str,
     /// The channel map; none for a log with the names of the program.
     pub(crate) map: Option<&'a str>,
+    /// The DBC of a CAN log.
+    pub(crate) dbc: Option<&'a Dbc>,
     /// The log.
     pub(crate) text: &'a [u8],
+}
+
+impl Asked<'_> {
+    /// What is needed to open the log.
+    fn options(&self) -> OpenOptions {
+        let dbc = self.dbc.map(|dbc| dbc.name.clone().into());
+        OpenOptions { dbc, dbc_text: self.dbc.map(|dbc| dbc.text.as_bytes().into()), time: None }
+    }
 }
 
 /// The log of a page, ready to be estimated.
@@ -35,10 +46,11 @@ struct Given<'a> {
 impl<'a> Given<'a> {
     fn of(asked: &Asked<'a>) -> Result<Self, Error> {
         let car = ShippedCar::named(asked.car)?;
-        let map = match asked.map {
+        let mut map = match asked.map {
             Some(map) => ChannelMap::of_text(Path::new("map.toml"), map)?,
             None => ChannelMap::default(),
         };
+        map.open = OpenOptions { time: map.open.time, ..asked.options() };
         let file = car.read(&car.file(), car.text)?;
         Ok(Self { car: file, name: Path::new(asked.name), map, text: asked.text.into() })
     }
@@ -71,7 +83,7 @@ pub(crate) fn estimates(asked: &Asked<'_>) -> Result<Table, Error> {
 /// A first channel map for a log, as `wetclutch inspect --suggest` writes it.
 pub(crate) fn suggested(asked: &Asked<'_>) -> Result<Value, Error> {
     let text: Arc<[u8]> = asked.text.into();
-    let mut log = Log::of_text(Path::new(asked.name), &OpenOptions::default(), Box::new(std::io::Cursor::new(text)))?;
+    let mut log = Log::of_text(Path::new(asked.name), &asked.options(), Box::new(std::io::Cursor::new(text)))?;
     let ranges = logs::inspect(&mut log)?.ranges();
     Ok(json!({ "map": logs::suggest(log.channels(), &ranges, None).trim_end() }))
 }

@@ -40,7 +40,7 @@ fn written(fuzzer: &Fuzzer, name: &str, input: &[u8]) -> PathBuf {
 
 pub(crate) fn log(fuzzer: &Fuzzer, input: &[u8]) {
     let path = written(fuzzer, "measured", input);
-    let options = OpenOptions { dbc: Some(bus()), time: None };
+    let options = OpenOptions { dbc: Some(bus()), ..OpenOptions::default() };
     let open = || Log::open(&path, &options).ok();
     let Some(mut log) = open() else { return };
     let map = written(fuzzer, "suggested.toml", suggest(log.channels(), &[], None).as_bytes());
@@ -92,7 +92,7 @@ fn replay(log: Option<Log>, map: &ChannelMap) {
 
 pub(crate) fn map(fuzzer: &Fuzzer, input: &[u8]) {
     let Ok(map) = ChannelMap::read(&written(fuzzer, "map.toml", input)) else { return };
-    let options = OpenOptions { dbc: Some(project().join("maps/genesis_at8.dbc")), time: None };
+    let options = OpenOptions { dbc: Some(project().join("maps/genesis_at8.dbc")), ..OpenOptions::default() };
     let frames = "(1.0) can0 316#353EAC173E0E1B72\n(1.0) can0 43F#834480FF77901700\n(1.0) can0 440#FFB31B00FF9C1753\n";
     let log = Log::open(&written(fuzzer, "frames.log", frames.as_bytes()), &options);
     let Ok(mut log) = log else { return };
@@ -108,7 +108,7 @@ pub(crate) fn dbc(fuzzer: &Fuzzer, input: &[u8]) {
     if Database::read(&dbc).is_err() {
         return;
     }
-    let options = OpenOptions { dbc: Some(dbc), time: None };
+    let options = OpenOptions { dbc: Some(dbc), ..OpenOptions::default() };
     let path: &Path = &data().join("bus.log");
     if let Ok(mut log) = Log::open(path, &options) {
         let _ = inspect(&mut log);

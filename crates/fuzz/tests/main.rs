@@ -89,7 +89,7 @@ fn seeds(target: Target) -> Vec<PathBuf> {
 #[test]
 fn each_seed_is_one_that_its_reader_takes_and_a_corpus_is_small() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../logs/tests/data");
-    let options = OpenOptions { dbc: Some(data.join("bus.dbc")), time: None };
+    let options = OpenOptions { dbc: Some(data.join("bus.dbc")), ..OpenOptions::default() };
     for target in Target::ALL.into_iter().filter(|target| target.format().is_some()) {
         let seeds = seeds(target);
         assert!(!seeds.is_empty(), "{}", target.name());

@@ -8,12 +8,11 @@
 //! **Architecture invariant:** this is the only crate that reads the formats of recorders.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
-// What only the readers of MDF, Parquet and CAN logs call.
+// What only the readers of MDF, Parquet and BLF logs call.
 #![cfg_attr(target_family = "wasm", allow(dead_code))]
 
 mod ahead;
 pub mod arrays;
-#[cfg(not(target_family = "wasm"))]
 pub mod can;
 pub mod channel;
 pub mod columns;

@@ -12,14 +12,13 @@ use trace::{FileUse, Following, ShownPath as _};
 
 use crate::ahead::Crew;
 use crate::arrays::Arrays;
-#[cfg(not(target_family = "wasm"))]
 use crate::can::{CanLog, Database};
 use crate::columns::{Columns, Stream};
 use crate::csv_log::CsvLog;
 #[cfg(not(target_family = "wasm"))]
 use crate::mdf::MdfLog;
 #[cfg(target_family = "wasm")]
-use crate::not_in_browser::{CanLog, Database, MdfLog, ParquetLog};
+use crate::not_in_browser::{MdfLog, ParquetLog};
 #[cfg(not(target_family = "wasm"))]
 use crate::parquet_log::ParquetLog;
 use crate::readings_table::ReadingsTable;
@@ -29,10 +28,23 @@ use crate::{CanKind, Channel, Format, LogError, TimeColumn, csv_log, error};
 /// What must be known to open some logs.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct OpenOptions {
-    /// The messages and signals of a CAN log.
+    /// The DBC with the messages and signals of a CAN log.
     pub dbc: Option<PathBuf>,
+    /// Its text, if it is not in that file; then `dbc` is what messages call it.
+    pub dbc_text: Option<Arc<[u8]>>,
     /// The time of a table; without it, a column with a usual name.
     pub time: Option<TimeColumn>,
+}
+
+impl OpenOptions {
+    /// Reads the DBC.
+    fn database(&self) -> Result<Option<Database>, LogError> {
+        let name = || self.dbc.as_deref().unwrap_or(Path::new("the DBC"));
+        match &self.dbc_text {
+            Some(text) => Database::of_text(name(), text).map(Some),
+            None => self.dbc.as_deref().map(Database::read).transpose(),
+        }
+    }
 }
 
 /// A log: channels, each with its own clock.
@@ -94,7 +106,7 @@ impl Log {
 
     fn of(path: &Path, options: &OpenOptions, reader: Box<dyn Read>, is_followed: bool) -> Result<Self, LogError> {
         let (head, reader) = beginning(path, reader)?;
-        let database = options.dbc.as_deref().map(Database::read).transpose()?;
+        let database = options.database()?;
         let is_file = path != Path::new("-");
         let (source, channels) = match Format::of(&head) {
             Format::Mdf | Format::Parquet | Format::Can(CanKind::Blf) if is_followed => {

@@ -173,6 +173,7 @@ impl ChannelMap {
             channels: channels.collect::<Result<_, _>>().map_err(LogError::map)?,
             open: OpenOptions {
                 dbc: raw.dbc.map(|dbc| folder.join(dbc)),
+                dbc_text: None,
                 time: raw.time.map(|time| TimeColumn { name: time.name, unit: time.unit }),
             },
             gearbox: raw.gearbox.map_or_else(Gearbox::default, Gearbox::from),

@@ -1,5 +1,5 @@
-//! Formats that are not read in a browser: MDF and Parquet need a file in which a reader can seek, and unpackers in C; a CAN log needs the
-//! file of its DBC.
+//! Formats that are not read in a browser: MDF and Parquet need a file in which a reader can seek, and unpackers in C; BLF, an unpacker that would
+//! make the page a tenth larger.
 
 use std::convert::Infallible;
 use std::io::Read;
@@ -7,11 +7,12 @@ use std::path::Path;
 
 use crate::LogError;
 use crate::ahead::Crew;
+use crate::can::{Database, Frame, Frames};
 use crate::columns::Stream;
-use crate::{CanKind, Channel, TimeColumn};
+use crate::{Channel, TimeColumn};
 
 /// What to do with a log of such a format.
-const NOT_READ: &str = "MDF, Parquet and CAN logs are not read in a browser\nhint: save the channels as CSV, or use the program `wetclutch`";
+const NOT_READ: &str = "MDF, Parquet and BLF logs are not read in a browser\nhint: save the channels as CSV with `wetclutch convert`, or use the program";
 
 /// An MDF log: there is none.
 pub(crate) struct MdfLog(Infallible);
@@ -19,20 +20,23 @@ pub(crate) struct MdfLog(Infallible);
 /// A Parquet log: there is none.
 pub(crate) struct ParquetLog(Infallible);
 
-/// A CAN log: there is none.
-pub(crate) struct CanLog(Infallible);
-
-/// The messages of a bus: there are none.
-pub(crate) struct Database(Infallible);
+/// A BLF log: there is none.
+pub(crate) struct Blf(Infallible);
 
 type Opened<L> = Result<(L, Vec<Channel>), LogError>;
 
-impl Database {
-    pub(crate) fn read(path: &Path) -> Result<Self, LogError> {
+impl Blf {
+    pub(crate) fn open(path: &Path, _: Box<dyn Read>) -> Result<Self, LogError> {
         Err(LogError::file(path, NOT_READ))
     }
+}
 
-    pub(crate) fn channels(&self) -> &[Channel] {
+impl Frames for Blf {
+    fn next_frame(&mut self) -> Result<Option<Frame>, LogError> {
+        match self.0 {}
+    }
+
+    fn notes(&self) -> Vec<String> {
         match self.0 {}
     }
 }
@@ -77,20 +81,6 @@ impl ParquetLog {
     }
 
     pub(crate) fn note(&mut self, _: &str) {
-        match self.0 {}
-    }
-
-    pub(crate) fn stream(&mut self, _: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
-        match self.0 {}
-    }
-}
-
-impl CanLog {
-    pub(crate) fn new(_: &Path, _: CanKind, _: Vec<u8>, _: Box<dyn Read>, database: Database, _: bool) -> Self {
-        match database.0 {}
-    }
-
-    pub(crate) fn format(&self) -> &'static str {
         match self.0 {}
     }
 

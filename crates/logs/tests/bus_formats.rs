@@ -156,7 +156,7 @@ const J1939: &str = "VERSION \"\"\n\nBU_: A\n\nBO_ 2364540158 EEC1: 8 A\n SG_ En
 #[test]
 fn parameter_groups_of_j1939_are_found_whatever_priority_and_source_are() {
     let folder = Folder::new("j1939");
-    let options = |dbc: &str| OpenOptions { dbc: Some(folder.write("j1939.dbc", dbc)), time: None };
+    let options = |dbc: &str| OpenOptions { dbc: Some(folder.write("j1939.dbc", dbc)), ..OpenOptions::default() };
     // EEC1 of the engine with another priority, of a second control unit, and with a value that is not available; ETC1 of the gearbox.
     let log = "(1.0) can0 18F00400#FFFFFF803EFFFFFF\n(1.1) can0 0CF00417#FFFFFF0000FFFFFF\n(1.2) can0 18F00400#FFFFFFFFFEFFFFFF\n\
         (1.3) can0 0CF00203#FF401FFFFF8025FF\n(1.4) can0 18FEF100#0000000000000000\n";
@@ -209,7 +209,7 @@ fn long_names_of_a_dbc_are_the_names_and_an_impossible_signal_leaves_the_others(
         BA_DEF_ SG_  \"SystemSignalLongSymbol\" STRING ;\nBA_DEF_DEF_  \"SystemSignalLongSymbol\" \"\";\n\
         BA_ \"SystemSignalLongSymbol\" SG_ 256 TransmissionInputShaftSpeedOfTh_ \"TransmissionInputShaftSpeedOfTheGearbox\";\n";
     let dbc = dbc.replace("\nSG_", "\n SG_");
-    let options = OpenOptions { dbc: Some(folder.write("long.dbc", &dbc)), time: None };
+    let options = OpenOptions { dbc: Some(folder.write("long.dbc", &dbc)), ..OpenOptions::default() };
     let (log, samples, notes) =
         read(&folder.write("bus.log", "(1.0) can0 100#01E803\n(2.0) can0 100#02E803\n"), &options).unwrap();
     assert_eq!(channel(&log, &samples, "TransmissionInputShaftSpeedOfTheGearbox"), [(1.0, 1000.0, Quality::Good)]);

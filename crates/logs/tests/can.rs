@@ -1,11 +1,12 @@
 //! Frames of a bus that a test writes.
 
 use crate::common::{Folder, channel, data, read, with_dbc};
-use logs::{OpenOptions, Quality};
+use logs::{Log, OpenOptions, Quality};
+use std::path::Path;
 
 /// Values of the signals of a log with one message, by name.
 fn values(folder: &Folder, log: &str, dbc: &str, name: &str) -> Vec<f64> {
-    let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc)), time: None };
+    let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc)), ..OpenOptions::default() };
     let (log, samples, notes) = read(&folder.write("own.log", log), &options).unwrap();
     assert_eq!(notes, Vec::<String>::new());
     channel(&log, &samples, name).into_iter().map(|(_, value, _)| value).collect()
@@ -93,7 +94,7 @@ fn values_that_a_dbc_names_as_none_are_missing_and_states_stay() {
            VAL_ 290 Gear 0 \"N\" 13 \"R\" 14 \"P\" 15 \"SNA\" ;\n";
     let frames = ["401F00A405030000", "FEFF00FE070F0000", "FDFF00FF070D0000", "FFFF00A4050E0000", "441F00A405030000"];
     let log: String = frames.iter().enumerate().map(|(i, data)| format!("(1.0{i}0000) can0 122#{data}\n")).collect();
-    let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc)), time: None };
+    let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc)), ..OpenOptions::default() };
     let (log, samples, _) = read(&folder.write("own.log", log), &options).unwrap();
     let of = |name: &str| {
         let found = channel(&log, &samples, name);
@@ -119,7 +120,7 @@ fn all_bits_of_an_obd_percentage_are_a_hundred_per_cent() {
     };
     let frame = "(1.0) can0 122#FFFFFF0000000000\n";
     let quality = |range: &str, name: &str| {
-        let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc(range))), time: None };
+        let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc(range))), ..OpenOptions::default() };
         let (log, samples, _) = read(&folder.write("own.log", frame), &options).unwrap();
         channel(&log, &samples, name)[0]
     };
@@ -139,7 +140,7 @@ fn messages_with_the_same_identifier_are_both_read_and_named() {
            BO_ 257 Twice: 8 A\n SG_ First : 0|8@1+ (1,0) [0|0] \"\" A\nBO_ 257 TwiceB: 8 A\n SG_ Second : 8|8@1+ (1,0) [0|0] \"\" A\n";
     let log =
         "(1.0) can0 100#0506000000000000\n(1.1) can0 00000100#0709000000000000\n(1.2) can0 101#0B0C000000000000\n";
-    let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc)), time: None };
+    let options = OpenOptions { dbc: Some(folder.write("own.dbc", dbc)), ..OpenOptions::default() };
     let (log, samples, notes) = read(&folder.write("own.log", log), &options).unwrap();
     let of = |name: &str| channel(&log, &samples, name).into_iter().map(|(_, value, _)| value).collect::<Vec<_>>();
     assert_eq!([of("Std_Sig"), of("Ext_Sig"), of("First"), of("Second")], [[5.0], [14.0], [11.0], [12.0]]);
@@ -276,7 +277,7 @@ fn a_text_in_any_encoding_is_the_same_bus_log() {
     ];
     for (i, encoded) in encodings.iter().enumerate() {
         for text in [&candump, &asc] {
-            let options = OpenOptions { dbc: Some(folder.write("own.dbc", encoded(&dbc))), time: None };
+            let options = OpenOptions { dbc: Some(folder.write("own.dbc", encoded(&dbc))), ..OpenOptions::default() };
             let (log, samples, notes) =
                 read(&folder.write("bus.log", encoded(text)), &options).unwrap_or_else(|error| panic!("{i} {error}"));
             assert_eq!((channel(&log, &samples, "N_Eng").len(), notes), (4, vec![]), "{i}");
@@ -285,4 +286,16 @@ fn a_text_in_any_encoding_is_the_same_bus_log() {
         let map = logs::ChannelMap::read(&map).unwrap_or_else(|error| panic!("{i} {error}"));
         assert_eq!(map.channels[0].names, ["Größe"]);
     }
+}
+
+#[test]
+fn a_dbc_in_memory_is_read_as_its_file_and_has_a_largest_size() {
+    let bytes = std::fs::read(data("bus.dbc")).unwrap();
+    let log = std::fs::read(data("bus.log")).unwrap();
+    let of_text = OpenOptions { dbc: Some("bus.dbc".into()), dbc_text: Some(bytes.into()), ..OpenOptions::default() };
+    let opened = Log::of_text(Path::new("bus.log"), &of_text, Box::new(std::io::Cursor::new(log))).unwrap();
+    assert_eq!(opened.channels(), Log::open(&data("bus.log"), &with_dbc()).unwrap().channels());
+    let huge = vec![b' '; 33 << 20];
+    let error = logs::can::Database::of_text(Path::new("huge.dbc"), &huge).unwrap_err();
+    assert!(error.to_string().contains("huge.dbc: this is larger than any DBC"), "{error}");
 }

@@ -183,7 +183,7 @@ fn a_table_with_a_time_for_each_signal_is_refused() {
     let by = |other: &dyn Fn(u32) -> String, title: &str| {
         let rows: String = (0..5).map(|i| format!("{};{};{};{}\n", 10 * i, 1500 + i, other(i), 1400 + i)).collect();
         let time = TimeColumn { name: "N_time".to_owned(), unit: Some("ms".to_owned()) };
-        let options = OpenOptions { dbc: None, time: Some(time) };
+        let options = OpenOptions { time: Some(time), ..OpenOptions::default() };
         let path = folder.write("log.csv", format!("N_time;N [rpm];{title};M [rpm]\n{rows}"));
         read(&path, &options).map(|_| ()).map_err(|error| error.to_string())
     };

@@ -49,7 +49,7 @@ fn blocks_of_every_compression_give_the_same_samples() {
 
 #[test]
 fn frames_of_a_bus_without_a_dbc_and_a_dbc_without_frames_are_reported() {
-    let dbc = OpenOptions { dbc: Some(data("bus.dbc")), time: None };
+    let dbc = OpenOptions { dbc: Some(data("bus.dbc")), ..OpenOptions::default() };
     let (log, _, notes) = read(&data("bus.mf4"), &OpenOptions::default()).unwrap();
     let said = "there are frames of a CAN bus, whose signals are not read\nhint: a DBC defines the signals in them: give it with --dbc";
     assert!(notes.iter().any(|note| note == said), "{notes:?}");

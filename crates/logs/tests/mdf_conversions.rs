@@ -122,7 +122,7 @@ fn the_unit_of_a_time_counts_wherever_the_file_says_it() {
     let numbers: Vec<u16> = (0..20).collect();
     let last_s = |bytes: &[u8], time: Option<(&str, &str)>| {
         let time = time.map(|(name, unit)| TimeColumn { name: name.to_owned(), unit: Some(unit.to_owned()) });
-        let options = OpenOptions { dbc: None, time };
+        let options = OpenOptions { time, ..OpenOptions::default() };
         let (log, samples, notes) =
             read(&folder.write("log.mf4", bytes), &options).map_err(|error| error.to_string())?;
         Ok::<_, String>((channel(&log, &samples, "N").last().unwrap().0, notes))

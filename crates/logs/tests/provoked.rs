@@ -79,7 +79,7 @@ fn logs_without_what_is_needed() {
     let asc = "date Wed Sep 30 15:06:13.191 2017\nbase hex  timestamps absolute\n";
     assert!(said(&folder, "bus.asc", asc).contains("there are no data frames"));
     let dbc = "VERSION \"\"\n\nBU_: A\n\nBO_ 256 X: 8 A\n SG_ S : 0|16@1+ (1,0) [0|0] \"rpm\" A\n SG_ T : 16|16@1+ (1,0) [0|0] \"rpm\" A\n\nSIG_VALTYPE_ 256 S : 1;\n";
-    let options = OpenOptions { dbc: Some(folder.write("bus.dbc", dbc)), time: None };
+    let options = OpenOptions { dbc: Some(folder.write("bus.dbc", dbc)), ..OpenOptions::default() };
     let candump = "(0.0) can0 100#0102030405060708\n(0.1) can0 100#0102030405060708\n";
     let found = read(&folder.write("bus.log", candump), &options);
     let text = found.map_or_else(|error| error.to_string(), |(_, _, notes)| notes.join("\n"));

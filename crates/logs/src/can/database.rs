@@ -75,7 +75,18 @@ impl Database {
     /// The file cannot be read or is no DBC. A signal of an impossible size is left out, with a note.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let bytes = trace::read_small(path, LARGEST_LIST).map_err(LogError::io(path))?;
-        Self::parse(path, &trace::text::text_of(&bytes))
+        Self::of_text(path, &bytes)
+    }
+
+    /// The same of the bytes of a file; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// It is no DBC, or larger than any.
+    pub fn of_text(path: &Path, bytes: &[u8]) -> Result<Self, LogError> {
+        if bytes.len() as u64 > LARGEST_LIST {
+            return Err(LogError::file(path, "this is larger than any DBC"));
+        }
+        Self::parse(path, &trace::text::text_of(bytes))
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, LogError> {

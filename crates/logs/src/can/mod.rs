@@ -1,6 +1,7 @@
 //! CAN logs: frames from candump, ASC, BLF, PCAN, SavvyCAN and python-can files, and the signals that a DBC finds in them.
 
 mod bits;
+#[cfg(not(target_family = "wasm"))]
 mod blf;
 mod database;
 mod frame;
@@ -19,10 +20,14 @@ use std::path::{Path, PathBuf};
 pub use database::Database;
 pub(crate) use frame::{Frame, Frames};
 
+#[cfg(not(target_family = "wasm"))]
+use self::blf::Blf;
 use self::database::Found;
 use crate::CanKind;
 use crate::LogError;
 use crate::columns::{Batch, Stream};
+#[cfg(target_family = "wasm")]
+use crate::not_in_browser::Blf;
 use crate::samples::Sample;
 
 /// A CAN log that has not been read yet.
@@ -75,7 +80,7 @@ impl CanLog {
 
 fn frames(path: &Path, kind: CanKind, input: Box<dyn Read>) -> Result<Box<dyn Frames>, LogError> {
     Ok(match kind {
-        CanKind::Blf => Box::new(blf::Blf::open(path, input)?),
+        CanKind::Blf => Box::new(Blf::open(path, input)?),
         _ => Box::new(text::Lines::new(path, kind, input)),
     })
 }

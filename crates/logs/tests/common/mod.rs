@@ -15,7 +15,7 @@ pub(crate) fn data(name: &str) -> PathBuf {
 }
 
 pub(crate) fn with_dbc() -> OpenOptions {
-    OpenOptions { dbc: Some(data("bus.dbc")), time: None }
+    OpenOptions { dbc: Some(data("bus.dbc")), ..OpenOptions::default() }
 }
 
 /// Every sample of a log, and its notes.

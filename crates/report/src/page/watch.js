@@ -3,8 +3,8 @@
 "use strict";
 const settings = JSON.parse(document.body.dataset.settings);
 const COLOURS = {
-  engine: "#808080", turbine: "#0072B2", output: "#009E73", wheel: "#C2679A",
-  offgoing: "#D55E00", oncoming: "#0072B2", "drive shafts": "#009E73",
+  engine: "#808080", turbine: "#2486c7", output: "#009E73", wheel: "#C2679A",
+  offgoing: "#D55E00", oncoming: "#2486c7", "drive shafts": "#009E73",
 };
 const OTHER = "#808080";
 // Numbers of a curve in a sample: value, lower and upper end of its range.
