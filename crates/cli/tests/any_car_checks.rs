@@ -233,6 +233,17 @@ fn a_wheel_speed_of_another_scale_is_told_or_refused() {
         let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("refused.csv")]));
         assert!(error.contains(expected) && error.contains("hint: "), "{factor}: {error}");
     }
+    // Within a bound that the file states it is a scale that the filter learns.
+    let car = std::fs::read_to_string(format!("{ROOT}vehicles/four_speed.toml")).unwrap();
+    let car = car.replace("\"../gearboxes/", &format!("\"{ROOT}gearboxes/"));
+    let wide = folder.write("wide.toml", car + "\n[error_bounds]\nwheel_scale_share = 0.2\n");
+    for factor in [0.81, 0.85, 1.18] {
+        let log = folder.write("log.csv", scaled(factor));
+        let estimate =
+            |vehicle: &str| wetclutch(&["estimate", &log, "--vehicle", vehicle, "-o", &folder.path("wide.csv")]);
+        said(&estimate(&wide));
+        assert_eq!(estimate(&format!("{ROOT}vehicles/four_speed.toml")).status.code(), Some(2));
+    }
 }
 
 #[test]

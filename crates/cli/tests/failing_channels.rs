@@ -229,6 +229,22 @@ fn a_shift_in_which_a_speed_fails_keeps_its_friction_work_and_says_what_failed()
     }
 }
 
+/// The wheels show the gears where the output does not.
+#[test]
+fn a_shift_over_which_the_output_fails_is_found_by_the_wheels() {
+    let case = Case::one_shift();
+    for (value, from_s, to_s) in [("0", 7.49, 9.49), ("0", 7.38, 8.39), ("", 7.49, 9.4), ("130", 7.53, 9.45)] {
+        let log = case.with("output_speed_rad_s", [from_s, to_s], value);
+        for observer in ["best", "rigid", "open-loop"] {
+            let (note, _, shifts) = case.estimate(&log, &["--observer", observer]);
+            assert_eq!(shifts.lines().count(), 2, "{value} {observer}: {note}");
+            assert_eq!((column(&shifts, "from_gear")[0].as_str(), column(&shifts, "to_gear")[0].as_str()), ("1", "2"));
+            let begin_s = numbers(&shifts, "time_s")[0];
+            assert!((7.4..8.2).contains(&begin_s), "{value} {observer}: {begin_s}");
+        }
+    }
+}
+
 /// Of the car with a gearbox too: while the turbine speed is lost its clutches may slip by anything between both gears.
 #[test]
 fn the_range_of_friction_work_holds_the_work_of_the_log_without_faults() {

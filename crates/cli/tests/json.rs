@@ -12,8 +12,8 @@ fn commands() -> Vec<String> {
     let help = printed(&wetclutch(&["--help"]));
     let listed = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let names = listed.lines().filter_map(|line| line.split_whitespace().next());
-    // Completions and manual pages are for a shell, not for a program.
-    names.filter(|name| !["help", "completions", "man"].contains(name)).map(str::to_owned).collect()
+    // Completions and manual pages are for a shell, a view is for people: no program reads them.
+    names.filter(|name| !["help", "completions", "man", "watch"].contains(name)).map(str::to_owned).collect()
 }
 
 /// Arguments of each command, in the order in which they are run: one makes the log of the others.

@@ -13,10 +13,12 @@ mod quality;
 mod ratio;
 mod track;
 mod unfit;
+mod wheel;
 
 use drivetrain::ShiftKind;
 use trace::Quantity;
 
+use self::wheel::Wheel;
 use crate::map::check_ratios;
 use crate::{Gearbox, LogError, Reading, Role};
 use contradiction::SeenRatios;
@@ -212,6 +214,7 @@ pub struct ShiftFinder {
     has_speeds: bool,
     tracks: [Track; ROLES],
     ratio: RatioWatch,
+    wheel: Wheel,
     gear: Steady,
     target: Steady,
     active: Steady,
@@ -250,6 +253,7 @@ impl ShiftFinder {
             has_speeds: speeds,
             tracks: std::array::from_fn(|_| Track::new(HELD_S)),
             ratio: RatioWatch::new(&gearbox.ratios, HELD_S),
+            wheel: Wheel::default(),
             gear: Steady::default(),
             target: Steady::default(),
             active: Steady::default(),
@@ -301,7 +305,15 @@ impl ShiftFinder {
             }
             Role::TurbineSpeed => self.ratio.turbine(time_s, value),
             Role::EngineSpeed if self.by_engine => self.ratio.turbine(time_s, value),
-            Role::OutputSpeed => self.ratio.output(time_s, value),
+            Role::OutputSpeed => {
+                self.ratio.output(time_s, value);
+                self.wheel.output(time_s, value);
+            }
+            Role::WheelSpeed => {
+                if let Some(output_rad_s) = self.wheel.wheel(time_s, value) {
+                    self.ratio.output(time_s, output_rad_s);
+                }
+            }
             Role::VehicleSpeed => {
                 if let (Some(rad_per_m), true) =
                     (self.output_rad_per_m, self.tracks[Role::OutputSpeed as usize].is_empty())

@@ -8,7 +8,7 @@ pub mod source;
 
 use std::path::Path;
 
-use car::Car;
+use car::{Car, ErrorBudget};
 use config::CarFile;
 use evaluate::checks::RefusedCommand;
 use evaluate::drive::ScoredDrive;
@@ -207,7 +207,8 @@ fn check_speeds(drive: &LoggedDrive<'_>, (setup, path): (&Setup<'_>, &Path), say
         return Ok(());
     }
     check_ratios(drive.rows_in_gear(), wrong_scale.as_deref(), Path::new(&setup.file.source.path), path)?;
-    check_wheel(drive.output_over_wheel(), setup.file.driveline.final_ratio)?;
+    let wheel_scale = ErrorBudget::of_car(&setup.file.car).wheel_scale;
+    check_wheel(drive.output_over_wheel(), setup.file.driveline.final_ratio, wheel_scale)?;
     drive.unusable().map_or(Ok(()), |unusable| Err(refused(unusable, path)))
 }
 

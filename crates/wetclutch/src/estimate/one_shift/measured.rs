@@ -146,6 +146,7 @@ fn each_reading(input: &Input<f64>, row: &LogRow, mut see: impl FnMut(&Reading))
     let speeds = [
         (Role::EngineSpeed, input.engine_rad_s),
         (Role::TurbineSpeed, input.turbine_rad_s),
+        (Role::WheelSpeed, input.wheel_rad_s),
         (Role::OutputSpeed, input.output_rad_s),
     ];
     for (role, reading) in speeds {

@@ -18,6 +18,8 @@ const IN_GEAR_FRACTION: f64 = 0.1;
 const MOSTLY: f64 = 0.5;
 /// Wheels differ by so much: tyres, scale and slip are a part of it.
 const WHEEL: f64 = 0.15;
+/// Fraction by which tyres slip besides.
+const SLIPS: f64 = 0.02;
 /// Bins of the ratios for a factor of e: of a hundredth.
 const PER_CENT: u32 = 100;
 /// Steps that are needed to judge, and time, s.
@@ -28,6 +30,8 @@ const TIME_S: f64 = 3.0;
 pub(crate) struct Ratios {
     gears: [f64; 2],
     final_ratio: f64,
+    /// Bound on the scale of the wheel speed.
+    wheel_scale: f64,
     /// Engine, turbine, output and wheel speed.
     came: [CameSpeed; 4],
     moving_s: f64,
@@ -45,6 +49,7 @@ impl Ratios {
         Self {
             gears: [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()],
             final_ratio: vehicle.driveline.final_ratio,
+            wheel_scale: vehicle.error_bounds.wheel_scale,
             came: [CameSpeed::default(); 4],
             moving_s: 0.0,
             moving: 0,
@@ -95,7 +100,7 @@ impl Ratios {
         if fraction(self.in_gear) < IN_GEAR_FRACTION {
             // Turbine and wheels fit each other: it is the output that is wrong.
             let (final_ratio, found) = (self.final_ratio, self.output_over_wheel.middle());
-            if fraction(self.in_gear_by_wheel) > MOSTLY && check_wheel(found, final_ratio).is_err() {
+            if fraction(self.in_gear_by_wheel) > MOSTLY && check_wheel(found, final_ratio, self.wheel_scale).is_err() {
                 return Err(Error::Input(format!(
                     "output_speed over wheel_speed is {found:.2} in the middle, and the final ratio of the vehicle file is {final_ratio:.2}; \
                      turbine_speed and wheel_speed fit the gears\nhint: output_speed is {:.3} times too large: check its unit and scale",
@@ -115,13 +120,15 @@ impl Ratios {
                 100.0 * fraction(self.in_gear),
             )));
         }
-        check_wheel(self.output_over_wheel.middle(), self.final_ratio)
+        check_wheel(self.output_over_wheel.middle(), self.final_ratio, self.wheel_scale)
     }
 }
 
-/// Refuses wheels that do not turn with the output: their middle ratio is far from that of the vehicle file.
-pub(crate) fn check_wheel(output_over_wheel: f64, final_ratio: f64) -> Result<(), Error> {
-    if (output_over_wheel / final_ratio - 1.0).abs() > WHEEL {
+/// Refuses wheels that do not turn with the output: their middle ratio is far from that of the vehicle file, and their scale outside its bound.
+pub(crate) fn check_wheel(output_over_wheel: f64, final_ratio: f64, wheel_scale: f64) -> Result<(), Error> {
+    let is_far = (output_over_wheel / final_ratio - 1.0).abs() > WHEEL;
+    let has_bound = (final_ratio / output_over_wheel - 1.0).abs() <= wheel_scale + SLIPS;
+    if is_far && !has_bound {
         return Err(Error::Input(format!(
             "output_speed over wheel_speed is {output_over_wheel:.2} in the middle, and the final ratio of the vehicle file is {final_ratio:.2}\n\
              hint: check unit and scale of wheel_speed and output_speed, and `driveline.final_ratio`",

@@ -15,8 +15,9 @@ pub(crate) struct Shifts<'a> {
     ratios: Vec<f64>,
     selection: Selection,
     recent: RecentSamples,
-    /// When the last one ended, s.
+    /// When the last one ended, s, and its gears.
     ended_s: f64,
+    gears: Option<[u32; 2]>,
     /// Those that are wanted.
     pub(crate) found: Vec<ShiftEstimate>,
     pub(crate) overview: Overview,
@@ -30,6 +31,7 @@ impl<'a> Shifts<'a> {
             selection: Selection::of(wanted),
             recent: RecentSamples::default(),
             ended_s: f64::NEG_INFINITY,
+            gears: None,
             found: Vec::new(),
             overview: Overview::default(),
         }
@@ -52,12 +54,15 @@ impl<'a> Shifts<'a> {
 
     /// The shift at the end of the log that the observer alone has seen, if there is one.
     pub(crate) fn of_observer_alone(&self) -> Option<Shift> {
-        seen_by_observer_alone(&self.recent, self.ended_s, &self.ratios, self.vehicle)
+        let seen = seen_by_observer_alone(&self.recent, self.ended_s, &self.ratios, self.vehicle);
+        // It is the last one again, if there was no other between them.
+        seen.filter(|shift| self.gears != Some([shift.from, shift.to]))
     }
 
     /// Takes a shift that is known now; `write` gets its samples if only some shifts are wanted and this is one.
     pub(crate) fn take<E>(&mut self, shift: Shift, write: impl FnOnce(&[LogSample]) -> Result<(), E>) -> Result<(), E> {
         self.ended_s = self.ended_s.max(shift.end_s());
+        self.gears = Some([shift.from, shift.to]);
         if !self.selection.begins(&format!("{}-{}", shift.from, shift.to)) {
             return Ok(());
         }
