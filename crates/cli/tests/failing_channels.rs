@@ -229,6 +229,25 @@ fn a_shift_in_which_a_speed_fails_keeps_its_friction_work_and_says_what_failed()
     }
 }
 
+/// An observer that needs the engine speed sees nothing of the shift without it.
+#[test]
+fn the_range_of_friction_work_holds_where_the_observer_did_not_see_the_begin() {
+    let case = Case::one_shift();
+    for observer in ["rigid", "best", "open-loop"] {
+        let more = ["--observer", observer];
+        let (_, _, clean) = case.estimate(&case.log, &more);
+        let ([work_j, ..], _) = work_of_first(&clean);
+        for (from_s, to_s) in [(7.24, 8.24), (7.24, 8.05), (7.0, 9.0)] {
+            let (note, _, shifts) = case.estimate(&case.with("engine_speed_rad_s", [from_s, to_s], "0"), &more);
+            let ([_, least_j, greatest_j], _) = work_of_first(&shifts);
+            assert!(
+                least_j < work_j && work_j < greatest_j,
+                "{observer} {from_s}: {least_j} {work_j} {greatest_j} {note}"
+            );
+        }
+    }
+}
+
 /// The wheels show the gears where the output does not.
 #[test]
 fn a_shift_over_which_the_output_fails_is_found_by_the_wheels() {

@@ -411,10 +411,10 @@ impl EstimatedShift {
     }
 }
 
-/// Whether turbine or output speed did not come for a while, or was refused.
+/// Whether the observer does not see the shift: turbine or output speed did not come for a while, or was refused, or another one that it needs.
 fn is_blind(sample: &LogSample) -> bool {
-    let Channels { turbine, output, .. } = sample.estimate.channels;
-    turbine.is_refused() || output.is_refused()
+    let Estimate { health, channels: Channels { turbine, output, .. }, .. } = sample.estimate;
+    turbine.is_refused() || output.is_refused() || health == Health::SpeedsRejected
 }
 
 fn pressure(sample: &LogSample) -> Ranged {
