@@ -476,7 +476,13 @@ fn sensitivity_shows_what_cannot_be_told_apart() {
     let output = wetclutch(&["sensitivity", VEHICLE, "-o", &folder.path("out")]);
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(stdout(&output).contains("turbine torque, error before the shift") && stdout(&output).contains("0.1 deg"));
-    assert!(read(folder.path("out/sensitivity.html")).contains("Inertia phase, with the shaft torque known"));
+    let page = read(folder.path("out/sensitivity.html"));
+    assert!(page.contains("Inertia phase, with the shaft torque known"));
+    // Figures first: a bar for each error, the widest over the whole width, with a mark at the valve model.
+    let charts = page.split_once("<div class=\"charts\">").unwrap().1.split_once("</div>").unwrap().0;
+    assert_eq!(charts.matches("<table class=\"chart\">").count(), 4);
+    assert!(charts.contains("style=\"width: 100.0%\"") && charts.contains("<i style=\"left: "), "{charts}");
+    assert_eq!(charts.matches("<th scope=\"row\">").count(), charts.matches("class=\"effect\"").count());
 }
 
 #[test]

@@ -5,7 +5,7 @@ use anstyle::{AnsiColor, Style};
 use console::Term;
 use trace::printable;
 
-use super::view::{self, CURVES, DRIVELINE, PANELS, PRESSURE, SPEED, State, TORQUE, Value};
+use super::view::{self, CURVES, DRIVELINE, PANELS, PRESSURE, SPEED, Shift, State, TORQUE, Value};
 
 /// Height of the figure, lines.
 const FIGURE: usize = 8;
@@ -71,7 +71,6 @@ fn styled(text: &str, style: Style, is_coloured: bool) -> String {
 fn picture(state: &State, (title, page): (&str, Option<&str>), (width, is_coloured): (usize, bool)) -> Vec<String> {
     let style = |text: &str, style: Style| styled(text, style, is_coloured);
     let values = state.values();
-    let mut lines = vec![cut(&printable(title), width)];
     let health = state.word("health");
     let health = match health {
         "" => String::new(),
@@ -79,15 +78,14 @@ fn picture(state: &State, (title, page): (&str, Option<&str>), (width, is_colour
         other => format!("health {}", style(&plain(other), WARNING)),
     };
     let rate = if state.rate > 0.0 { format!(", {:.0} rows/s", state.rate) } else { String::new() };
-    lines.push(format!(
-        "{}  {}{health}",
-        style(&format!("{:.2} s", state.time_s - state.origin_s), TITLE),
-        gear_words(state)
-    ));
-    lines[0] += &rate;
-    lines.push(of_panel(state, &values, SPEED));
-    lines.push(of_panel(state, &values, DRIVELINE));
-    lines.push(String::new());
+    let time = style(&format!("{:.2} s", state.time_s - state.origin_s), TITLE);
+    let mut lines = vec![
+        format!("{}{rate}", printable(title)),
+        format!("{time}  {}{health}", gear_words(state)),
+        of_panel(state, &values, SPEED),
+        of_panel(state, &values, DRIVELINE),
+        String::new(),
+    ];
     lines.extend(clutches(state, &values, is_coloured));
     let elements = state.elements();
     if !elements.is_empty() {
@@ -97,29 +95,23 @@ fn picture(state: &State, (title, page): (&str, Option<&str>), (width, is_colour
     }
     lines.push(String::new());
     lines.extend(figure(state, width, is_coloured));
-    let shifts = state.shifts.iter().rev().take(SHIFTS);
-    let shifts: Vec<String> = shifts
-        .map(|shift| {
-            let time = shift.end_s.map_or("goes on".to_owned(), |end_s| format!("{:.2} s", end_s - shift.begin_s));
-            let health = if shift.health.is_empty() { "good".to_owned() } else { shift.health.join(", ") };
-            format!(
-                "shift {:<4} {:<6} at {:>9.2} s   {time:<8} {}",
-                shift.number,
-                shift.gears,
-                shift.begin_s - state.origin_s,
-                plain(&health)
-            )
-        })
-        .collect();
-    if !shifts.is_empty() {
+    if !state.shifts.is_empty() {
         lines.push(String::new());
-        lines.extend(shifts);
+        lines.extend(state.shifts.iter().rev().take(SHIFTS).map(|shift| shift_line(shift, state.origin_s)));
     }
     lines.push(match page {
         Some(page) => format!("Ctrl-C ends it   page: {page}"),
         None => "Ctrl-C ends it".to_owned(),
     });
-    lines
+    // A line that goes on below would be drawn over only in part.
+    lines.iter().map(|line| cut(line, width)).collect()
+}
+
+fn shift_line(shift: &Shift, origin_s: f64) -> String {
+    let Shift { number, gears, begin_s, end_s, health } = shift;
+    let time = end_s.map_or("goes on".to_owned(), |end_s| format!("{:.2} s", end_s - begin_s));
+    let health = if health.is_empty() { "good".to_owned() } else { health.join(", ") };
+    format!("shift {number:<4} {gears:<6} at {:>9.2} s   {time:<8} {}", begin_s - origin_s, plain(&health))
 }
 
 /// A word of a table in plain words.
@@ -127,9 +119,19 @@ fn plain(word: &str) -> String {
     word.replace('_', " ")
 }
 
-/// A text that is no wider.
-fn cut(text: &str, width: usize) -> String {
-    text.chars().take(width.saturating_sub(20)).collect()
+/// As much of a line as is no wider; what sets a style takes no room and stays.
+fn cut(line: &str, width: usize) -> String {
+    let (mut shown, mut is_style) = (0, false);
+    let fits = |c: &char| {
+        is_style |= *c == '\x1b';
+        if is_style {
+            is_style = *c != 'm';
+            return true;
+        }
+        shown += 1;
+        shown <= width
+    };
+    line.chars().filter(fits).collect()
 }
 
 fn gear_words(state: &State) -> String {
@@ -201,7 +203,7 @@ fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
     let columns = width.saturating_sub(LABELS + 3).clamp(10, 200);
     let end = round_above(largest);
     // Which dots of a character are set, and by which curve last.
-    let mut dots = vec![[(0_u32, None); 1]; columns * FIGURE];
+    let mut dots: Vec<(u32, Option<Style>)> = vec![(0, None); columns * FIGURE];
     for sample in &state.samples {
         let x = ((sample.time_s - first.time_s) / span_s * (columns * DOTS[0] - 1) as f64).round() as usize;
         for (at, style) in &curves {
@@ -211,9 +213,9 @@ fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
             }
             let height = (FIGURE * DOTS[1] - 1) as f64;
             let y = (height * (1.0 - (value / end).clamp(0.0, 1.0))).round() as usize;
-            let [cell] = &mut dots[y / DOTS[1] * columns + x / DOTS[0]];
-            cell.0 |= BITS[y % DOTS[1]][x % DOTS[0]];
-            cell.1 = Some(*style);
+            let (bits, of) = &mut dots[y / DOTS[1] * columns + x / DOTS[0]];
+            *bits |= BITS[y % DOTS[1]][x % DOTS[0]];
+            *of = Some(*style);
         }
     }
     let decimals = PANELS[PRESSURE].decimals.min(2);
@@ -223,7 +225,7 @@ fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
             row if row + 1 == FIGURE => number(0.0, decimals),
             _ => String::new(),
         };
-        let cells = dots[row * columns..(row + 1) * columns].iter().map(|[(bits, style)]| {
+        let cells = dots[row * columns..(row + 1) * columns].iter().map(|(bits, style)| {
             let dots = char::from_u32(NO_DOT + bits).unwrap_or(' ').to_string();
             style.map_or(dots.clone(), |style| styled(&dots, style, is_coloured))
         });
@@ -256,7 +258,63 @@ fn round_above(largest: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use wetclutch::estimate::{LiveCell, LiveRows as _};
+
+    use super::super::view::View;
     use super::*;
+
+    #[test]
+    fn the_picture_has_what_is_known_within_the_width_of_the_terminal() {
+        let view = View::new(10.0);
+        let names = [
+            "gear",
+            "target_gear",
+            "health",
+            "oncoming",
+            "engine_speed_rad_s",
+            "oncoming_pressure_estimate_pa",
+            "oncoming_pressure_least_pa",
+            "oncoming_pressure_greatest_pa",
+            "element_b_valve_model_pressure_pa",
+        ];
+        view.begin(&names);
+        for step in 0..300 {
+            let word = |word: &str| LiveCell::Word(word.to_owned());
+            let pressure_pa = 5e3 * f64::from(step);
+            let shifts = ["1", if step > 100 { "2" } else { "1" }, if step > 200 { "reading_refused" } else { "good" }];
+            let numbers = [200.0, pressure_pa, 0.9 * pressure_pa, 1.1 * pressure_pa, 1.6e6].map(LiveCell::Number);
+            let cells: Vec<LiveCell> = shifts.map(word).into_iter().chain([word("E")]).chain(numbers).collect();
+            view.row(0.01 * f64::from(step), &cells);
+        }
+        let lines = |width: usize, is_coloured: bool| {
+            view.with(|state| picture(state, ("a log", Some("http://127.0.0.1:1/")), (width, is_coloured))).unwrap()
+        };
+        let plain = lines(90, false);
+        let text = plain.join("\n");
+        for part in [
+            "2.99 s  gear 1 to 2   health reading refused",
+            "engine  200.0  rad/s",
+            "oncoming E       1.495 (1.345 to 1.645)",
+            "by the command   B 1.60",
+            "    2.00 |",
+            "shift 1    1-2    at      1.01 s   goes on  reading refused",
+            "page: http://127.0.0.1:1/",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert!(!text.contains('\x1b') && lines(90, true).join("").contains("\x1b[36m"));
+        for width in [0, 5, 20, 40, 90, 300] {
+            assert!(lines(width, false).iter().all(|line| line.chars().count() <= width), "{width}");
+        }
+    }
+
+    #[test]
+    fn a_line_is_cut_to_the_width_of_the_terminal_and_keeps_its_styles() {
+        assert_eq!(cut("speeds", 80), "speeds");
+        assert_eq!(cut("speeds", 3), "spe");
+        assert_eq!(cut("\x1b[33moff\x1b[0m and on", 5), "\x1b[33moff\x1b[0m a");
+        assert_eq!(cut("", 0), "");
+    }
 
     #[test]
     fn an_axis_ends_at_a_round_number_above() {
