@@ -103,23 +103,13 @@ pub(super) fn contain_vehicle(check: &Check<'_>, raw: &RawErrorBounds, vehicle: 
         Err(check.meaning(format_args!("design.error_bounds.{key}"), at, message, Some(hint)))
     };
     let full = plausible::full_command(&oncoming.valve).min(settings.command_max);
-    let (highest_pa, [_, gain]) = (oncoming.valve.settled_pressure(full), bounds.valve_gain_factor);
+    let highest_pa = oncoming.valve.settled_pressure(full);
     let pressure_max_pa = bounds.pressure_max_pa;
-    // A rounded product is not less.
-    if pressure_max_pa < (1.0 - 1e-9) * gain * highest_pa {
-        let (message, hint) = if pressure_max_pa < highest_pa {
-            let message = format!(
-                "{pressure_max_pa} Pa is less than the {highest_pa:.0} Pa that the valve of this file gives at its largest command: the car of this file would be outside its own error bounds"
-            );
-            (message, format!("{:.0} with the largest gain of the bounds", gain * highest_pa))
-        } else {
-            let message = format!(
-                "{pressure_max_pa} Pa is less than the {:.0} Pa of the largest command, {highest_pa:.0} Pa, with the largest gain of `valve_gain_factor`, {gain}: \
-                 ranges would end below pressures within the bounds",
-                gain * highest_pa
-            );
-            (message, format!("{:.0}, or a smaller gain", gain * highest_pa))
-        };
+    if pressure_max_pa < highest_pa {
+        let message = format!(
+            "{pressure_max_pa} Pa is less than the {highest_pa:.0} Pa that the valve of this file gives at its largest command: the car of this file would be outside its own error bounds"
+        );
+        let hint = format!("{:.0} with the largest gain of the bounds", highest_pa * bounds.valve_gain_factor[1]);
         return outside("pressure_max_pa", raw.pressure_max_pa.span().start, (message, hint));
     }
     match (&oncoming.valve, &raw.line_pressure_pa) {

@@ -57,15 +57,16 @@ impl VehicleFile {
     }
 
     fn of_pressures(&self) -> [Judged; 2] {
-        let valve = &self.oncoming.valve;
+        let (valve, [_, gain]) = (&self.oncoming.valve, self.error_bounds.valve_gain_factor);
         let hysteresis_pa = self.error_bounds.valve_hysteresis_pa;
         [
             Judged {
                 key: "design.error_bounds.pressure_max_pa".to_owned(),
-                what: "over the pressure of the valve at the end of its maps",
-                value: self.error_bounds.pressure_max_pa / valve.settled_pressure(full_command(valve)),
-                usual: [1.0, 10.0],
-                hint: "it is the largest pressure of the supply, in Pa, and the limit of all pressures; 1 MPa is 1e6 Pa",
+                what: "over the pressure of the valve at the end of its maps, with the largest `valve_gain_factor`",
+                value: self.error_bounds.pressure_max_pa / (gain * valve.settled_pressure(full_command(valve))),
+                // A fit moves gain and bounds by less.
+                usual: [0.95, 10.0],
+                hint: "it is the largest pressure of the supply, in Pa, at which all ranges end, whatever the gain; 1 MPa is 1e6 Pa",
             },
             Judged {
                 key: "design.error_bounds.valve_hysteresis_pa".to_owned(),
