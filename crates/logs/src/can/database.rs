@@ -84,7 +84,10 @@ impl Database {
     /// It is no DBC, or larger than any.
     pub fn of_text(path: &Path, bytes: &[u8]) -> Result<Self, LogError> {
         if bytes.len() as u64 > LARGEST_LIST {
-            return Err(LogError::file(path, "this is larger than any DBC"));
+            return Err(LogError::file(
+                path,
+                "this is larger than any DBC\nhint: check that it is the database of the bus, not a log",
+            ));
         }
         Self::parse(path, &trace::text::text_of(bytes))
     }

@@ -43,8 +43,9 @@ impl Server {
     /// Listens at a port of 127.0.0.1; 0 is one that is free.
     pub(super) fn open(port: u16) -> Result<Self, Failure> {
         let failed = |error: io::Error| {
-            let hint = "hint: choose another port, or none for one that is free";
-            Failure::Input(format!("--serve: port {port} of 127.0.0.1: {error}\n{hint}"))
+            Failure::Input(format!(
+                "--serve: port {port} of 127.0.0.1: {error}\nhint: choose another port, or none for one that is free"
+            ))
         };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
