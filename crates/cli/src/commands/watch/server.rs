@@ -17,7 +17,7 @@ const MAX_LOOKING: usize = 16;
 /// Bytes of a request that are read.
 const MAX_REQUEST: u64 = 16 << 10;
 /// How long a browser may take for a request, or to take a part of an answer.
-const PATIENCE: Duration = Duration::from_secs(5);
+const PATIENCE: Duration = Duration::from_secs(2);
 /// Pictures between two lines without news: a browser that has gone is noticed by them.
 const PICTURES_TO_A_SIGN: u32 = 20;
 
