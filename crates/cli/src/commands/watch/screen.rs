@@ -7,8 +7,8 @@ use trace::printable;
 
 use super::view::{self, CURVES, DRIVELINE, PANELS, PRESSURE, SPEED, Shift, State, TORQUE, Value};
 
-/// Height of the figure, lines.
-const FIGURE: usize = 8;
+/// Height of the figure, lines: what the terminal has room for within these.
+const FIGURE: [usize; 2] = [3, 16];
 /// Shifts that are listed.
 const SHIFTS: usize = 4;
 /// Width of the labels of the figure.
@@ -43,8 +43,10 @@ impl<'a> Screen<'a> {
     /// Draws the picture. A terminal that cannot be written to gets none.
     pub(super) fn draw(&mut self, state: &State) {
         let (rows, columns) = self.terminal.size_checked().unwrap_or((24, 80));
-        let mut lines = picture(state, (self.title, self.page), (usize::from(columns), self.is_coloured));
-        lines.truncate(usize::from(rows).saturating_sub(1).max(1));
+        // The cursor has a line.
+        let height = usize::from(rows).saturating_sub(1).max(1);
+        let mut lines = picture(state, (self.title, self.page), ([usize::from(columns), height], self.is_coloured));
+        lines.truncate(height);
         // In one piece, so that no half of a picture is seen. What is left of the one before is removed.
         let mut text = if self.lines > 1 { format!("\r\x1b[{}A", self.lines - 1) } else { "\r".to_owned() };
         text += &lines.join("\x1b[K\n");
@@ -68,7 +70,11 @@ fn styled(text: &str, style: Style, is_coloured: bool) -> String {
 }
 
 /// The lines of the picture.
-fn picture(state: &State, (title, page): (&str, Option<&str>), (width, is_coloured): (usize, bool)) -> Vec<String> {
+fn picture(
+    state: &State,
+    (title, page): (&str, Option<&str>),
+    ([width, height], is_coloured): ([usize; 2], bool),
+) -> Vec<String> {
     let style = |text: &str, style: Style| styled(text, style, is_coloured);
     let values = state.values();
     let health = state.word("health");
@@ -94,15 +100,20 @@ fn picture(state: &State, (title, page): (&str, Option<&str>), (width, is_colour
         lines.push(format!("by the command   {}", all.collect::<Vec<_>>().join("   ")));
     }
     lines.push(String::new());
-    lines.extend(figure(state, width, is_coloured));
+    let mut below = Vec::new();
     if !state.shifts.is_empty() {
-        lines.push(String::new());
-        lines.extend(state.shifts.iter().rev().take(SHIFTS).map(|shift| shift_line(shift, state.origin_s)));
+        below.push(String::new());
+        below.extend(state.shifts.iter().rev().take(SHIFTS).map(|shift| shift_line(shift, state.origin_s)));
     }
-    lines.push(match page {
+    below.push(match page {
         Some(page) => format!("Ctrl-C ends it   page: {page}"),
         None => "Ctrl-C ends it".to_owned(),
     });
+    let [low, high] = FIGURE;
+    // Its title has a line.
+    let rows = height.saturating_sub(lines.len() + below.len() + 1).clamp(low, high);
+    lines.extend(figure(state, [width, rows], is_coloured));
+    lines.extend(below);
     // A line that goes on below would be drawn over only in part.
     lines.iter().map(|line| cut(line, width)).collect()
 }
@@ -192,7 +203,7 @@ fn clutches(state: &State, values: &[Value], is_coloured: bool) -> Vec<String> {
 }
 
 /// The pressures of both clutches over the last seconds, in dots.
-fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
+fn figure(state: &State, [width, rows]: [usize; 2], is_coloured: bool) -> Vec<String> {
     let of = |name: &str| CURVES.iter().position(|curve| curve.panel == PRESSURE && curve.name == name);
     let curves = [("offgoing", OFFGOING), ("oncoming", ONCOMING)];
     let curves: Vec<(usize, Style)> = curves.into_iter().filter_map(|(name, style)| Some((of(name)?, style))).collect();
@@ -203,7 +214,7 @@ fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
     let columns = width.saturating_sub(LABELS + 3).clamp(10, 200);
     let end = round_above(largest);
     // Which dots of a character are set, and by which curve last.
-    let mut dots: Vec<(u32, Option<Style>)> = vec![(0, None); columns * FIGURE];
+    let mut dots: Vec<(u32, Option<Style>)> = vec![(0, None); columns * rows];
     for sample in &state.samples {
         let x = ((sample.time_s - first.time_s) / span_s * (columns * DOTS[0] - 1) as f64).round() as usize;
         for (at, style) in &curves {
@@ -211,7 +222,7 @@ fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
             if !value.is_finite() {
                 continue;
             }
-            let height = (FIGURE * DOTS[1] - 1) as f64;
+            let height = (rows * DOTS[1] - 1) as f64;
             let y = (height * (1.0 - (value / end).clamp(0.0, 1.0))).round() as usize;
             let (bits, of) = &mut dots[y / DOTS[1] * columns + x / DOTS[0]];
             *bits |= BITS[y % DOTS[1]][x % DOTS[0]];
@@ -222,7 +233,7 @@ fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
     let line = |row: usize| {
         let label = match row {
             0 => number(end, decimals),
-            row if row + 1 == FIGURE => number(0.0, decimals),
+            row if row + 1 == rows => number(0.0, decimals),
             _ => String::new(),
         };
         let cells = dots[row * columns..(row + 1) * columns].iter().map(|(bits, style)| {
@@ -237,7 +248,7 @@ fn figure(state: &State, width: usize, is_coloured: bool) -> Vec<String> {
         styled("offgoing", OFFGOING, is_coloured),
         styled("oncoming", ONCOMING, is_coloured)
     );
-    std::iter::once(title).chain((0..FIGURE).map(line)).collect()
+    std::iter::once(title).chain((0..rows).map(line)).collect()
 }
 
 /// The end of an axis from zero.
@@ -287,10 +298,12 @@ mod tests {
             view.row(0.01 * f64::from(step), &cells);
         }
         let lines = |width: usize, is_coloured: bool| {
-            view.with(|state| picture(state, ("a log", Some("http://127.0.0.1:1/")), (width, is_coloured))).unwrap()
+            view.with(|state| picture(state, ("a log", Some("http://127.0.0.1:1/")), ([width, 23], is_coloured)))
+                .unwrap()
         };
         let plain = lines(90, false);
         let text = plain.join("\n");
+        assert_eq!(plain.len(), 23, "{text}");
         for part in [
             "2.99 s  gear 1 to 2   health reading refused",
             "engine  200.0  rad/s",
