@@ -122,10 +122,10 @@ fn pressures_that_the_valve_of_the_file_exceeds_are_refused() {
         format!("vehicle.toml:{line}: `design.error_bounds.pressure_max_pa`: 500000 Pa is less than the 1100000 Pa");
     // Ranges end at the pressure of the supply, also where the largest gain would give more: `check` tells it.
     let text = VEHICLE.replace("valve_gain_factor = [0.9, 1.1]", "valve_gain_factor = [0.7, 1.3]");
-    let told = VehicleFile::from_source(Source::built_in("v.toml", &text)).unwrap().implausible();
+    let warnings = VehicleFile::from_source(Source::built_in("v.toml", &text)).unwrap().implausible();
     assert!(
-        told.len() == 1 && told[0].contains("pressure_max_pa") && told[0].contains("whatever the gain"),
-        "{told:?}"
+        warnings.len() == 1 && warnings[0].contains("pressure_max_pa") && warnings[0].contains("whatever the gain"),
+        "{warnings:?}"
     );
     assert!(low.starts_with(&expected) && low.contains("\nhint: 1210000 with the largest gain"), "{low}");
     let path = format!("{}/../../vehicles/two_speed_pwm.toml", env!("CARGO_MANIFEST_DIR"));

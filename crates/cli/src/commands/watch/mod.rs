@@ -51,14 +51,25 @@ pub(crate) fn watch(options: &Watch) -> Result<(), Failure> {
                 let mut screen = Screen::new(terminal, &title, address.as_deref());
                 while !has_ended.load(Ordering::Relaxed) {
                     thread::sleep(REDRAWN);
-                    view.with(|state| screen.draw(state));
+                    // A terminal that stands still holds up neither the estimate nor the page.
+                    if let Some(lines) = view.with(|state| screen.lines(state)) {
+                        screen.draw(&lines);
+                    }
                 }
             });
         }
-        let result = live(&arguments, (&view, &stop), &mut messages);
-        has_ended.store(true, Ordering::Relaxed);
-        result
+        let _ending = Ending(&has_ended);
+        live(&arguments, (&view, &stop), &mut messages)
     });
     let shown = messages.show(&options.log);
     result.and(shown)
+}
+
+/// Ends what shows an estimate when the estimate ends, in whatever way.
+struct Ending<'a>(&'a AtomicBool);
+
+impl Drop for Ending<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }

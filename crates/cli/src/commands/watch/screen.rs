@@ -40,13 +40,18 @@ impl<'a> Screen<'a> {
         Self { terminal, title, page, is_coloured, lines: 0 }
     }
 
-    /// Draws the picture. A terminal that cannot be written to gets none.
-    pub(super) fn draw(&mut self, state: &State) {
+    /// The lines of the picture, as many as the terminal has room for.
+    pub(super) fn lines(&self, state: &State) -> Vec<String> {
         let (rows, columns) = self.terminal.size_checked().unwrap_or((24, 80));
         // The cursor has a line.
         let height = usize::from(rows).saturating_sub(1).max(1);
         let mut lines = picture(state, (self.title, self.page), ([usize::from(columns), height], self.is_coloured));
         lines.truncate(height);
+        lines
+    }
+
+    /// Draws these lines. A terminal that cannot be written to gets none.
+    pub(super) fn draw(&mut self, lines: &[String]) {
         // In one piece, so that no half of a picture is seen. What is left of the one before is removed.
         let mut text = if self.lines > 1 { format!("\r\x1b[{}A", self.lines - 1) } else { "\r".to_owned() };
         text += &lines.join("\x1b[K\n");
