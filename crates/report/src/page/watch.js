@@ -18,6 +18,7 @@ let samples = [];
 let latest = null;
 let isHeld = false;
 let isDue = false;
+let newsAt = 0;
 
 const plots = settings.panels.map((panel) => {
   const figure = document.createElement("div");
@@ -138,8 +139,14 @@ new ResizeObserver(redraw).observe(at("panels"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 
 const rows = new EventSource("/rows");
+// Longer than a recorder writes at a time, ms.
+const STALLED = 3000;
+setInterval(() => {
+  if (latest && rows.readyState === EventSource.OPEN && Date.now() - newsAt > STALLED) at("state").textContent = "no new rows";
+}, 500);
 rows.addEventListener("message", (event) => {
   latest = JSON.parse(event.data);
+  newsAt = Date.now();
   for (const sample of latest.samples) {
     if (samples.length && sample[0] < samples.at(-1)[0]) samples = [];
     samples.push(sample);

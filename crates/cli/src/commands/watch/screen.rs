@@ -88,7 +88,11 @@ fn picture(
         "good" => "health good".to_owned(),
         other => format!("health {}", style(&plain(other), WARNING)),
     };
-    let rate = if state.rate > 0.0 { format!(", {:.0} rows/s", state.rate) } else { String::new() };
+    let rate = match state.rate() {
+        None => ", no new rows".to_owned(),
+        Some(rate) if rate > 0.0 => format!(", {rate:.0} rows/s"),
+        Some(_) => String::new(),
+    };
     let time = style(&format!("{:.2} s", state.time_s - state.origin_s), TITLE);
     let mut lines = vec![
         format!("{}{rate}", printable(title)),

@@ -192,7 +192,7 @@ fn news(state: &State, sent: u64) -> Json {
             json!([shift.number, shift.gears, rounded(shift.begin_s - state.origin_s), time_s, shift.health])
         })
         .collect();
-    json!({ "samples": samples, "words": words, "elements": elements, "shifts": shifts, "rate": rounded(state.rate) })
+    json!({ "samples": samples, "words": words, "elements": elements, "shifts": shifts, "rate": state.rate().map(rounded) })
 }
 
 /// A number with as many digits as a figure shows; null where there is none.

@@ -11,8 +11,9 @@ use wetclutch::estimate::{LiveCell, LiveRows, shown_from_s};
 const SAMPLES: f64 = 2000.0;
 /// Shifts that are kept.
 const SHIFTS: usize = 200;
-/// Time constant of the rate of the rows, s.
+/// The rate of the rows is counted over so long, s, and none come if it was not counted for so long.
 const RATE_S: f64 = 1.0;
+const STALLED_S: f64 = 3.0;
 
 /// A panel of curves.
 pub(super) struct Panel {
@@ -129,7 +130,7 @@ pub(super) struct State {
     pub(super) dropped: u64,
     pub(super) shifts: VecDeque<Shift>,
     /// Rows per second, and when and after how many rows that was found.
-    pub(super) rate: f64,
+    rate: f64,
     counted: Option<(Instant, u64)>,
 }
 
@@ -205,6 +206,12 @@ impl State {
         {
             shift.health.push(health);
         }
+    }
+
+    /// Rows per second, zero before they are counted; none where no row comes any more.
+    pub(super) fn rate(&self) -> Option<f64> {
+        let (since, _) = self.counted?;
+        (since.elapsed().as_secs_f64() < STALLED_S).then_some(self.rate)
     }
 
     fn count(&mut self) {
