@@ -24,12 +24,17 @@ impl Car {
                 self.names(oncoming)
             ),
             Change::Single { .. } if gearbox.is_same_ratio(from, to) => "both gears have one ratio".to_owned(),
+            Change::Single { offgoing, oncoming, .. } if !shift.changes_dog_under_power(gearbox) => format!(
+                "{} off and {} on, one of them a dog: it can be put in in a downshift and taken out in an upshift",
+                self.names(&[*offgoing]),
+                self.names(&[*oncoming])
+            ),
             Change::Single { offgoing, oncoming, .. } => {
                 let both = [*offgoing, *oncoming];
                 match both.into_iter().find(|&element| !self.can_change(element)) {
                     Some(element) => format!("{} has no plates (`pack`) in the gearbox file", gearbox.elements[element].name),
-                    None if both.iter().all(|&element| gearbox.is_one_way(element)) => {
-                        format!("{} are both one-way clutches: nothing can be commanded", self.names(&both))
+                    None if !both.iter().any(|&element| self.has_valve(element)) => {
+                        format!("{} have no pressure: nothing can be commanded", self.names(&both))
                     }
                     None => "turbine and output speed do not determine the speeds of the other shafts, or no inertia is given".to_owned(),
                 }
@@ -38,9 +43,13 @@ impl Car {
         }
     }
 
-    /// Whether an element can open or close under load: with plates and valve, or as a one-way clutch.
+    /// Whether an element can open or close in a shift: with plates and valve, as a one-way clutch, or as a dog.
     fn can_change(&self, element: usize) -> bool {
-        self.clutches.get(element).is_some_and(Option::is_some) || self.gearbox.is_one_way(element)
+        self.has_valve(element) || self.gearbox.is_one_way(element) || self.gearbox.is_dog(element)
+    }
+
+    fn has_valve(&self, element: usize) -> bool {
+        self.clutches.get(element).is_some_and(Option::is_some)
     }
 
     fn names(&self, elements: &[usize]) -> String {

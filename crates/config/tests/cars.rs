@@ -169,6 +169,7 @@ fn a_first_file_of_every_shipped_gearbox_is_short_and_a_car_of_its_numbers() {
                 name: "car \"x\"".to_owned(),
                 gearbox: "g.toml".to_owned(),
                 has_converter: name != "dual_clutch_7",
+                converter: None,
                 has_stroke: engine_torque_n_m > 1000.0,
                 mass_kg: 5.0 * engine_torque_n_m + 500.0,
                 wheel_radius_m: 0.35,
@@ -315,6 +316,7 @@ fn the_shipped_vehicle_files_are_right() {
         ("eight_speed_8hp45", 5),
         ("eight_speed_a8lr1", 6),
         ("nine_speed_9g", 6),
+        ("nine_speed_9hp", 4),
         ("dual_clutch", 2),
     ] {
         let path = format!("{folder}{name}.toml");

@@ -4,6 +4,7 @@
 
 mod cars;
 mod common;
+mod dogs;
 mod files;
 mod gearbox_errors;
 mod gearboxes;

@@ -70,6 +70,7 @@ layout! {
 /// Words of an element of a shift that is no clutch or brake with a place in the tables.
 const ONE_WAY: u32 = u32::MAX;
 const UNKNOWN: u32 = u32::MAX - 1;
+const DOG: u32 = u32::MAX - 2;
 /// Added to the place of one whose gear a one-way clutch holds too.
 const ONE_SIDED: u32 = 1 << 31;
 
@@ -79,6 +80,7 @@ impl Layout for ShiftElement {
             Self::Friction(place) => u32::from(place),
             Self::OneSided(place) => ONE_SIDED + u32::from(place),
             Self::OneWay => ONE_WAY,
+            Self::Dog => DOG,
             Self::Unknown => UNKNOWN,
         };
         sink.whole(name, word);
@@ -87,6 +89,8 @@ impl Layout for ShiftElement {
     fn take(words: &mut Words<'_>) -> Option<Self> {
         Some(match words.whole()? {
             ONE_WAY => Self::OneWay,
+            UNKNOWN => Self::Unknown,
+            DOG => Self::Dog,
             word if word >= ONE_SIDED => Self::one_sided((word - ONE_SIDED) as usize),
             place => Self::at(place as usize),
         })

@@ -21,10 +21,10 @@ pub fn controlling(kind: ShiftKind) -> usize {
     }
 }
 
-/// The same of the shift with these rows: the other one where that is a one-way clutch, which overruns then and drives nothing.
+/// The same of the shift with these rows: the other one where that is a one-way clutch or a dog, which drives nothing while it slips.
 pub fn controlling_of(rows: &[ShiftScoreRow], kind: ShiftKind) -> usize {
     let by_kind = controlling(kind);
-    if rows.first().is_some_and(|row| row.clutches[by_kind].is_one_way) { 1 - by_kind } else { by_kind }
+    if rows.first().is_some_and(|row| !row.clutches[by_kind].has_pressure) { 1 - by_kind } else { by_kind }
 }
 
 /// Errors over the rows of a phase.

@@ -399,7 +399,7 @@ fn clutch_row(
         torque_range_n_m: found.torque_range_n_m,
         pressure_range_pa: found.pressure_range_pa,
         hidden: found.hidden,
-        is_one_way: found.element.is_one_way(),
+        has_pressure: found.element.has_pressure(),
         in_range: within(found.pressure_range_pa, pressure_pa, ROUNDING_PA)
             && within(found.torque_range_n_m, torque_n_m, ROUNDING_N_M),
     }

@@ -37,8 +37,8 @@ pub struct ClutchRow {
     pub hidden: bool,
     /// Whether the truth is within the guaranteed ranges.
     pub in_range: bool,
-    /// Whether it is a one-way clutch, which has no pressure.
-    pub is_one_way: bool,
+    /// Whether pressure makes it hold: not that of a one-way clutch or a dog.
+    pub has_pressure: bool,
 }
 
 /// A row of a shift.
@@ -100,7 +100,7 @@ impl ClutchRow {
             slip_range_rad_s: None,
             alpha: f64::NAN,
             sticks,
-            is_one_way: false,
+            has_pressure: true,
             torque_range_n_m: None,
             pressure_range_pa: None,
             hidden: false,
@@ -289,7 +289,7 @@ pub fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstima
                 torque_range_n_m: found.torque_range_n_m,
                 pressure_range_pa: found.pressure_range_pa,
                 hidden: found.hidden,
-                is_one_way: found.element.is_one_way(),
+                has_pressure: found.element.has_pressure(),
                 in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
                     && within(found.torque_range_n_m, truth.torque_n_m, ROUNDING_N_M),
             }

@@ -25,6 +25,7 @@ fn every_vehicle_with_a_gearbox_has_an_image_that_a_controller_takes() {
         "six_speed",
         "four_speed",
         "four_speed_one_way",
+        "nine_speed_9hp",
         "dual_clutch",
     ] {
         let image = Image::of(&filter_of(&format!("{name}.toml"))).unwrap();

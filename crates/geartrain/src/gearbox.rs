@@ -157,6 +157,11 @@ impl Gearbox {
         self.elements.get(element).is_some_and(|element| element.kind == ElementKind::OneWayClutch)
     }
 
+    /// Whether an element is a dog.
+    pub fn is_dog(&self, element: usize) -> bool {
+        self.elements.get(element).is_some_and(|element| element.kind == ElementKind::Dog)
+    }
+
     /// The one-way clutch that holds a gear: one that is engaged without torque, as behind an open brake, holds none.
     pub fn one_way_clutch_of(&self, gear: usize) -> Option<usize> {
         let holds = |holding: &&Holding| self.is_one_way(holding.element) && holding.per_turbine_torque > ZERO;

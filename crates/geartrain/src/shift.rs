@@ -58,6 +58,16 @@ impl Shift {
         ShiftKind::of(turbine_n_m, gears[self.from].ratio, gears[self.to].ratio)
     }
 
+    /// Whether a dog that takes or gives up the load does so with an engine that drives, between gears of one direction: it is taken out without load
+    /// at the end of the torque phase of an upshift, and put in at the synchronous speed of a downshift, up to which the offgoing clutch
+    /// has held the turbine. True where no dog changes.
+    pub fn changes_dog_under_power(&self, gearbox: &Gearbox) -> bool {
+        let Change::Single { offgoing, oncoming, .. } = &self.change else { return true };
+        let [from, to] = [self.from, self.to].map(|gear| gearbox.gears[gear].ratio);
+        let fits = |element: usize, is_fit: bool| !gearbox.is_dog(element) || (is_fit && from * to > ZERO);
+        fits(*offgoing, from.abs() > to.abs()) && fits(*oncoming, from.abs() < to.abs())
+    }
+
     /// Whether an element that changes holds the turbine in one direction alone: a one-way clutch that is engaged in both gears, as the sprag
     /// behind a brake, holds the gear of this element too. While it overruns, this element carries nothing.
     pub fn is_one_sided(&self, gearbox: &Gearbox, element: usize) -> bool {

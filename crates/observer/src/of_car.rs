@@ -9,7 +9,7 @@ use crate::gearbox::{
 use crate::{Budget, FillBudget, InputLimits, ValveModel};
 use car::{Car, ElementErrors, ErrorBudget, Sensors};
 use drivetrain::{Cylinder, Real};
-use geartrain::{Change, ElementKind, Gear, Gearbox};
+use geartrain::{Change, Gear, Gearbox, Shift};
 
 use crate::of_sensors::{SCALE_MIN, engine_noise, speed_reading, std_dev_of};
 
@@ -50,7 +50,7 @@ pub struct ShiftTables<T> {
 
 impl ShiftTables<f64> {
     /// The tables of a gearbox whose elements are made by `friction_element` from their plates, `None` for an element without a valve. An
-    /// element without plates or valve, as a dog, is left out, and the shifts between others remain; so do those between one of them and a one-way clutch. What sits on the input
+    /// element without plates or valve is left out, and the shifts between others remain; so do those between one of them and a one-way clutch or a dog. What sits on the input
     /// shaft without being part of the gearbox, as an engine without converter, is added to the mass.
     ///
     /// # Errors
@@ -73,7 +73,8 @@ impl ShiftTables<f64> {
         }
         let shift_rows = gearbox.shifts.iter().filter_map(|shift| {
             let of = |element: usize| match places[element] {
-                None => gearbox.is_one_way(element).then_some(ShiftElement::OneWay),
+                None if gearbox.is_one_way(element) => Some(ShiftElement::OneWay),
+                None => gearbox.is_dog(element).then_some(ShiftElement::Dog),
                 Some(place) if shift.is_one_sided(gearbox, element) => Some(ShiftElement::one_sided(place)),
                 Some(place) => Some(ShiftElement::at(place)),
             };
@@ -86,10 +87,11 @@ impl ShiftTables<f64> {
             let mut reduced = shift.reduced?;
             reduced.mass_kg_m2[0][0] += more_on_input_kg_m2;
             // Between gears of one ratio the speeds show nothing.
-            if gearbox.is_same_ratio(shift.from, shift.to) || clutches == [ShiftElement::OneWay; 2] {
+            let has_valve = clutches.iter().any(|clutch| clutch.has_pressure());
+            if gearbox.is_same_ratio(shift.from, shift.to) || !has_valve || !shift.changes_dog_under_power(gearbox) {
                 return None;
             }
-            let has_dog = has_dog(gearbox, [shift.from, shift.to]);
+            let has_dog = has_dog(gearbox, shift);
             Some(ShiftRow { has_dog, ..ShiftRow::new([shift.from, shift.to], clutches, &reduced) })
         });
         let shifts: Vec<_> = shift_rows.collect();
@@ -209,11 +211,11 @@ fn holding(gear: &Gear, places: &[Option<usize>]) -> [f64; MAX_ELEMENTS] {
     holding
 }
 
-/// Whether a dog of the gear after is not in the gear before.
-fn has_dog(gearbox: &Gearbox, [from, to]: [usize; 2]) -> bool {
-    let holds = |gear: usize, element: usize| gearbox.gears[gear].holding.iter().any(|of| of.element == element);
-    let is_dog = |element: usize| gearbox.elements[element].kind == ElementKind::Dog;
-    gearbox.gears[to].holding.iter().any(|of| is_dog(of.element) && !holds(from, of.element))
+/// Whether a dog that is held in a shift is not in the gear before.
+fn has_dog(gearbox: &Gearbox, shift: &Shift) -> bool {
+    let Change::Single { held, .. } = &shift.change else { return false };
+    let is_in = |element: usize| gearbox.gears[shift.from].holding.iter().any(|of| of.element == element);
+    held.iter().any(|&element| gearbox.is_dog(element) && !is_in(element))
 }
 
 /// A piston whose stroke is within these limits, each the edge of a uniform distribution.

@@ -146,7 +146,7 @@ fn clutch_row([pressure_pa, torque_n_m, slip_rad_s]: [f64; 3], found: &[f64]) ->
         pressure_range_pa,
         hidden: false,
         in_range,
-        is_one_way: estimate_pa.is_nan(),
+        has_pressure: !estimate_pa.is_nan(),
     })
 }
 

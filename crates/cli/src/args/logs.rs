@@ -254,7 +254,7 @@ pub(crate) struct Init {
     /// Rolling radius of the driven wheels, m: 0.1 to 1
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = within(0.1..=1.0), required_unless_present = "from_log")]
     pub(crate) wheel_radius_m: Option<f64>,
-    /// The gearbox: 8hp, 10_speed, dual_clutch_7, lepelletier_6, ravigneaux_4, 722_6, 8hp45, 9g_tronic, a340e, a8lr1, c6, fn4a, tf80sc, or a gearbox file
+    /// The gearbox: 10_speed, 4l60e, 722_6, 8hp, 8hp45, 9g_tronic, 9hp48, a340e, a8lr1, c6, dual_clutch_7, fn4a, lepelletier_6, ravigneaux_4, tf80sc, th400, or a gearbox file
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["valve", "complete", "ratios"])]
     pub(crate) gearbox: Option<String>,
     /// What connects engine and gearbox [default: clutch for dual_clutch_7, else converter]

@@ -18,7 +18,7 @@ const LEVELS: &str = "the levels are \"stick-diagram\" (shafts, sets, elements),
                       \"ratios\" (ratios alone)";
 
 /// The gearbox files of the program, each by its name, for the gasoline engine of `vehicles/eight_speed.toml`.
-pub const SHIPPED: [(&str, &str); 15] = [
+pub const SHIPPED: [(&str, &str); 16] = [
     ("8hp", include_str!("../../../../gearboxes/8hp.toml")),
     ("10_speed", include_str!("../../../../gearboxes/10_speed.toml")),
     ("dual_clutch_7", include_str!("../../../../gearboxes/dual_clutch_7.toml")),
@@ -27,6 +27,7 @@ pub const SHIPPED: [(&str, &str); 15] = [
     ("722_6", include_str!("../../../../gearboxes/722_6.toml")),
     ("8hp45", include_str!("../../../../gearboxes/8hp45.toml")),
     ("9g_tronic", include_str!("../../../../gearboxes/9g_tronic.toml")),
+    ("9hp48", include_str!("../../../../gearboxes/9hp48.toml")),
     ("a340e", include_str!("../../../../gearboxes/a340e.toml")),
     ("a8lr1", include_str!("../../../../gearboxes/a8lr1.toml")),
     ("fn4a", include_str!("../../../../gearboxes/fn4a.toml")),

@@ -153,8 +153,8 @@ impl<'c> CommandDelay<'c> {
 
     fn judge(&mut self, waiting: &Waiting) {
         let Some(&shift) = self.tables.tables().commanded(waiting.shift) else { return };
-        // A one-way clutch has no pressure.
-        if shift.clutches.iter().any(|clutch| clutch.is_one_way()) {
+        // A one-way clutch or a dog has no pressure.
+        if shift.clutches.iter().any(|clutch| !clutch.has_pressure()) {
             return;
         }
         let Some(points) = self.points(waiting) else { return };

@@ -3,7 +3,7 @@
 use car::{Car, ErrorBudget};
 use drivetrain::Real;
 use nalgebra::DMatrix;
-use observer::gearbox::{ElementUncertainty, GearboxFilter};
+use observer::gearbox::{ElementUncertainty, GearboxFilter, ShiftClutch};
 use observer::{ShiftTables, element_uncertainty, gearbox_filter};
 
 use super::shift_log::ShiftLog;
@@ -310,7 +310,7 @@ pub(crate) fn std_dev_of(bound: f64) -> f64 {
     bound / 3.0_f64.sqrt()
 }
 
-/// The pairs of neighbouring gears and of these shifts with a shift from one clutch to another, the lower gear first.
+/// The pairs of neighbouring gears and of these shifts with a shift from one clutch or brake to another, the lower gear first.
 fn pairs(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<[usize; 2]> {
     let rows = tables.tables();
     let forward = car.gearbox.forward_gears();
@@ -322,7 +322,10 @@ fn pairs(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<[usiz
             pairs.push(pair);
         }
     }
-    pairs.retain(|[low, high]| rows.shift(*low, *high).is_some() || rows.shift(*high, *low).is_some());
+    let is_fitted = |from: usize, to: usize| {
+        rows.shift(from, to).is_some_and(|row| row.clutches.iter().all(ShiftClutch::has_pressure))
+    };
+    pairs.retain(|[low, high]| is_fitted(*low, *high) || is_fitted(*high, *low));
     pairs
 }
 

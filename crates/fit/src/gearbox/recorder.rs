@@ -276,8 +276,8 @@ impl<'a> Recorder<'a> {
         };
         let rows = self.tables.tables();
         let row = rows.commanded(gears).ok_or("it is not from one clutch to another")?;
-        if row.clutches.iter().any(ShiftClutch::is_one_way) {
-            return Err("one of its elements is a one-way clutch");
+        if !row.clutches.iter().all(ShiftClutch::has_pressure) {
+            return Err("one of its elements is a one-way clutch or a dog");
         }
         let span = [open.begun_s - 0.1, ended_s + AFTER_S];
         let commands = row.clutches.map(|clutch| {

@@ -323,7 +323,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             valve_pa,
             open_loop_n_m: open_loop_n_m / clutch.alpha,
             holds,
-            hidden: !holds && !clutch.is_one_way() && std_dev >= T::of(HIDDEN) * alone,
+            hidden: !holds && clutch.has_pressure() && std_dev >= T::of(HIDDEN) * alone,
             pressure_range_pa: None,
             torque_range_n_m: None,
         }

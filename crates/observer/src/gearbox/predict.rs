@@ -200,6 +200,9 @@ impl<T: Real> GearboxFilter<'_, T> {
             }
             let (row, rest) = self.held_torque(&shift, c, torques);
             let needed_n_m = running.x.value(&row) + rest;
+            if clutch.element.is_dog() {
+                return Contact { slip, needed_n_m, holds_n_m: T::infinity() };
+            }
             if clutch.is_one_way() {
                 let holds_n_m = if needed_n_m * clutch.alpha > T::zero() { T::infinity() } else { T::zero() };
                 return Contact { slip, needed_n_m, holds_n_m };
@@ -225,7 +228,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         if let Some(held) = after.holding() {
             let held = held.min(1);
-            running.phase.slips_yet = if shift.clutches[held].is_one_way() {
+            running.phase.slips_yet = if !shift.clutches[held].has_pressure() {
                 T::zero()
             } else {
                 Self::slips_yet(running, &shift, held, torques)

@@ -107,6 +107,8 @@ pub enum ShiftElement {
     OneSided(u8),
     /// A one-way clutch, which has no pressure and is in no table.
     OneWay,
+    /// A dog, which has none either: it holds any torque in both directions while it is in.
+    Dog,
     /// Of the gearbox the ratios alone are known.
     Unknown,
 }
@@ -131,7 +133,7 @@ impl ShiftElement {
     pub const fn place(self) -> Option<usize> {
         match self {
             Self::Friction(place) | Self::OneSided(place) => Some(place as usize),
-            Self::OneWay | Self::Unknown => None,
+            Self::OneWay | Self::Dog | Self::Unknown => None,
         }
     }
 
@@ -139,6 +141,18 @@ impl ShiftElement {
     #[inline]
     pub const fn is_one_way(self) -> bool {
         matches!(self, Self::OneWay)
+    }
+
+    /// Whether it is a dog.
+    #[inline]
+    pub const fn is_dog(self) -> bool {
+        matches!(self, Self::Dog)
+    }
+
+    /// Whether pressure makes it hold: not that of a one-way clutch or a dog.
+    #[inline]
+    pub const fn has_pressure(self) -> bool {
+        !matches!(self, Self::OneWay | Self::Dog)
     }
 
     /// Whether it is a clutch or brake whose gear a one-way clutch holds too.
@@ -166,6 +180,11 @@ impl<T> ShiftClutch<T> {
         self.element.is_one_way()
     }
 
+    /// Whether pressure makes it hold: not that of a one-way clutch or a dog.
+    pub fn has_pressure(&self) -> bool {
+        self.element.has_pressure()
+    }
+
     /// Whether a one-way clutch holds its gear, itself or beside it: the turbine may turn slower than in the gear.
     pub fn may_overrun(&self) -> bool {
         self.element.is_one_way() || self.element.is_one_sided()
@@ -184,7 +203,7 @@ pub struct ShiftRow<T> {
     pub clutches: [ShiftClutch<T>; 2],
     /// Mass `M` in turbine and output speed, kg m^2.
     pub mass_kg_m2: [[T; 2]; 2],
-    /// Whether a dog of the gear after has to be put in, which is not in the gear before: until it is, the shaft of the oncoming clutch
+    /// Whether a dog that is held has to be put in, which is not in the gear before: until it is, the shaft of the oncoming clutch
     /// turns at another ratio.
     pub has_dog: bool,
 }
@@ -317,7 +336,7 @@ impl<'a, T: Real> GearboxTables<'a, T> {
     pub fn shift(&self, from: usize, to: usize) -> Option<&ShiftRow<T>> {
         let elements = self.elements.len().min(MAX_ELEMENTS);
         let is_known = |clutch: &ShiftClutch<T>| {
-            clutch.is_one_way() || clutch.element.place().is_some_and(|place| place < elements)
+            !clutch.has_pressure() || clutch.element.place().is_some_and(|place| place < elements)
         };
         let known = |row: &&ShiftRow<T>| row.from == from && row.to == to && row.clutches.iter().all(is_known);
         self.shifts.iter().find(known)
@@ -340,7 +359,9 @@ mod tests {
     fn an_element_has_a_place_if_the_tables_can_have_it() {
         assert_eq!(ShiftElement::at(MAX_ELEMENTS - 1).place(), Some(MAX_ELEMENTS - 1));
         assert_eq!([MAX_ELEMENTS, 256, usize::MAX].map(ShiftElement::at), [ShiftElement::Unknown; 3]);
-        assert_eq!([ShiftElement::OneWay, ShiftElement::Unknown].map(ShiftElement::place), [None; 2]);
+        let others = [ShiftElement::OneWay, ShiftElement::Dog, ShiftElement::Unknown];
+        assert_eq!(others.map(ShiftElement::place), [None; 3]);
+        assert_eq!(others.map(ShiftElement::has_pressure), [false, false, true]);
         assert_eq!([3, MAX_ELEMENTS].map(|place| ShiftElement::one_sided(place).place()), [Some(3), None]);
         // As small as the number of a place: the tables have two for each shift.
         assert!(size_of::<ShiftClutch<f32>>() <= 12);

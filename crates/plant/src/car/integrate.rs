@@ -100,6 +100,8 @@ pub struct CarIntegrator {
     relative_tolerance: f64,
     /// The right-hand side at the state, found at the end of the last step, and the inputs under which it holds.
     known: Option<(CarInputs, Rates<STATES_WITH_STROKE>)>,
+    /// Torque of each dog that is to come out and is still held by its load, N m; zero of the others.
+    held_dogs_n_m: [f64; MAX_ELEMENTS],
 }
 
 /// The right-hand side at one state: derivative, and the torques that make it but for those of the sticking elements.
@@ -136,7 +138,15 @@ impl CarIntegrator {
         }
         let (contacts, state) = Contacts::settle(model, &[None; MAX_ELEMENTS], None, &state, inputs)?;
         let (step_size, relative_tolerance) = (StepSize::FIRST, RELATIVE_TOLERANCE);
-        Ok(Self { time_s, state, contacts, step_size, relative_tolerance, known: None })
+        Ok(Self {
+            time_s,
+            state,
+            contacts,
+            step_size,
+            relative_tolerance,
+            known: None,
+            held_dogs_n_m: [0.0; MAX_ELEMENTS],
+        })
     }
 
     /// The same with another relative tolerance of a step.
@@ -157,6 +167,7 @@ impl CarIntegrator {
         until_s: f64,
         record: &mut impl FnMut(&CarStep<'_>),
     ) -> Result<(), CarError> {
+        let inputs = &self.with_loaded_dogs(model, inputs);
         self.resettle(model, inputs)?;
         const F: usize = SMALL_FREEDOMS;
         const P: usize = SMALL_PACKS;
@@ -216,10 +227,36 @@ impl CarIntegrator {
         Ok(())
     }
 
+    /// A dog cannot be taken out under load: these inputs with the dogs that stay in until their torque is small or has changed its sign.
+    fn with_loaded_dogs(&mut self, model: &CarModel, inputs: &CarInputs) -> CarInputs {
+        let loaded_from_n_m: [Option<f64>; MAX_ELEMENTS] =
+            std::array::from_fn(|element| match model.parts.get(element) {
+                Some(Part::Dog(limit_n_m))
+                    if !inputs.dogs[element] && self.contacts.of(element) == Some(Contact::Stuck) =>
+                {
+                    Some(*limit_n_m)
+                }
+                _ => None,
+            });
+        let mut loaded = *inputs;
+        if loaded_from_n_m.iter().flatten().all(|limit| limit.is_infinite()) {
+            self.held_dogs_n_m = [0.0; MAX_ELEMENTS];
+            return loaded;
+        }
+        let held_n_m = self.held_n_m(model, &model.applied(&self.contacts, &self.state, &model.acting(inputs)));
+        for (element, limit_n_m) in loaded_from_n_m.into_iter().enumerate() {
+            let (before, held) = (self.held_dogs_n_m[element], held_n_m[element]);
+            let stays = limit_n_m.is_some_and(|limit_n_m| held.abs() > limit_n_m) && held * before >= 0.0;
+            self.held_dogs_n_m[element] = if stays { held } else { 0.0 };
+            loaded.dogs[element] |= stays;
+        }
+        loaded
+    }
+
     /// Inputs that jump, such as a dog that is put in, change what elements can hold.
     fn resettle(&mut self, model: &CarModel, inputs: &CarInputs) -> Result<(), CarError> {
         let changed = (0..model.parts.len()).any(|element| match model.parts[element] {
-            Part::Dog | Part::LockUp => {
+            Part::Dog(_) | Part::LockUp => {
                 let holds = model.holding_limits(element, &self.state, inputs).is_some();
                 holds != self.contacts.of(element).is_some()
             }

@@ -38,6 +38,9 @@ const BRAKE_TURN_RAD_S: f64 = 0.1;
 /// Torque by which the synchroniser of a dog brings its gear to the speed of the shaft, N m \[chosen\].
 const SYNCHRONISER_N_M: f64 = 40.0;
 
+/// Torque above which a dog between the members of planetary sets cannot be taken out, N m \[chosen\].
+const LOADED_DOG_N_M: f64 = 5.0;
+
 /// What an element of the car is.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Part {
@@ -45,8 +48,8 @@ pub(super) enum Part {
     Friction(usize, Box<ShiftClutch>),
     /// A one-way clutch.
     OneWay,
-    /// A dog clutch with synchroniser.
-    Dog,
+    /// A dog clutch with synchroniser, and the torque above which it cannot be taken out, N m.
+    Dog(f64),
     /// The clutch between engine and gearbox input.
     LockUp,
 }
@@ -196,13 +199,17 @@ impl CarModel {
     /// The gearbox has no stick diagram, is too large, or its inertia cannot be inverted.
     pub fn new(car: Car) -> Result<Self, TrainError> {
         let train = car.gearbox.train.as_ref().ok_or(TrainError::NoDiagram)?;
+        // The dogs of gear pairs come last, and change while their clutch is open.
+        let of_pairs = train.pairs.iter().filter(|pair| pair.dog.is_some()).count();
+        let first_of_pairs = car.gearbox.elements.len().saturating_sub(of_pairs);
         let train = TrainModel::new(train, car.engine.inertia_kg_m2)?;
         let mut packs = 0;
         let mut parts = Vec::new();
-        for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
+        for (at, (element, clutch)) in car.gearbox.elements.iter().zip(&car.clutches).enumerate() {
             parts.push(match (element.kind, clutch) {
                 (ElementKind::OneWayClutch, _) => Part::OneWay,
-                (ElementKind::Dog, _) => Part::Dog,
+                (ElementKind::Dog, _) if at < first_of_pairs => Part::Dog(LOADED_DOG_N_M),
+                (ElementKind::Dog, _) => Part::Dog(f64::INFINITY),
                 (_, Some(clutch)) => {
                     packs += 1;
                     Part::Friction(packs - 1, Box::new(*clutch))
@@ -277,8 +284,8 @@ impl CarModel {
         let capacity = match &self.parts[element] {
             Part::Friction(slot, clutch) => clutch.clutch.static_capacity(Self::plates_pa(*slot, clutch, state)),
             Part::OneWay => return Some((0.0, UNLIMITED_N_M)),
-            Part::Dog if inputs.dogs[element] => UNLIMITED_N_M,
-            Part::Dog => 0.0,
+            Part::Dog(_) if inputs.dogs[element] => UNLIMITED_N_M,
+            Part::Dog(_) => 0.0,
             Part::LockUp if self.car.converter.is_none() => UNLIMITED_N_M,
             Part::LockUp => inputs.lock_up_n_m,
         };
@@ -321,7 +328,7 @@ impl CarModel {
                 if clutch.drag_n_m > 0.0 { torque + drag_torque(clutch.drag_n_m, slip) } else { torque }
             }
             Part::OneWay => 0.0,
-            Part::Dog => direction * SYNCHRONISER_N_M,
+            Part::Dog(_) => direction * SYNCHRONISER_N_M,
             Part::LockUp => direction * u.lock_up_n_m,
         }
     }

@@ -126,6 +126,9 @@ fn a_solenoid_stuck_on_or_off_lets_every_car_go_on_in_every_gear() {
 #[test]
 fn neutral_asked_for_while_the_engine_pulls_lets_the_elements_of_every_first_gear_slip() {
     for car in super::road_cars().into_iter().filter(|car| car.converter.is_some()) {
+        // Behind a dog that stays in the engine speeds up shafts, whose reaction the output carries.
+        let has_dog = (0..car.gearbox.elements.len()).any(|element| car.gearbox.is_dog(element));
+        let most_n_m = if has_dog { 100.0 } else { 50.0 };
         for throttle in [0.0, 0.1, 0.3, 0.5] {
             let file = format!(
                 "name = \"n\"\nstart = {{ gear = \"1\", vehicle_m_s = 5.0 }}\nshift = [{{ time_s = 3.0, gear = \"N\" }}]\n\
@@ -139,7 +142,7 @@ fn neutral_asked_for_while_the_engine_pulls_lets_the_elements_of_every_first_gea
             assert!(run.is_ok(), "{name}, throttle {throttle}: {run:?}");
             // The engine is free of the road.
             let shaft_n_m = at(&samples, 5.5).torques.shaft_n_m;
-            assert!(shaft_n_m.abs() < 50.0, "{name}, throttle {throttle}: {shaft_n_m} N m");
+            assert!(shaft_n_m.abs() < most_n_m, "{name}, throttle {throttle}: {shaft_n_m} N m");
         }
     }
 }

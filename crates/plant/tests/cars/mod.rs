@@ -18,6 +18,7 @@ macro_rules! car {
     };
 }
 
+mod dogs;
 mod drives;
 mod energy;
 mod faults;
@@ -65,6 +66,7 @@ fn road_cars() -> Vec<Car> {
         car!("gearboxes/ravigneaux_4_one_way.toml", ""),
         car!("gearboxes/a340e.toml", ""),
         car!("gearboxes/9g_tronic.toml", ""),
+        car!("gearboxes/9hp48.toml", ""),
         car!("gearboxes/lepelletier_6.toml", ""),
         car!("gearboxes/tf80sc.toml", ""),
         car!("gearboxes/10_speed.toml", ""),

@@ -133,7 +133,7 @@ pub(super) fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) 
     } else if !shift.rows.is_empty() {
         let roles = || ["offgoing", "oncoming"].into_iter().zip(names).enumerate();
         panels.extend(roles().map(|(c, (role, name))| torque_panel(&shift.rows, c, format!("{name}, {role}"))));
-        let with_pressure = roles().filter(|(c, _)| !is_one_way(&shift.rows, *c));
+        let with_pressure = roles().filter(|(c, _)| has_pressure(&shift.rows, *c));
         panels.extend(with_pressure.map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
         panels.push(friction_power_panel(&shift.rows, names));
     }
@@ -162,9 +162,9 @@ fn friction_power_panel(rows: &[ShiftScoreRow], names: [&str; 2]) -> Panel {
 /// Time between two points of a range, s: a page of an hour has more than three hundred shifts.
 const RANGE_S: f64 = 0.04;
 
-/// Whether a clutch of the shift is a one-way clutch, which has no pressure and no valve model.
-fn is_one_way(rows: &[ShiftScoreRow], c: usize) -> bool {
-    rows.iter().any(|row| row.clutches[c].is_one_way)
+/// Whether pressure makes a clutch of the shift hold: a one-way clutch or a dog has none, and no valve model.
+fn has_pressure(rows: &[ShiftScoreRow], c: usize) -> bool {
+    rows.iter().all(|row| row.clutches[c].has_pressure)
 }
 
 /// The pieces of a phase; the longest has its name.
@@ -240,7 +240,7 @@ fn clutch_panel(
     // A log may have a measured pressure, and then no torque.
     let known = if rows.iter().any(|row| row.clutches[c].torque_n_m[0].is_finite()) { "true" } else { "measured" };
     let mut series = vec![curve(0, known, Stroke::TRUTH), curve(1, "filter", ESTIMATE)];
-    if !is_one_way(rows, c) {
+    if has_pressure(rows, c) {
         series.push(curve(2, "valve model", OPEN_LOOP));
     }
     let bands = [("range (error budget)", WIDE_RANGE), ("two standard deviations", RANGE)];

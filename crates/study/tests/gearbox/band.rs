@@ -61,7 +61,7 @@ fn coverage(known: &Car, tables: &ShiftTables<f64>, shift: &MatrixShift, draw: (
     for row in score_samples(tables, &filter, &samples, &inputs) {
         let Some(phase) = row.phase() else { continue };
         let [torque, pressure] = &mut all[usize::from(phase == TruePhase::Inertia)];
-        let is_compared = |clutch: &&ClutchRow| !clutch.sticks && !clutch.is_one_way;
+        let is_compared = |clutch: &&ClutchRow| !clutch.sticks && clutch.has_pressure;
         for clutch in row.clutches.iter().filter(is_compared) {
             torque.push(clutch.torque_n_m[0], clutch.torque_band_n_m(), clutch.torque_range_n_m);
             pressure.push(clutch.pressure_pa[0], clutch.pressure_band_pa(), clutch.pressure_range_pa);

@@ -172,6 +172,15 @@ fn a_shift_between_neighbouring_gears_that_is_not_driven_is_named_with_its_reaso
         dual.why_no_shift([one, three]),
         "only dogs change, D1 off and D3 on: no clutch takes the load over from another"
     );
+    // A dog that would have to go in while the car stands.
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/nine_speed_9hp.toml");
+    let nine = CarFile::read(path.as_ref()).unwrap().car;
+    assert_eq!(not_driven(&nine).unwrap(), Vec::<[usize; 2]>::new());
+    let [reverse, one] = ["R", "1"].map(|name| nine.gearbox.gear(name).unwrap());
+    assert_eq!(
+        nine.why_no_shift([reverse, one]),
+        "B off and A on, one of them a dog: it can be put in in a downshift and taken out in an upshift"
+    );
 }
 
 /// A gearbox whose third gear can only be reached by two changes at once is driven without it.

@@ -12,7 +12,7 @@ use study::gearbox::recording::Recording;
 use super::cars::sensors;
 
 /// The vehicle files with a gearbox that is on the road, but for those that other tests drive.
-const CARS: [&str; 10] = [
+const CARS: [&str; 11] = [
     "five_speed_722_6",
     "three_speed_c6",
     "three_speed_th400",
@@ -22,6 +22,7 @@ const CARS: [&str; 10] = [
     "four_speed_fn4a",
     "four_speed_simpson",
     "nine_speed_9g",
+    "nine_speed_9hp",
     "six_speed_tf80sc",
 ];
 

@@ -12,7 +12,8 @@
 //! offgoing one. So the roles change by themselves when the turbine torque changes its sign during a shift. The controller knows
 //! the nominal car; it does not know pressures, torques, or the errors of the valves.
 //!
-//! One of the two may be a one-way clutch. It has no command: it lets go when its torque is gone, and catches at synchronous speed.
+//! One of the two may be a one-way clutch. It has no command: it lets go when its torque is gone, and catches at synchronous speed. Or
+//! it is a dog: it is put in at synchronous speed and taken out without load, while the engine drives.
 
 mod calibration;
 mod engine;
@@ -29,7 +30,7 @@ use std::collections::VecDeque;
 
 use car::{Car, ShiftClutch};
 use drivetrain::ReducedShift;
-use geartrain::{Change, ElementKind, Shift};
+use geartrain::{Change, Shift};
 
 use super::integrate::CarError;
 use crate::gear_train::MAX_ELEMENTS;
@@ -46,7 +47,7 @@ pub use target::{SlipCurve, SlipTarget, SlipTargets};
 use track::Track;
 
 /// Offgoing and oncoming clutch of a shift, with their places among the elements, and the reduced shift. One of them may be a
-/// one-way clutch, which has no valve.
+/// one-way clutch or a dog, which have no valve.
 type Single<'c> = ([(usize, Option<ShiftClutch>); 2], &'c Shift, &'c ReducedShift<f64>);
 
 /// Speed of the gearbox output below which a gear of the other direction may be engaged, rad/s \[chosen\].
@@ -256,12 +257,21 @@ impl CarShiftController {
         self.car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str())
     }
 
-    /// The gear of the other direction that differs from this one by one clutch: neutral is what they have in common.
+    /// The gear of the other direction that differs from this one by one clutch: neutral is what they have in common. Where a dog
+    /// distinguishes the directions, neutral is what the two lowest gears have in common.
     fn partner(&self, gear: usize) -> Option<usize> {
         let gears = &self.car.gearbox.gears;
+        let by_one_clutch = |a: usize, b: usize| self.single(a, b).is_some();
         let turns = |other: &usize| gears[*other].ratio * gears[gear].ratio < 0.0;
-        let candidates = (0..gears.len()).filter(turns).filter(|&other| self.single(other, gear).is_some());
-        candidates.max_by(|&a, &b| gears[a].ratio.abs().total_cmp(&gears[b].ratio.abs()))
+        let candidates = (0..gears.len()).filter(turns).filter(|&other| by_one_clutch(other, gear));
+        let largest = candidates.max_by(|&a, &b| gears[a].ratio.abs().total_cmp(&gears[b].ratio.abs()));
+        largest.or_else(|| {
+            let is_dog =
+                |gear: usize| gears[gear].holding.iter().any(|holding| self.car.gearbox.is_dog(holding.element));
+            let [first, second] = *self.car.gearbox.forward_gears().first_chunk()?;
+            let other = [(first, second), (second, first)].into_iter().find(|&(from, _)| from == gear)?.1;
+            (self.car.converter.is_some() && is_dog(gear) && by_one_clutch(other, gear)).then_some(other)
+        })
     }
 
     /// Engages a gear from neutral.
@@ -289,8 +299,12 @@ impl CarShiftController {
         };
         let clutch = |element: usize| {
             let clutch = self.car.clutches.get(element).copied().flatten();
-            (clutch.is_some() || self.car.gearbox.is_one_way(element)).then_some((element, clutch))
+            let is_form_fit = self.car.gearbox.is_one_way(element) || self.car.gearbox.is_dog(element);
+            (clutch.is_some() || is_form_fit).then_some((element, clutch))
         };
+        if !shift.changes_dog_under_power(&self.car.gearbox) {
+            return None;
+        }
         let clutches = [clutch(*offgoing)?, clutch(*oncoming)?];
         clutches.iter().any(|(_, clutch)| clutch.is_some()).then_some((clutches, shift, reduced))
     }
@@ -353,8 +367,9 @@ impl CarShiftController {
         let is_one_sided = |element: usize| shift.is_one_sided(&self.car.gearbox, element);
         let off = Controlled::new(offgoing, off, reduced.slip_offgoing, line_pa);
         let on = Controlled::new(oncoming, on, reduced.slip_oncoming, 0.0);
-        let offgoing = off.one_sided(is_one_sided(offgoing));
-        let on = on.one_sided(is_one_sided(oncoming));
+        let is_dog = |element: usize| self.car.gearbox.is_dog(element);
+        let offgoing = off.one_sided(is_one_sided(offgoing)).dog(is_dog(offgoing));
+        let on = on.one_sided(is_one_sided(oncoming)).dog(is_dog(oncoming));
         let oncoming = on.filled_from(self.strokes.of(oncoming), &self.calibration);
         let shift = ActiveShift::new(to, [offgoing, oncoming], reduced.mass_kg_m2, line_pa, time_s);
         let (car, road) = (&self.car, &self.car.road);
@@ -420,17 +435,28 @@ impl CarShiftController {
         let line_pa = self.car.line_pressure_pa;
         let partner = self.partner(self.gear).filter(|_| self.is_neutral);
         let opened = partner.and_then(|partner| self.single(self.gear, partner)).map(|(clutches, ..)| clutches[0].0);
-        // The clutches of a shift get their commands from it.
+        // The clutches of a shift get their commands from it, and so does a dog that changes.
+        for holding in &self.car.gearbox.gears[self.gear].holding {
+            let element = holding.element;
+            match &self.car.clutches[element] {
+                Some(clutch) if opened != Some(element) => elements[element] = clutch.valve.command_for(line_pa),
+                Some(_) => (),
+                None => dogs[element] = self.car.gearbox.is_dog(element),
+            }
+        }
         let next = self.active.as_ref().map_or(self.preselected, |shift| Some(shift.to));
-        for gear in [Some(self.gear), next].into_iter().flatten() {
-            for holding in &self.car.gearbox.gears[gear].holding {
-                let element = holding.element;
-                match &self.car.clutches[element] {
-                    Some(clutch) if gear == self.gear && opened != Some(element) => {
-                        elements[element] = clutch.valve.command_for(line_pa)
-                    }
-                    Some(_) => (),
-                    None => dogs[element] = self.car.gearbox.elements[element].kind == ElementKind::Dog,
+        let change = next.and_then(|next| self.car.gearbox.shift(self.gear, next)).map(|shift| &shift.change);
+        if let Some(Change::Single { held, .. }) = change {
+            for &element in held.iter().filter(|&&element| self.car.gearbox.is_dog(element)) {
+                dogs[element] = true;
+            }
+        }
+        if let Some(shift) = &self.active {
+            for (clutch, is_in) in
+                [(&shift.offgoing, shift.is_offgoing_in()), (&shift.oncoming, shift.is_oncoming_in())]
+            {
+                if clutch.is_dog() {
+                    dogs[clutch.element] = is_in;
                 }
             }
         }

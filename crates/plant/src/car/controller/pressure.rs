@@ -1,5 +1,5 @@
 //! A shift clutch as its controller sees it: from torque at the turbine to the command of its valve. A one-way clutch has none: it
-//! is asked for nothing.
+//! is asked for nothing. A dog is put in or taken out.
 
 use car::{FastFill, ShiftClutch};
 
@@ -11,8 +11,9 @@ use crate::fast_fill::{FillPlan, StrokeModel};
 pub(super) struct Controlled {
     /// Its place among the elements.
     pub(super) element: usize,
-    /// `None` for a one-way clutch.
+    /// `None` for a one-way clutch or a dog.
     clutch: Option<ShiftClutch>,
+    is_dog: bool,
     /// Whether a one-way clutch that is held through the shift holds its gear too: it holds the turbine in one direction alone.
     is_one_sided: bool,
     /// Its slip per turbine speed.
@@ -28,7 +29,16 @@ pub(super) struct Controlled {
 impl Controlled {
     pub(super) fn new(element: usize, clutch: Option<ShiftClutch>, slip_row: [f64; 2], modelled_pa: f64) -> Self {
         let [alpha, per_output] = slip_row;
-        Self { element, clutch, is_one_sided: false, alpha, ratio: -per_output / alpha, modelled_pa, fill: None }
+        Self {
+            element,
+            clutch,
+            is_dog: false,
+            is_one_sided: false,
+            alpha,
+            ratio: -per_output / alpha,
+            modelled_pa,
+            fill: None,
+        }
     }
 
     /// The same where a one-way clutch holds its gear too, or not.
@@ -36,9 +46,19 @@ impl Controlled {
         Self { is_one_sided, ..self }
     }
 
+    /// The same of a dog, or not.
+    pub(super) fn dog(self, is_dog: bool) -> Self {
+        Self { is_dog, ..self }
+    }
+
+    /// Whether it is a dog.
+    pub(super) fn is_dog(&self) -> bool {
+        self.is_dog
+    }
+
     /// Whether it holds by itself, in one direction.
     pub(super) fn is_one_way(&self) -> bool {
-        self.clutch.is_none()
+        self.clutch.is_none() && !self.is_dog
     }
 
     /// Whether a one-way clutch lets the turbine turn slower than in its gear, itself or beside it.

@@ -94,6 +94,8 @@ pub(super) struct ActiveShift {
     /// Offgoing and oncoming slip one period before, with the output speed of the wheels, rad/s.
     slips_before_rad_s: Option<[f64; 2]>,
     engine: EngineRequest,
+    /// Engine torque that is added so that the engine drives while a dog changes, N m.
+    driving_n_m: f64,
     /// Rate of the reference of the slip when the clutches answer, rad/s^2.
     reference_rad_s2: f64,
     /// Pressure at which the command of the oncoming clutch settles, Pa.
@@ -154,6 +156,7 @@ impl ActiveShift {
             handed_n_m: 0.0,
             slips_before_rad_s: None,
             engine: EngineRequest { fraction: 1.0, added_n_m: 0.0 },
+            driving_n_m: 0.0,
             reference_rad_s2: 0.0,
             oncoming_pa: 0.0,
         }
@@ -176,9 +179,9 @@ impl ActiveShift {
     }
 
     /// The way back to the gear `from` that is being left: offgoing and oncoming clutch change their roles. `None` where the new
-    /// gear is nearly engaged.
+    /// gear is nearly engaged, or a dog changes.
     pub(super) fn withdrawn(&self, c: &CarCalibration, from: usize, time_s: f64) -> Option<Self> {
-        if self.is_from_neutral {
+        if self.is_from_neutral || self.changes_dog() {
             return None;
         }
         let clutches = [self.oncoming.clone(), self.offgoing.clone()];
@@ -271,7 +274,9 @@ impl ActiveShift {
             if now.z.abs() < c.lock_slip_rad_s { self.locked_since_s.or(Some(now.time_s)) } else { None };
         let holds = self.locked_since_s.is_some_and(|since_s| passed(since_s, c.lock_hold_s));
         let is_filled = passed(self.since_s, self.fill_s(c));
+        let waits = self.waits_for_drive(c, now) && !passed(self.begun_s, c.longest_s);
         let next = match self.stage {
+            ShiftStage::Fill if waits => ShiftStage::Fill,
             ShiftStage::Fill if is_filled && self.overruns(c, now) => ShiftStage::Lock,
             ShiftStage::InertiaPhase if self.overruns(c, now) => ShiftStage::Lock,
             ShiftStage::Fill if is_filled && self.is_free(c, now) => ShiftStage::InertiaPhase,
@@ -325,6 +330,33 @@ impl ActiveShift {
         if next == ShiftStage::HandOver {
             self.handed_n_m = self.controlled_n_m;
         }
+    }
+
+    /// Whether a dog takes or gives up the load.
+    pub(super) fn changes_dog(&self) -> bool {
+        self.offgoing.is_dog() || self.oncoming.is_dog()
+    }
+
+    /// Whether the dog of the old gear is to be in: it comes out when the torque phase has taken its load.
+    pub(super) fn is_offgoing_in(&self) -> bool {
+        self.stage == ShiftStage::Fill
+    }
+
+    /// Whether the dog of the new gear is to be in: from shortly before its synchronous speed on.
+    pub(super) fn is_oncoming_in(&self) -> bool {
+        matches!(self.stage, ShiftStage::HandOver | ShiftStage::Lock | ShiftStage::Done)
+    }
+
+    /// Whether the engine is to drive: until the dog of the old gear is out, or that of the new gear in.
+    pub(super) fn needs_drive(&self) -> bool {
+        let off = self.offgoing.is_dog() && matches!(self.stage, ShiftStage::Fill | ShiftStage::TorquePhase);
+        let on = self.oncoming.is_dog() && !matches!(self.stage, ShiftStage::Lock | ShiftStage::Done);
+        off || on
+    }
+
+    /// Whether a dog changes and the engine does not drive yet.
+    fn waits_for_drive(&self, c: &CarCalibration, now: &Now) -> bool {
+        self.changes_dog() && now.turbine_n_m < c.sign_n_m
     }
 
     /// Whether the old gear holds the turbine no longer: it is neutral, or its one-way clutch overruns.

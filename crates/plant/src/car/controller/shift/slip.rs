@@ -7,6 +7,12 @@ use crate::car::controller::engine::EngineRequest;
 use crate::car::controller::target::SlipTarget;
 use crate::car::controller::{CarCalibration, CarMeasured};
 
+/// Turbine torque beyond that which speeds up the turbine, that the engine is asked for while a dog changes, N m \[chosen\].
+const DRIVING_N_M: f64 = 15.0;
+
+/// Rate at which the engine torque is raised to it, 1/s \[chosen\].
+const DRIVING_PER_S: f64 = 8.0;
+
 impl ActiveShift {
     /// The old gear slips: from now on the slip follows its reference.
     pub(super) fn begin_slip(&mut self, c: &CarCalibration, now: &Now) {
@@ -126,7 +132,15 @@ impl ActiveShift {
         let changes = self.is_slipping && matches!(self.stage, ShiftStage::InertiaPhase | ShiftStage::HandOver);
         let inertia_kg_m2 = self.inertia_kg_m2() + self.vehicle.engine_kg_m2;
         let added_n_m = if changes { self.target.engine * inertia_kg_m2 * self.reference_rad_s2 } else { 0.0 };
-        self.engine = EngineRequest { fraction, added_n_m };
+        if self.needs_drive() {
+            // What is left for a clutch while the turbine comes up.
+            let left_n_m = if self.is_slipping { self.controlled_n_m } else { turbine_n_m };
+            let missing_n_m = DRIVING_N_M - left_n_m;
+            self.driving_n_m = (self.driving_n_m + DRIVING_PER_S * c.control_period_s * missing_n_m).max(0.0);
+        } else {
+            self.driving_n_m = 0.0;
+        }
+        self.engine = EngineRequest { fraction, added_n_m: added_n_m + self.driving_n_m };
     }
 
     fn suitable_engine_fraction(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
