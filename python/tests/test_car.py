@@ -41,6 +41,31 @@ def test_a_written_car_does_not_replace_another_gearbox(tmp_path: Path) -> None:
     assert not (tmp_path / "car.toml").exists()
 
 
+def test_a_car_of_another_folder_is_written_with_its_gearbox_beside(tmp_path: Path) -> None:
+    car = wc.Car.read(ROOT / "vehicles" / "six_speed.toml").replace(vehicle__mass_kg=2000.0)
+    car.write(tmp_path / "mine.toml")
+    again = wc.Car.read(tmp_path / "mine.toml")
+    assert again.gearbox_toml() == car.gearbox_toml() and again.replace(gearbox="../gearboxes/lepelletier_6.toml") == car
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["lepelletier_6.toml", "mine.toml"]
+
+
+def test_what_is_no_car_or_log_is_an_error_of_the_argument() -> None:
+    car = wc.Car.template("8hp", mass_kg=1900.0)
+    log = {"time_s": [0.0, 0.01], "turbine_speed_rad_s": [100.0, 101.0]}
+    for call in (
+        lambda: wc.estimate("car.toml", log),  # type: ignore[call-overload]
+        lambda: wc.fit("car.toml", [log]),  # type: ignore[call-overload]
+        lambda: wc.estimate(car, None),
+        lambda: wc.estimate(car, log, learnt="learnt.toml"),
+        lambda: wc.Table({"a": [object()]}),
+        lambda: wc.Table({"a": np.ones((2, 2))}),
+        lambda: wc.Table({"a": [1.0], "b": [1.0, 2.0]}),
+    ):
+        with pytest.raises(wc.InputError) as wrong:
+            call()
+        assert wrong.value.hint
+
+
 def test_keys_are_replaced_and_checked() -> None:
     car = wc.Car.template("8hp", mass_kg=1900.0)
     heavier = car.replace(vehicle__mass_kg=2100.0)

@@ -70,3 +70,72 @@ def test_a_library_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(wc.InputError, match="asammdf") as caught:
         wc.read(path)
     assert caught.value.hint == "pip install asammdf"
+
+
+def maximum_of(log: wc.Log) -> dict[str, float]:
+    channels = log.channels
+    return dict(zip(channels["channel"], channels["maximum"], strict=True))
+
+
+def test_each_structure_of_a_mat_file_has_its_own_times(tmp_path: Path) -> None:
+    io = pytest.importorskip("scipy.io")
+    path = tmp_path / "log.mat"
+    of = speeds()
+    engine = {"time": of["time"] + 5.0, "nEngine": of["time"]}
+    io.savemat(path, {"eng": engine, "gb": {"t_ms": 1e3 * of["time"], "nTurbine": of["nTurbine"]}})
+    columns = wc._foreign.columns_of(str(path))
+    assert columns is not None
+    time = columns["time_s"]
+    assert len(time) == 200 and time[0] == 0.0
+    assert np.isnan(columns["eng.nEngine"][time < 4.9]).all() and columns["eng.nEngine"][time > 5.985][0] == pytest.approx(0.99)
+    assert np.isnan(columns["gb.nTurbine"][time > 4.9]).all() and columns["gb.nTurbine"][0] == 100.0
+
+
+def test_a_structure_with_time_of_simulink_has_its_signals(tmp_path: Path) -> None:
+    io = pytest.importorskip("scipy.io")
+    path = tmp_path / "log.mat"
+    of = speeds()
+    signals = [
+        {"values": of["nTurbine"].reshape(-1, 1), "label": "nTurbine", "dimensions": 1},
+        {"values": np.column_stack([of["nOutput"], of["time"]]), "label": "two", "dimensions": 2},
+    ]
+    io.savemat(path, {"logged": {"time": of["time"].reshape(-1, 1), "signals": signals, "blockName": "model/Scope"}, "tout": [0.0, 1.0]})
+    assert maximum_of(wc.read(path)) == {
+        "logged.nTurbine": pytest.approx(149.5),
+        "logged.two_1": pytest.approx(20.99),
+        "logged.two_2": pytest.approx(0.99),
+    }
+
+
+def test_what_has_no_times_in_a_mat_file_is_named(tmp_path: Path) -> None:
+    io = pytest.importorskip("scipy.io")
+    path = tmp_path / "log.mat"
+    of = speeds()
+    io.savemat(path, {"t": [0.0, 1.0, 2.0, 3.0, 4.0], "time": of["time"], "nTurbine": of["nTurbine"], "other": [1.0, 2.0, 3.0]})
+    with pytest.warns(UserWarning, match="left out, as no times belong to them: t, other"):
+        log = wc.read(path)
+    assert maximum_of(log) == {"nTurbine": pytest.approx(149.5)}
+
+
+@pytest.mark.parametrize("version", ["4", "5"])
+def test_a_damaged_mat_file_is_an_error_of_the_file(tmp_path: Path, version: str) -> None:
+    io = pytest.importorskip("scipy.io")
+    path = tmp_path / "log.mat"
+    io.savemat(path, speeds(), format=version)
+    assert sorted(wc.read(path).channels["channel"]) == ["nOutput", "nTurbine"]
+    path.write_bytes(path.read_bytes()[:700])
+    with pytest.raises(wc.InputError) as caught:
+        wc.read(path)
+    assert caught.value.file == str(path) and caught.value.hint
+
+
+def test_words_of_mdf_3_are_the_numbers_behind_them(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    of = speeds()
+    gears = np.where(of["time"] < 0.5, 1, 2).astype("u1")
+    words = {"val_0": 1, "text_0": b"first", "val_1": 2, "text_1": b"second", "default": b"none"}
+    mdf = asammdf.MDF(version="3.30")
+    mdf.append([asammdf.Signal(samples=gears, timestamps=of["time"], name="gear", conversion=words)])
+    path = tmp_path / "old.mdf"
+    mdf.save(path)
+    assert maximum_of(wc.read(path)) == {"gear": 2.0}

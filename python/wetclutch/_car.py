@@ -122,23 +122,29 @@ class Car:
         return self._gearbox
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Writes the vehicle file and, of a car with a gearbox, the gearbox file where the vehicle file names it.
+        """Writes the vehicle file and, of a car with a gearbox, the gearbox file into the same folder. A gearbox file that the vehicle file
+        names and that is there already stays where it is.
 
         Raises:
             FileExistsError: The gearbox file is there already and is another one.
         """
         path = os.fspath(path)
+        text = self._text
         if self._gearbox is not None:
             import tomllib
 
-            named = os.path.join(os.path.dirname(path), tomllib.loads(self._text)["gearbox"])
-            if os.path.exists(named):
-                with open(named, encoding="utf-8") as there:
-                    if there.read() != self._gearbox:
-                        raise FileExistsError(f"{named}: this file is there already, and is another gearbox")
-            else:
-                _write_whole(named, self._gearbox)
-        _write_whole(path, self._text)
+            folder, named = os.path.dirname(path), tomllib.loads(text)["gearbox"]
+            if _text_of(os.path.join(folder, named)) != self._gearbox:
+                beside = os.path.basename(named)
+                there = _text_of(os.path.join(folder, beside))
+                if there is None:
+                    _write_whole(os.path.join(folder, beside), self._gearbox)
+                elif there != self._gearbox:
+                    message = f"{os.path.join(folder, beside)}: this file is there already, and is another gearbox"
+                    raise FileExistsError(message)
+                if beside != named:
+                    text = _with_gearbox(text, beside)
+        _write_whole(path, text)
 
     def replace(self, values: dict[str, Any] | None = None, /, **keys: Any) -> Self:
         """The same car with other values in its vehicle file.
@@ -202,12 +208,36 @@ class Car:
         return f"Car({self.name!r}, {len(forward)} forward gears)"
 
 
+def check_car(car: object) -> None:
+    """Refuses what is no car."""
+    if not isinstance(car, Car):
+        raise InputError(f"car is a {type(car).__name__}, and no Car", hint="give `wetclutch.Car.read(PATH)`", key="car")
+
+
 #: The tables of bounds on errors.
 _BOUNDS = "error_bounds"
 
 
 def _is_bound(key: str) -> bool:
     return _BOUNDS in key.split(".")[:-1]
+
+
+def _text_of(path: str) -> str | None:
+    """The text of a file; None of one that is not there."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            return file.read()
+    except FileNotFoundError:
+        return None
+
+
+def _with_gearbox(text: str, named: str) -> str:
+    """The text of a vehicle file that names another gearbox file; its comments stay."""
+    import re
+
+    line = re.compile(r"""^(gearbox\s*=\s*)("[^"\\]*"|'[^']*')""", re.MULTILINE)
+    changed, count = line.subn(lambda found: f'{found[1]}"{named}"', text, count=1)
+    return changed if count else replaced(text, {"gearbox": named}, {})
 
 
 def _write_whole(path: str, text: str) -> None:

@@ -42,7 +42,9 @@ class WetclutchError(Exception):
         self.key = key
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made, (type(self), self.message, self.hint, self.file, self.line, self.key)
+        made = (type(self), self.message, self.hint, self.file, self.line, self.key)
+        # The notes say which of many logs it was, also from another process.
+        return _made, made, {"__notes__": self.__notes__} if hasattr(self, "__notes__") else None
 
 
 class InputError(WetclutchError, ValueError):

@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any, TypedDict, Unpack, overload
 
 from . import _wetclutch as native
-from ._car import Car
-from ._errors import check_range, of_files
+from ._car import Car, check_car
+from ._errors import InputError, check_range, of_files
 from ._executor import each
 from ._foreign import columns_of
 from ._progress import Progress, Report, reported
@@ -92,6 +92,8 @@ def read(
     >>> read({"time_s": [0.0, 0.01], "turbine_speed_rad_s": [100.0, 101.0]}).table
     Table(2 rows: time_s, turbine_speed_rad_s)
     """
+    if log is None:
+        raise InputError("there is no log", hint="give a path, a data frame, or columns by their names")
     path = os.fspath(log) if isinstance(log, (str, os.PathLike)) else None
     columns = log if path is None else columns_of(path)
     return Log(
@@ -229,13 +231,16 @@ def estimate(
     """
     check_range("threads", threads, 1, 1024)
     check_range("shift", shift, 1, 10**9)
+    check_car(car)
+    if learnt is not None and "\n" not in learnt:
+        raise InputError(f"learnt: `{learnt}` is no text of what was learnt", hint="give Estimates.learnt, or the text of such a file")
     options = {
         "observer": observer,
         "method": method,
         "sensors": file_or_sensors(sensors),
-        "columns": list(columns),
+        "columns": [columns] if isinstance(columns, str) else list(columns),
         "shift": shift,
-        "shifts": list(shifts),
+        "shifts": [shifts] if isinstance(shifts, str) else list(shifts),
         "learnt": learnt,
         "threads": threads,
         "with_page": page,

@@ -80,8 +80,9 @@ def _failed(error: Exception, words: str) -> Exception:
     if not isinstance(error, BrokenExecutor) and type(error).__name__ != "KilledWorker":
         return error
     died, _, hint = words.partition("\n")
-    message = f"workers died while they {died}; the system may have ended them for want of memory"
-    return WorkError(message, hint=hint or None)
+    message = f"workers died while they {died}: the system ended them for want of memory, or they could not start"
+    start = 'processes that start anew run the script again: put its calls below `if __name__ == "__main__":`'
+    return WorkError(message, hint=f"{hint}; {start}" if hint else start)
 
 
 def each(executor: Any, task: Callable[[_Of], _Result], of: Sequence[_Of], progress: Progress, what: str) -> tuple[_Result, ...]:

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any, overload
 
 from . import _wetclutch as native
-from ._car import Car
+from ._car import Car, check_car
 from ._errors import of_files
 from ._estimate import Log, framed, read
 from ._executor import each
@@ -116,6 +116,8 @@ def fit(
         WorkError: A fit found no minimum, or workers died again and again at the same car.
     """
     read_by = file_or_sensors(sensors)
+    for one in car if isinstance(car, (list, tuple)) else [car]:
+        check_car(one)
     if not isinstance(car, Car):
         if len(car) != len(logs):
             raise ValueError(f"there are {len(car)} cars and logs of {len(logs)}, expected logs for each car")

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 from . import _wetclutch as native
+from ._errors import InputError, WetclutchError
 
 
 class Table:
@@ -34,8 +35,8 @@ class Table:
                 to NumPy arrays, lists of numbers or lists of words. None and NaN are missing values.
 
         Raises:
-            TypeError: A column is neither of numbers, times nor words.
-            ValueError: The columns have different lengths.
+            InputError: A column is neither of numbers, times nor words, two have one name, or they have different lengths.
+            TypeError: This is no table.
         """
         self._table = _native(data)
 
@@ -129,28 +130,56 @@ def _native(data: Any) -> native.Table:
         return data
     if isinstance(data, Table):
         return data._table
+    is_pandas = hasattr(data, "columns") and hasattr(data, "iloc")
+    if is_pandas:
+        _refuse_twice([str(name) for name in data.columns])
+    if hasattr(data, "iloc") and not is_pandas:
+        raise InputError(f"a {type(data).__name__} is one column", hint="give a data frame, such as `series.to_frame()`")
     if hasattr(data, "__arrow_c_stream__"):
         try:
-            return native.Table.from_arrow(_without_null_columns(data))
+            return native.Table.from_arrow(_plain_columns(data))
         except ImportError:
             pass  # pandas exports Arrow data with pyarrow only.
+        except WetclutchError:
+            raise
+        except Exception as error:
+            # pandas: a column of numbers and words is no Arrow data, and is read below.
+            if not is_pandas:
+                raise InputError(f"the table cannot be read: {error}", hint="give columns of numbers, times or words") from error
     elif hasattr(data, "__arrow_c_array__"):
         return native.Table.from_arrow(data)
-    if hasattr(data, "columns") and hasattr(data, "iloc"):
-        return native.Table.from_columns({str(name): _column(data.iloc[:, at]) for at, name in enumerate(data.columns)})
+    if is_pandas:
+        return _of_columns({str(name): data.iloc[:, at] for at, name in enumerate(data.columns)})
     if isinstance(data, Mapping):
-        return native.Table.from_columns({name: _column(values) for name, values in data.items()})
+        return _of_columns(data)
     raise TypeError(
         f"a {type(data).__name__} is no table: give a data frame, Arrow data, or a mapping from names to columns"
     )
 
 
-def _without_null_columns(data: Any) -> Any:
-    """The same where polars has columns without a type: it exports them with a buffer, which Arrow's interface does not know."""
+def _of_columns(columns: Mapping[Any, Any]) -> native.Table:
+    try:
+        return native.Table.from_columns({name: _column(values) for name, values in columns.items()})
+    except (TypeError, ValueError) as error:
+        if isinstance(error, WetclutchError):
+            raise
+        raise InputError(str(error), hint="give columns of numbers, times or words, all of one length") from error
+
+
+def _refuse_twice(names: list[str]) -> None:
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"two columns are called `{twice}`", hint="rename one of them, or leave it out", key=twice)
+
+
+def _plain_columns(data: Any) -> Any:
+    """The same with numbers where polars has columns without a type, which it exports with a buffer that Arrow's interface does not know, or
+    decimals."""
     polars = sys.modules.get("polars")
-    if polars is not None and isinstance(data, polars.DataFrame) and polars.Null in data.dtypes:
-        return data.cast({polars.Null: polars.Float64})
-    return data
+    if polars is None or not isinstance(data, polars.DataFrame):
+        return data
+    odd = {kind: polars.Float64 for kind in data.dtypes if kind == polars.Null or isinstance(kind, polars.Decimal)}
+    return data.cast(odd) if odd else data
 
 
 def _column(values: Any) -> Any:
@@ -158,8 +187,10 @@ def _column(values: Any) -> Any:
     if hasattr(values, "to_numpy"):
         values = values.to_numpy()
     kind = getattr(getattr(values, "dtype", None), "kind", None)
+    if getattr(values, "ndim", 1) == 2 and 1 in values.shape:
+        values = values.reshape(-1)
     if getattr(values, "ndim", 1) != 1:
-        raise ValueError(f"a column has one dimension, got {values.ndim}")
+        raise InputError(f"a column has one dimension, got {values.ndim}", hint="give each column of a matrix its name")
     if kind in ("f", "i", "u", "b"):
         import numpy as np
 
