@@ -210,5 +210,9 @@ fn a_new_vehicle_file_can_be_used_and_is_not_written_over() {
     assert!(!init("nan,2").status.success());
     printed(&init("4.17,2.34"));
     printed(&wetclutch(&["check", &car]));
+    // The same once more changes nothing.
+    printed(&init("4.17,2.34"));
+    assert!(stderr(&init("4.17,2.35")).contains("is there already"));
+    folder.write("car.toml", folder.read("car.toml") + "# mine\n");
     assert!(stderr(&init("4.17,2.34")).contains("is there already"));
 }

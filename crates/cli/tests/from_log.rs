@@ -43,6 +43,20 @@ fn init_takes_ratios_and_final_ratio_of_a_log_and_says_what_it_does_not_show() {
     // As people write it.
     assert!((final_ratio / 3.0 - 1.0).abs() < 0.01 && final_ratio == config::significant(final_ratio), "{final_ratio}");
     assert!(wetclutch(&["check", &car]).status.success());
+    // The capacity of the converter, at the speed ratios that the drive shows, is that of the car within its interval.
+    assert!(text.contains("capacity of the converter") && !text.contains("is that of a usual one"), "{text}");
+    let points = |key: &str| -> Vec<f64> {
+        vehicle["converter"][key].as_array().unwrap().iter().map(|value| value.as_float().unwrap()).collect()
+    };
+    let known =
+        config::CarFile::read(format!("{ROOT}vehicles/four_speed.toml").as_ref()).unwrap().car.converter.unwrap();
+    for (ratio, capacity) in points("speed_ratio").into_iter().zip(points("capacity_n_m_s2")) {
+        let expected = known.capacity_n_m_s2.at(ratio);
+        assert!(
+            !(0.7..0.9).contains(&ratio) || (capacity / expected - 1.0).abs() < 0.15,
+            "{ratio}: {capacity} {expected}"
+        );
+    }
     // Of a gearbox whose ratios alone are known no command is used, and the map may have them.
     let suggested = folder.read("map.toml");
     assert!(suggested.contains("[channel.element_") && suggested.contains("\n# ratios = [2.4"), "{suggested}");
@@ -76,7 +90,7 @@ fn init_takes_ratios_and_final_ratio_of_a_log_and_says_what_it_does_not_show() {
     unused(&["--gearbox", "ravigneaux_4"], "--from-log has no effect: ");
     assert!(!unused(&["--stroke"], "--stroke has no effect: ").contains("[fill]"));
     // A file that is there stays, and what is missing is asked for.
-    assert!(refused(&init(&radius)).contains("the file is there already"));
+    assert!(refused(&init(&["--wheel-radius-m", "0.31"])).contains("the file is there already"));
     let other = folder.path("other.toml");
     let output =
         |more: &[&str]| wetclutch(&[&["init", "--from-log", &log, "--mass-kg", "1500", "-o", &other], more].concat());

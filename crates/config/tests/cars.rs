@@ -125,7 +125,7 @@ fn a_default_that_cannot_be_right_names_the_file_and_the_numbers_that_it_follows
 fn a_valve_of_ones_own_that_is_not_whole_is_told_so() {
     let message = car("[valve]\nzero_pressure_a = 1.0\n").unwrap_err();
     assert!(
-        message.contains("missing field") && message.contains("hint: a [valve] of your own is given whole"),
+        message.contains("missing key") && message.contains("hint: a [valve] of your own is given whole"),
         "{message}"
     );
 }
@@ -139,12 +139,12 @@ fn a_valve_of_one_element_and_a_lock_up_clutch_that_are_not_whole_are_told_so() 
         ("[lock_up]\n", "`capacity_n_m`", "hint: [lock_up] has "),
     ] {
         let message = car(text).unwrap_err();
-        assert!(message.contains(&format!("car.toml:3: missing field {field}\n{hint}")), "{message}");
+        assert!(message.contains(&format!("car.toml:3: missing key {field}\n{hint}")), "{message}");
     }
     // What is not missing has no such hint.
     let message = car(&format!("{lock_up}ramp_s = 0.5\nramp = 1\n")).unwrap_err();
     assert!(
-        message.contains("car.toml:9: unknown field `ramp`") && !message.contains("hint: [lock_up] has"),
+        message.contains("car.toml:9: unknown key `ramp`") && !message.contains("hint: [lock_up] has"),
         "{message}"
     );
 }
@@ -348,13 +348,10 @@ fn wrong_vehicle_files_get_their_line_and_a_hint() {
             ["car.toml:7", "is 110, not below", ""],
         ),
         ("[fill]\nstroke_m = 1.2\n", ["car.toml:4", "fill.stroke_m", "expected 0.00001 to 0.02"]),
-        ("[clutch.B.fill]\nleak = 1\n", ["car.toml:4", "unknown field `leak`", ""]),
+        ("[clutch.B.fill]\nleak = 1\n", ["car.toml:4", "unknown key `leak`", ""]),
         ("launch = \"turbo\"\n", ["car.toml:3", "turbo", ""]),
-        ("mass = 3\n", ["car.toml:3", "unknown field `mass`", ""]),
-        (
-            "[valve]\ngain = { current_a = [0, 1], gain_pa_a = [1e6, 1e6] }\n",
-            ["car.toml:3", "missing field `delay`", ""],
-        ),
+        ("mass = 3\n", ["car.toml:3", "unknown key `mass`", ""]),
+        ("[valve]\ngain = { current_a = [0, 1], gain_pa_a = [1e6, 1e6] }\n", ["car.toml:3", "missing key `delay`", ""]),
     ] {
         let error = car(text).unwrap_err();
         assert!(parts.iter().all(|part| error.contains(part)), "{text}: {error}");

@@ -108,6 +108,7 @@ impl VehicleFile {
             gearbox: file,
             // This one ships as a gearbox without a converter.
             has_converter: numbers.has_converter.unwrap_or(gearbox != DUAL_CLUTCH),
+            converter: None,
             has_stroke: numbers.has_stroke,
             mass_kg: numbers.mass_kg,
             wheel_radius_m: numbers.wheel_radius_m,

@@ -18,14 +18,6 @@ use wetclutch::shell_quoted;
 
 pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
-    // A file that somebody has filled in is not to be lost by a second call.
-    if options.output.exists() && !is_forced() {
-        let message = format!(
-            "{}: the file is there already\nhint: choose another name after -o; --force replaces it",
-            options.output.shown()
-        );
-        return Err(Failure::Input(message));
-    }
     let log = options.from_log.as_deref().map(|log| FromLog::read(log, options)).transpose()?;
     if log.is_none() && options.mapping.is_given() {
         warn_without_effect("a channel map", "it maps the channels of the log of --from-log");
@@ -38,7 +30,7 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     }
     let numbers = Numbers::of(options, log.as_ref())?;
     let gearbox = match (&options.gearbox, &log) {
-        (Some(gearbox), _) => car(options, &numbers, gearbox)?,
+        (Some(gearbox), log) => car(options, &numbers, gearbox, log.as_ref())?,
         (None, Some(log)) => Some(by_ratios(options, &numbers, log)?),
         (None, None) => one_shift(options, &numbers).map(|()| None)?,
     };
@@ -67,11 +59,12 @@ fn one_shift(options: &Init, numbers: &Numbers) -> Result<(), Failure> {
         valve: options.valve.into(),
     };
     let text = if options.complete { complete_file } else { short_file }(&facts, options.stroke)?;
+    refuse_another(&options.output, &text)?;
     write_text(&options.output, &text)
 }
 
 /// A vehicle file with a gearbox, and the gearbox file beside it if it is one of the program's, which is returned.
-fn car(options: &Init, numbers: &Numbers, gearbox: &str) -> Result<Option<PathBuf>, Failure> {
+fn car(options: &Init, numbers: &Numbers, gearbox: &str, log: Option<&FromLog>) -> Result<Option<PathBuf>, Failure> {
     let torque_n_m = numbers.engine_torque_n_m;
     let shipped = SHIPPED.iter().find(|(name, _)| *name == gearbox);
     let (source, named, beside) = match shipped {
@@ -89,7 +82,9 @@ fn car(options: &Init, numbers: &Numbers, gearbox: &str) -> Result<Option<PathBu
         None if gearbox == "dual_clutch_7" => LaunchChoice::Clutch,
         None => LaunchChoice::Converter,
     };
-    let text = short_car_file(&facts(options, numbers, named, launch), &source)?;
+    let facts = CarFacts { converter: converter_of(log)?, ..facts(options, numbers, named, launch) };
+    let text = short_car_file(&facts, &source)?;
+    refuse_another(&options.output, &text)?;
     if let Some(path) = &beside {
         write_text(path, &source.text)?;
         output::note(&format!("gearbox file: {}", path.shown()));
@@ -106,12 +101,19 @@ fn by_ratios(options: &Init, numbers: &Numbers, log: &FromLog) -> Result<PathBuf
     let source = Source { path: path.clone(), text: log.gearbox_file(&options.name)? };
     refuse_existing(&path, &source.text)?;
     let launch = options.launch.unwrap_or(LaunchChoice::Converter);
-    let facts = CarFacts { has_stroke: false, ..facts(options, numbers, file, launch) };
+    let converter = log.converter_table()?;
+    let facts = CarFacts { has_stroke: false, converter, ..facts(options, numbers, file, launch) };
     let text = short_car_file(&facts, &source)?;
+    refuse_another(&options.output, &text)?;
     write_text(&path, &source.text)?;
     output::note(&format!("gearbox file: {}", path.shown()));
     write_text(&options.output, &text)?;
     Ok(path)
+}
+
+/// The converter of a log, if it shows it.
+fn converter_of(log: Option<&FromLog>) -> Result<Option<String>, Failure> {
+    Ok(log.map(FromLog::converter_table).transpose()?.flatten())
 }
 
 fn facts(options: &Init, numbers: &Numbers, gearbox: String, launch: LaunchChoice) -> CarFacts {
@@ -119,6 +121,7 @@ fn facts(options: &Init, numbers: &Numbers, gearbox: String, launch: LaunchChoic
         name: options.name.clone(),
         gearbox,
         has_converter: launch == LaunchChoice::Converter,
+        converter: None,
         has_stroke: options.stroke,
         mass_kg: options.mass_kg,
         wheel_radius_m: numbers.wheel_radius_m,
@@ -146,6 +149,18 @@ fn from_folder_of(output: &Path, named: &str) -> Result<String, Failure> {
     let whole = Path::new(named).canonicalize();
     let whole = whole.map_err(|error| Failure::Input(format!("--gearbox {named}: {error}")))?;
     Ok(whole.to_string_lossy().into_owned())
+}
+
+/// A vehicle file that somebody has filled in is not to be lost by a second call.
+fn refuse_another(path: &Path, text: &str) -> Result<(), Failure> {
+    if path.exists() && !is_forced() && !trace::read_text(path).is_ok_and(|there| there == text) {
+        let message = format!(
+            "{}: the file is there already, and is another one\nhint: choose another name after -o; --force replaces it",
+            path.shown()
+        );
+        return Err(Failure::Input(message));
+    }
+    Ok(())
 }
 
 /// Refuses to write over a gearbox file that somebody has changed.

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use config::significant;
-use logs::{Log, Readings, Role, SeenGear, SeenGears};
+use config::{VehicleFile, significant};
+use fit::drive::{ConverterFit, DriveRecord, fit_converter};
+use logs::{Log, Reading, Readings, Role, SeenGear, SeenGears};
 use trace::{ShownPath as _, quantity};
 
-use crate::args::{Init, available_threads};
+use crate::args::{Init, LaunchChoice, available_threads};
 use crate::commands::channel_map;
 use crate::failure::Failure;
 use crate::output;
@@ -75,15 +76,23 @@ impl Numbers {
                 quantity(self.engine_torque_n_m, "N m", 0)
             ));
         }
+        let has_converter = options.launch != Some(LaunchChoice::Clutch);
+        if has_converter && log.converter.is_ok() {
+            found.push("capacity of the converter".to_owned());
+        }
         if !found.is_empty() {
             output::note(&format!("from the log: {}", found.join(", ")));
         }
         let plates = if options.gearbox.is_some() { "" } else { "elements and plates of the gearbox, " };
         output::note(&format!(
-            "not in {}, and so given or usual values: mass, {plates}inertias, torque ratio of the converter, valves and kiss points\n\
-             hint: `wetclutch inspect LOG --map MAP.toml --shifts --write-converter OUT.toml` fits the capacity of the converter",
+            "not in {}, and so given or usual values: mass, {plates}inertias, torque ratio of the converter, valves and kiss points",
             log.path.shown()
         ));
+        if let (true, Err(reason)) = (has_converter, &log.converter) {
+            output::note(&format!(
+                "the capacity of the converter is that of a usual one, as the log does not show it: {reason}\nhint: replace [converter] where it is known"
+            ));
+        }
     }
 }
 
@@ -91,6 +100,8 @@ impl Numbers {
 pub(super) struct FromLog {
     path: PathBuf,
     seen: SeenGears,
+    /// The converter, or why the log does not show it.
+    converter: Result<ConverterFit, String>,
 }
 
 impl FromLog {
@@ -110,13 +121,29 @@ impl FromLog {
                 role.name()
             )));
         }
-        let mut seen = SeenGears::default();
+        let (mut seen, mut record, mut first_s) = (SeenGears::default(), DriveRecord::default(), None);
         let mut readings = Readings::new(&mut log, &map)?;
         while let Some(reading) = readings.next_or_refused() {
-            seen.push(&reading?);
+            let reading = reading?;
+            seen.push(&reading);
+            if !reading.is_refused() {
+                let first_s = *first_s.get_or_insert(reading.time_s);
+                record.push(&Reading { time_s: reading.time_s - first_s, ..reading });
+            }
         }
         readings.check()?;
-        Ok(Self { path: path.to_owned(), seen })
+        record.complete(map.gearbox.output_rad_per_m.or_else(|| seen.output_rad_per_m()));
+        let converter = fit_converter(&record, &record.moments());
+        Ok(Self { path: path.to_owned(), seen, converter })
+    }
+
+    /// The table of the converter that the log shows.
+    ///
+    /// # Errors
+    /// The program's own vehicle file is wrong.
+    pub(super) fn converter_table(&self) -> Result<Option<String>, Failure> {
+        let usual = VehicleFile::built_in()?;
+        Ok(self.converter.as_ref().ok().map(|fitted| fitted.table(&usual.converter)))
     }
 
     /// A gearbox file with the ratios.

@@ -120,6 +120,7 @@ mod tests {
                 name: "car".to_owned(),
                 gearbox: "8hp.toml".to_owned(),
                 has_converter: true,
+                converter: None,
                 has_stroke: false,
                 mass_kg: 10.0 * engine_torque_n_m,
                 wheel_radius_m: 0.3,

@@ -22,6 +22,15 @@ impl ConverterFit {
     /// The table `[converter]` of a vehicle file. What no log of speeds and engine torque shows is that of a `usual` converter: the torque
     /// ratio, and the capacity below the first knot and in overrun, scaled to the capacities that were found.
     pub fn vehicle_table(&self, log: &str, usual: &Converter<f64>) -> String {
+        format!(
+            "{BEGIN}{}, fitted by `wetclutch inspect --shifts --write-converter`: it replaces [converter] of a vehicle file.\n{}",
+            printable(log),
+            self.table(usual)
+        )
+    }
+
+    /// The same without the line that says where it is from and what it is for.
+    pub fn table(&self, usual: &Converter<f64>) -> String {
         let points = self.points(usual);
         let list = |value: &dyn Fn(&Point) -> String| points.iter().map(value).collect::<Vec<_>>().join(", ");
         let seen = self.seen();
@@ -30,12 +39,10 @@ impl ConverterFit {
             format!("#   {:.2}: {:.3e} +- {half:.1e}, {:.1} s\n", knot.speed_ratio, knot.capacity_n_m_s2, knot.time_s)
         });
         format!(
-            "{BEGIN}{}, fitted by `wetclutch inspect --shifts --write-converter`: it replaces [converter] of a vehicle file.\n\
-             # From the log, speed ratio: capacity in N m s^2 with the half of its 95 % interval, time near it:\n{}\
+            "# From the log, speed ratio: capacity in N m s^2 with the half of its 95 % interval, time near it:\n{}\
              # Inertia of engine and pump {:.3} +- {:.3} kg m^2 ({}): [engine] inertia_kg_m2.\n\
              # Not in the log, and so those of a usual converter, scaled: the torque ratio, and the capacity below a speed ratio of {} and above 1.\n\
              [converter]\nspeed_ratio = [{}]\ncapacity_n_m_s2 = [{}]\ntorque_ratio = [{}]\n",
-            printable(log),
             found.collect::<String>(),
             self.inertia_kg_m2,
             HALF_OF_95 * self.inertia_sd_kg_m2,

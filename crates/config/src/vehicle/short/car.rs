@@ -32,6 +32,8 @@ pub struct CarFacts {
     pub gearbox: String,
     /// Whether it has a torque converter; without one the engine turns the gearbox input.
     pub has_converter: bool,
+    /// The table `[converter]`, where its maps are known; `None` for those of a usual converter, as comments.
+    pub converter: Option<String>,
     /// Whether the pistons of its clutches have a stroke.
     pub has_stroke: bool,
     /// Mass, kg.
@@ -237,7 +239,11 @@ fn lowest_ratio(gearbox: &Gearbox) -> f64 {
 
 /// The file with what `shown` says of each table.
 fn text(facts: &CarFacts, shown: impl Fn(&str) -> String) -> String {
-    let converter = if facts.has_converter { format!("[converter]\n{}\n", shown("converter")) } else { String::new() };
+    let converter = match &facts.converter {
+        _ if !facts.has_converter => String::new(),
+        Some(table) => format!("{table}\n"),
+        None => format!("[converter]\n{}\n", shown("converter")),
+    };
     let stroke = if facts.has_stroke { "# The pistons have a stroke: the fill takes time.\n[fill]\n\n" } else { "" };
     format!(
         "{HEAD}\nname = {}\ngearbox = {} # from the folder of this file; plates, pistons and springs are in it\n\
