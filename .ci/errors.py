@@ -115,6 +115,7 @@ CURES = {
     "give a value in the range that the message names": [
         "`…` is …, expected",
         "expected a number from",
+        "expected a whole number from",
         "expected I/N with I",
         "expected two gears by their names",
         "such as [\"1-2\", \"2-1\"]",

@@ -19,7 +19,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 
 from reference_columns import MEANINGS  # noqa: E402
-from reference_keys import READERS  # noqa: E402
+from reference_keys import DEFAULTS, READERS  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = Path(sys.argv[1]).resolve()
@@ -63,9 +63,15 @@ KINDS = [
     ("Study file of a car with a gearbox", "car_study", "experiments", ["eight_speed_ftp_75.toml"]),
     ("Channel map", "channel_map", "maps", ["genesis_at8.toml"]),
 ]
+# Tables whose keys are listed elsewhere.
+ALIKE = [
+    (r"scenario\[\]\.sensors\.", ("scenario[].sensors", "keys of the [sensors](#sensors-file)")),
+    (r"sensors\.", ("sensors", "keys of the [sensors](#sensors-file)")),
+    (r"scenario\[\]\.off_nominal\.", ("scenario[].off_nominal", "keys of `off_nominal`")),
+]
 # Kinds of which no file is shipped: their keys are those of the schema.
 OTHERS = [("Sensors file", "sensors"), ("File of what was learnt", "learnt")]
-TITLES = ["| key | value | range | read by | |", "|---|---|---|---|---|"]
+TITLES = ["| key | value | range | default | read by | |", "|---|---|---|---|---|---|"]
 NUMBER = re.compile(r"[-+]?\d[\d_]*(\.\d+)?([eE][-+]?\d+)?")
 
 
@@ -122,7 +128,63 @@ def shortened(number):
     """A number with many zeros in the way people write it."""
     text = number.group(0)
     short = f"{float(text):g}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")
-    return short if len(text) > 6 and float(text) != 0 else text
+    if float(text) == 0:
+        return text
+    return short if len(text) > 6 or "e" in text else text
+
+
+def measured_defaults():
+    """The defaults of vehicle files, by what `check` says of short ones with the numbers of the cars whose values they are."""
+    car = WORK / "vehicles" / "short.toml"
+    car.write_text('name = "short"\ngearbox = "../gearboxes/8hp.toml"\nfill = {}\n')
+    one = WORK / "vehicles" / "short_one.toml"
+    numbers = ["--mass-kg", "1500", "--wheel-radius-m", "0.3", "--final-ratio", "3", "--engine-torque-n-m", "190"]
+    run("init", "--ratios", "2.5,1", *numbers, "--stroke", "-o", str(one))
+    found = json.loads(run("check", "--json", str(car), str(one)).stdout)["files"]
+    of = lambda file: {without_names(taken["key"]): taken["value"] for taken in file["defaults"]}
+    return {"car": of(found[0]), "vehicle": of(found[1])}
+
+
+def without_names(path):
+    """A key without the names of a car's parts and places in lists."""
+    path = re.sub(r"^clutch\.[^.]+\.", "clutch.NAME.", path)
+    return re.sub(r"^(gear_train\.shaft)\.[^.]+\.", r"\1[].", path)
+
+
+def default(kind, path, required, measured):
+    """What a key counts as where it is left out."""
+    plain = re.sub(r"^(clutch|channel)\.[^.]+\.", r"\1.NAME.", path.lstrip("."))
+    # Files have no brackets after the name of a list of tables.
+    in_lists = {re.sub(r"\[\]", "", key.lstrip(".")): key.lstrip(".") for key, _ in schema_keys(schema_of(kind))}
+    plain = in_lists.get(plain, plain)
+    value = measured.get(kind, {}).get(plain)
+    if value is not None:
+        return f"`{cell(value if len(value) <= 30 else '[...]')}`"
+    if plain in {key.lstrip(".") for key in required}:
+        return "required"
+    fits = lambda pattern: re.match(pattern.replace(r"\[\]", r"(\[\])?"), plain.removeprefix("NAME."))
+    found = next((text for pattern, text in DEFAULTS[kind] if fits(pattern)), None)
+    if found is None:
+        MISSING.append(f"{kind}: `{path}` has no default in .ci/reference_keys.py")
+    return found
+
+
+MISSING = []
+
+
+def required_keys(schema, path=""):
+    """The keys without which a table of a schema is not taken."""
+    for one in schema.get("anyOf", [schema]):
+        items = one.get("items")
+        if isinstance(items, dict) and path:
+            yield from required_keys(items, path + "[]")
+        for key, of in one.get("properties", {}).items():
+            whole = f"{path}.{key}" if path else key
+            if key in one.get("required", []):
+                yield whole
+            yield from required_keys(of, whole)
+        if isinstance(one.get("additionalProperties"), dict):
+            yield from required_keys(one["additionalProperties"], f"{path}.NAME" if path else "NAME")
 
 
 def schema_keys(schema, path=""):
@@ -165,14 +227,24 @@ def reader(kind, path):
     return found
 
 
-def rows_of_schema(kind, seen):
+def schema_of(kind):
+    return json.loads((ROOT / "docs" / "schemas" / f"{kind}.json").read_text())
+
+
+def rows_of_schema(kind, seen, measured):
     """Rows of the keys of a schema that are not among those."""
-    schema = json.loads((ROOT / "docs" / "schemas" / f"{kind}.json").read_text())
+    schema = schema_of(kind)
+    required = set(required_keys(schema))
     rows = {}
     for path, of in schema_keys(schema):
-        if path not in seen and path not in rows:
+        alike = next((words for pattern, words in ALIKE if re.match(pattern, path)), None) if kind != "sensors" else None
+        if alike is not None:
+            name, words = alike
+            rows[name] = f"| `{name}` | table | | {words} | {reader(kind, path)} | |"
+        elif path not in seen and path not in rows:
             words, allowed = values_of(of)
-            rows[path] = f"| `{path}` | {words} | {cell(allowed)} | {reader(kind, path)} | |"
+            shown = f"sensors.{path.removeprefix('.NAME.')}" if kind == "sensors" else path
+            rows[path] = f"| `{shown}` | {words} | {cell(allowed)} | {default(kind, path, required, measured)} | {reader(kind, path)} | |"
     return list(rows.values())
 
 
@@ -183,13 +255,14 @@ def keys():
         shutil.copytree(ROOT / folder, WORK / folder)
     page = [HEAD, "# Keys of the files\n"]
     page += [
-        "The value is that of the shipped file that is named; the range is the one that `check` states. An empty range: other rules hold, which `check` names. `[]` is any entry of a list of tables, `NAME` any name.",
+        "The value is that of the shipped file that is named; the range is the one that `check` states. An empty range: other rules hold, which `check` names. The default holds where the key is left out; that of a vehicle file is of a car of 1500 kg and 190 N m, and scaled for others. `[]` is any entry of a list of tables, `NAME` any name.",
         "Read by: the commands whose results depend on the key. `simulate` stands for all that simulate: `demo`, `bench`, `study`, `worst-case`, `error-bound`; `estimate` also for `fit`, `export`, `sensitivity` and the estimates of those. `check` reads every key.",
         "What each table is for: [vehicle files](vehicle-file.md), [gearbox files](gearbox-file.md), [simulation files](simulation-files.md), [channel map](channel-map.md).",
     ]
+    measured = measured_defaults()
     for title, kind, folder, names in KINDS:
         page += ["", f"## {title}", "", *TITLES]
-        seen = set()
+        seen, required = set(), set(required_keys(schema_of(kind)))
         for name in names:
             text = (ROOT / folder / name).read_text()
             for number, path, value, comment in keys_of(text):
@@ -198,13 +271,15 @@ def keys():
                 seen.add(path)
                 shown = "[...]" if value == "[" else value if len(value) <= 40 else value[:36] + " ..."
                 comment = comment if len(comment) <= 160 else comment[:157] + "..."
-                page.append(f"| `{path}` | `{cell(shown)}` | {cell(allowed(folder, text, number, value))} | {reader(kind, path)} | {cell(comment)} |")
+                page.append(f"| `{path}` | `{cell(shown)}` | {cell(allowed(folder, text, number, value))} | {default(kind, path, required, measured)} | {reader(kind, path)} | {cell(comment)} |")
         page += ["", "From " + ", ".join(f"[`{folder}/{name}`](../../{folder}/{name})" for name in names) + "."]
-        others = rows_of_schema(kind, seen)
+        others = rows_of_schema(kind, seen, measured)
         if others:
             page += ["", "Other keys of such a file:", "", *TITLES, *others]
     for title, kind in OTHERS:
-        page += ["", f"## {title}", "", *TITLES, *rows_of_schema(kind, set())]
+        page += ["", f"## {title}", "", *TITLES, *rows_of_schema(kind, set(), measured)]
+    if MISSING:
+        sys.exit("\n".join(MISSING))
     return "\n".join(page) + "\n"
 
 

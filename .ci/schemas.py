@@ -94,6 +94,15 @@ class File:
         inner[place[-1]] = value
         return root
 
+    def without(self, place):
+        """The tables of the file without the key at a place."""
+        root = json.loads(json.dumps(self.root))
+        inner = root
+        for step in place[:-1]:
+            inner = inner[step]
+        del inner[place[-1]]
+        return root
+
     def errors(self, *roots):
         """The errors of files with these tables, beside the file; the program starts once for all, which is most of the time."""
         probes = [self.path.with_name(f"probe_{at}.toml") for at in range(len(roots))]
@@ -183,7 +192,20 @@ def schema_of_table(places):
     if is_open and all(isinstance(value, dict) for found in values.values() for _, _, value in found) and values:
         # Tables with names of their own, such as those of clutches.
         return {"type": "object", "additionalProperties": schema_of([one for found in values.values() for one in found])}
-    return {"type": "object", "properties": dict(sorted(properties.items())), "additionalProperties": is_open}
+    required = sorted(key for key, found in values.items() if is_required(key, found, len(places)))
+    schema = {"type": "object", "properties": dict(sorted(properties.items())), "additionalProperties": is_open}
+    return {**schema, "required": required} if required else schema
+
+
+def is_required(key, found, tables):
+    """Whether a key is in every table, and none can be without it."""
+    if len(found) < tables:
+        return False
+    for file, place, _ in found[:4]:
+        [errors] = file.errors(file.without(place))
+        if not any(f"missing `{key}`" in error["message"] or f"missing key `{key}`" in error["message"] for error in errors):
+            return False
+    return True
 
 
 def schema_of(found):
@@ -222,6 +244,8 @@ def fits(schema, value):
     if isinstance(value, list):
         return all(fits(schema.get("items", {}), item) for item in value)
     if isinstance(value, dict):
+        if any(key not in value for key in schema.get("required", [])):
+            return False
         other = schema.get("additionalProperties", True)
         of = lambda key: schema.get("properties", {}).get(key, other)
         return all(of(key) is True or (of(key) is not False and fits(of(key), item)) for key, item in value.items())
@@ -243,6 +267,40 @@ def write_parts():
     lock_up = re.sub("(?m)^# ", "", car[begin:end])
     more = "[clutch.A]\ndrag_n_m = 1.0\n[clutch.A.error_bounds]\nfriction_factor = [0.9, 1.1]\n"
     (WORK / "vehicles" / "more_of_eight_speed.toml").write_text(f"{car[:begin]}{lock_up}{car[end:]}\n{more}")
+    # Cars with other valves and with all bounds of an element.
+    bounds = "friction_factor = [0.9, 1.1]\nvalve_lag_factor = [0.8, 1.2]\nvalve_gain_factor = [0.9, 1.1]\nvalve_delay_s = [0.0, 0.03]\n"
+    duty = re.search(r"(?ms)^\[clutch\.b\.valve\].*?(?=^\[)", (WORK / "vehicles" / "two_speed_pwm.toml").read_text()).group(0)
+    duty = re.sub(r"(?m)^\[.*\]$", "[valve]", duty, count=1)
+    (WORK / "vehicles" / "pwm_of_eight_speed.toml").write_text(
+        f"name = \"c\"\ngearbox = \"../gearboxes/8hp.toml\"\nhydraulics = {{ line_pressure_pa = 1.0e6 }}\n{duty}\n[clutch.A.error_bounds]\nduty_percent = 1.0\n"
+    )
+    (WORK / "vehicles" / "bounds_of_eight_speed.toml").write_text(
+        f"name = \"c\"\ngearbox = \"../gearboxes/8hp.toml\"\n[clutch.A.error_bounds]\ncurrent_a = 0.01\nvalve_hysteresis_pa = 1e4\n{bounds}"
+        "[clutch.A.friction]\nslip_rad_s = [0.0, 10.0]\ncoefficient = [0.12, 0.13]\n"
+    )
+    # Drives and studies with sensors, and with every fault.
+    bench = tomllib.loads((WORK / "experiments" / "bench.toml").read_text())
+    sensors = f"sensors = {toml(bench['sensors'])}\n"
+    faults = [
+        {"kind": "weak-clutch", "element": "A", "friction_factor": 0.5},
+        {"kind": "stuck-solenoid", "element": "A", "command": 0.5},
+        {"kind": "swapped-solenoids", "elements": ["A", "B"]},
+        {"kind": "leaking-piston", "element": "A", "pressure_fraction": 0.5},
+        {"kind": "aeration", "lag_factor": 3.0},
+        {"kind": "line-pressure", "pressure_pa": 8e5},
+        {"kind": "wrong-fluid", "friction_factor": 0.7},
+    ]
+    for at, fault in enumerate(faults):
+        city = tomllib.loads((WORK / "drives" / "city.toml").read_text())
+        city["fault"] = [{**fault, "from_s": 10.0}]
+        (WORK / "drives" / f"fault_{at}_of_city.toml").write_text("".join(f"{key} = {toml(of)}\n" for key, of in city.items()))
+    (WORK / "drives" / "sensors_of_city.toml").write_text(sensors + (WORK / "drives" / "city.toml").read_text())
+    (WORK / "drives" / "list_of_city.toml").write_text(
+        "name = \"d\"\nstart = { gear = \"1\", vehicle_m_s = 3.0 }\nshift = [{ time_s = 3.0, gear = \"2\" }]\n"
+        "[[segment]]\nduration_s = 6\nthrottle = [0.1, 0.2]\nbrake = [0.0, 0.1]\ngrade_rad = [0.0, 0.01]\n"
+    )
+    study = (WORK / "experiments" / "eight_speed_ftp_75.toml").read_text()
+    (WORK / "experiments" / "sensors_of_study.toml").write_text(sensors + study)
     learnt = {"gearbox": "8hp", "elements": ["A"], "shifts": 3, "refused": 0, "oil_temperature_degc": 80.0, "mean": [0.0], "covariance": [[1.0]]}
     (WORK / "vehicles" / "learnt.toml").write_text("".join(f"{key} = {toml(of)}\n" for key, of in learnt.items()))
 
