@@ -60,8 +60,18 @@ pub(crate) fn error(message: &str) {
     let mut stderr = anstream::stderr().lock();
     for one in message.split(NEXT) {
         // There is no other place to report that standard error cannot be written.
-        let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", with_excerpt(&printable_lines(one)));
+        let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", with_excerpt(&printable_lines(&without_codes(one))));
     }
+}
+
+/// A message without the numbers of the operating system's errors, whose words are before them.
+fn without_codes(message: &str) -> String {
+    let mut parts = message.split(" (os error ");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |shown, part| {
+        let code = part.find(|c: char| !c.is_ascii_digit()).unwrap_or(part.len());
+        shown + part[code..].strip_prefix(')').unwrap_or(&part[code..])
+    })
 }
 
 /// Another message on standard error.
@@ -123,6 +133,13 @@ fn with_hints<'m>(lines: impl Iterator<Item = &'m str>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_errors_are_left_out() {
+        let message = "a.csv: No such file or directory (os error 2)\nhint: check it (os error 13) again";
+        assert_eq!(without_codes(message), "a.csv: No such file or directory\nhint: check it again");
+        assert_eq!(without_codes("nothing (to leave out)"), "nothing (to leave out)");
+    }
 
     #[test]
     fn the_place_of_an_error_may_be_in_a_file_with_any_name() {

@@ -40,7 +40,7 @@ hint: it is in s: 20 ms is 0.02
 fn all_errors_of_a_file_have_their_lines_and_hints_come_last() {
     let text = "[channel.engine_speed]\nnaem = \"N\"\ndelay_s = 99\n";
     let expected = "\
-error: map.toml:2: unknown field `naem`, expected one of `name`, `names`, `group`, `combine`, `unit`, `scale`, `offset`, `delay_s`, `late_s`, `sent_on_change`, `valid_range`
+error: map.toml:2: unknown key `naem`, expected one of `name`, `names`, `group`, `combine`, `unit`, `scale`, `offset`, `delay_s`, `late_s`, `sent_on_change`, `valid_range`
  --> map.toml:2:1
   |
 2 | naem = \"N\"

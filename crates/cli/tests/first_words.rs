@@ -23,10 +23,10 @@ fn check_takes_several_files_and_names_all_errors_of_each() {
     // The good one is described.
     assert!(printed.contains(&format!("{VEHICLE}:\nvehicle \"")), "{printed}");
     for part in [
-        "unknown field `mas_kg`",
+        "unknown key `mas_kg`",
         "did you mean `mass_kg`",
         "`vehicle.wheel_radius_m` is 1000",
-        "unknown field `nam`",
+        "unknown key `nam`",
         "`channel.engine_speed.delay_s` is 99, expected 0 to 10",
         "error: 2 of 3 files have errors: ",
     ] {

@@ -127,8 +127,8 @@ fn a_file_that_was_not_learnt_of_this_car_is_refused_before_anything_is_written(
     assert!(refused_with(&text.replace("mean = [", "mean = [9, ")).contains(&one_more));
     assert!(refused_with(&text.replace("mean = [", "mean = [9")).contains("not within the bounds"));
     assert!(refused_with(&text[..text.len() / 2]).contains("hint: --learnt takes a file that"));
-    assert!(refused_with("").contains("missing field `gearbox`"));
-    assert!(refused_with(&std::fs::read_to_string(vehicle("eight_speed")).unwrap()).contains("unknown field"));
+    assert!(refused_with("").contains("missing key `gearbox`"));
+    assert!(refused_with(&std::fs::read_to_string(vehicle("eight_speed")).unwrap()).contains("unknown key"));
     assert!(refused_with(&folder.read(log)).contains("this looks like a table"));
     let other = |name: &str| {
         let more = ["--vehicle", &vehicle(name), "--learnt", &learnt, "-o", &out];

@@ -142,7 +142,7 @@ fn what_is_wrong_with_a_short_file_is_said_with_its_line() {
             "belongs to `capacity_n_m_s2`, which this file leaves out\nhint: give all of them",
         ),
         ("# piston_area_m2 = ", "piston_area_m2 = 900", "`clutch.b.piston_area_m2` is "),
-        ("[converter]", "[converter]\nmu = 1", "unknown field `mu`"),
+        ("[converter]", "[converter]\nmu = 1", "unknown key `mu`"),
     ];
     for (old, new, message) in cases {
         assert!(good.contains(old), "{old}");

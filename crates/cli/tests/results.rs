@@ -53,7 +53,7 @@ fn check_names_all_errors_of_the_vehicle_that_a_drive_names() {
     folder.write("car.toml", text.replace("wheel_radius_m = ", "wheel_radius_m = 1000"));
     let drive = "name = \"d\"\nvehicle = \"car.toml\"\n[[segment]]\nduration_s = 3\nthrottle = 0.2\n";
     let error = refused(&wetclutch(&["check", &folder.write("drive.toml", drive)]));
-    assert!(error.contains("unknown field `mas_kg`") && error.contains("`vehicle.wheel_radius_m` is 1000"), "{error}");
+    assert!(error.contains("unknown key `mas_kg`") && error.contains("`vehicle.wheel_radius_m` is 1000"), "{error}");
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn a_misspelt_key_of_a_channel_map_is_named_alone() {
     let folder = Folder::new("map-errors");
     let map = folder.write("map.toml", "[channel.engine_speed]\nnaem = \"N\"\n");
     let error = refused(&wetclutch(&["check", &map]));
-    assert!(error.starts_with(&format!("error: {map}:2: unknown field `naem`")), "{error}");
+    assert!(error.starts_with(&format!("error: {map}:2: unknown key `naem`")), "{error}");
     assert_eq!(error.matches("error: ").count(), 1, "{error}");
     let map = folder.write("map.toml", "[chanel.engine_speed]\nname = \"N\"\n");
     let error = without_excerpts(&refused(&wetclutch(&["check", &map])));

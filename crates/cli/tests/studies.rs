@@ -231,7 +231,7 @@ fn a_factor_that_cannot_be_is_refused_before_the_first_run() {
     let text =
         |key: &str, values: &str| format!("plan = \"random\"\nruns = 5\n[[factor]]\nkey = \"{key}\"\n{values}\n");
     let cases = [
-        ("car.vehicle.mas_kg", "range = [1300, 2000]", "unknown field `mas_kg`"),
+        ("car.vehicle.mas_kg", "range = [1300, 2000]", "unknown key `mas_kg`"),
         ("car.vehicle.mass_kg", "range = [13, 2000]", "`vehicle.mass_kg` is 13"),
         ("mass", "range = [1300, 2000]", "must begin with `car.`"),
         ("car.engine.torque.torque_n_m", "range = [0.9, 1.1]", "change = \"scale\""),

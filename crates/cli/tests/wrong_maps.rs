@@ -172,7 +172,7 @@ fn check_names_the_wrong_units_of_a_map_and_a_database_that_is_not_there() {
     let message = refused(&wetclutch(&["check", &folder.write("map.toml", &behind)]));
     let errors: Vec<&str> = message.lines().filter(|line| line.starts_with("error: ")).collect();
     let all = [
-        ":3: unknown field `colour`",
+        ":3: unknown key `colour`",
         ":1: `dbc`: ",
         ":5: invalid type: the text \"x\"",
         ":6: channel `N`",

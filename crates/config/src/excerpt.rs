@@ -103,7 +103,7 @@ impl Text<'_> {
             }
         };
         let quoted = first.split('`').nth(1).unwrap_or_default();
-        if ["unknown field `", "unknown key `", "there is no role `"].iter().any(|begin| first.starts_with(begin)) {
+        if ["unknown key `", "there is no role `"].iter().any(|begin| first.starts_with(begin)) {
             let is_it = |entry: &&Entry| self.is_here(&entry.key) && entry.name(self.text) == quoted;
             return entries.iter().find(is_it).map(|entry| entry.key.clone()).or_else(|| self.whole_line());
         }
@@ -197,8 +197,8 @@ mod tests {
             (4, "`clutch.a.map[1]` is 2, expected 3 to 4", (4, 11, "2")),
             (4, "`clutch.a.map[2]` is -3, expected 0 to 4", (5, 3, "-3")),
             (7, "invalid type: the text \"8\", expected a number", (7, 9, "\"8\"")),
-            (7, "unknown field `faces`, expected `teeth`", (7, 1, "faces")),
-            (6, "missing field `gain`", (6, 1, "[clutch.b]")),
+            (7, "unknown key `faces`, expected `teeth`", (7, 1, "faces")),
+            (6, "missing key `gain`", (6, 1, "[clutch.b]")),
             (6, "`clutch.b`: missing `gain`", (6, 9, "b")),
             (1, "`name`: a name must not be empty", (1, 8, "\"x\"")),
         ] {
@@ -222,9 +222,9 @@ mod tests {
     #[test]
     fn an_error_of_the_whole_file_has_no_excerpt() {
         assert_eq!(marked("a = 1\n", 1, "this looks like a study file, expected a vehicle file"), None);
-        assert_eq!(marked("", 1, "missing field `name`"), None);
-        assert_eq!(marked("a = 1\n", 9, "missing field `name`"), None);
-        assert_eq!(marked("a = 1\n\n", 0, "missing field `name`"), None);
+        assert_eq!(marked("", 1, "missing key `name`"), None);
+        assert_eq!(marked("a = 1\n", 9, "missing key `name`"), None);
+        assert_eq!(marked("a = 1\n\n", 0, "missing key `name`"), None);
     }
 
     #[test]

@@ -414,7 +414,7 @@ mod tests {
         for read in readers {
             let error = read(Source::built_in("x.toml", "unknown_to_all = 1\n")).unwrap_err().to_string();
             let keys: Vec<&str> = error.split('`').skip(3).step_by(2).collect();
-            assert!(error.contains("unknown field `unknown_to_all`") && keys.len() > 2, "{error}");
+            assert!(error.contains("unknown key `unknown_to_all`") && keys.len() > 2, "{error}");
             assert_eq!(misspelt(keys.into_iter(), &KINDS_KEYS), None);
         }
     }

@@ -411,7 +411,7 @@ mod tests {
         let line = 1 + source.text.lines().position(|line| line.starts_with("mass_kg")).unwrap();
         let heavy = error("vehicle.mass_kg", Change::Scale, 1e6);
         assert!(heavy.contains(&format!(":{line}: `vehicle.mass_kg` is ")), "{heavy}");
-        assert!(error("vehicle.mas_kg", Change::Set, 1.0).contains("unknown field `mas_kg`"));
+        assert!(error("vehicle.mas_kg", Change::Set, 1.0).contains("unknown key `mas_kg`"));
         assert!(error("vehicle.mass_kg", Change::Scale, f64::NAN).contains("NaN"));
         let mut tree = Tree::of(&source).unwrap();
         for (key, message) in

@@ -74,7 +74,7 @@ fn numbers_in_wrong_units_get_the_right_one_as_hint() {
     );
     assert!(error_in(EIGHT_SPEED, "sun_teeth = 48", "sun_teeth = 48.5").contains("expected an integer"));
     let inertia = r#"{ name = "c1", inertia_kg_m2 = "#;
-    assert!(error_in(EIGHT_SPEED, inertia, &format!("{inertia}nan, x = ")).contains("unknown field `x`"));
+    assert!(error_in(EIGHT_SPEED, inertia, &format!("{inertia}nan, x = ")).contains("unknown key `x`"));
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn the_level_must_be_given_and_known() {
     assert!(error.contains("missing `level`"), "{error}");
     let other = EIGHT_SPEED.replacen("level = \"stick-diagram\"", "level = \"ratios\"", 1);
     assert!(
-        GearboxFile::from_source(Source::built_in("g.toml", &other)).unwrap_err().to_string().contains("unknown field")
+        GearboxFile::from_source(Source::built_in("g.toml", &other)).unwrap_err().to_string().contains("unknown key")
     );
 }
 

@@ -300,7 +300,7 @@ fn a_wrong_map_is_refused_with_its_key() {
         ("[channel.gear]\nname = \"a\"\nvalid_range = [1, nan]\n", "`channel.gear.valid_range` is [1, NaN]"),
         ("[gearbox]\nratios = [1.0, 2.0]\n", "`gearbox.ratios`: 1 is followed by 2, expected falling ratios"),
         ("[gearbox]\nwheel_radius_m = -1\n", "`gearbox.wheel_radius_m` is -1"),
-        ("[chanel.gear]\nname = \"a\"\n", "unknown field `chanel`"),
+        ("[chanel.gear]\nname = \"a\"\n", "unknown key `chanel`"),
     ] {
         let error = ChannelMap::read(&folder.write("map.toml", text)).unwrap_err().to_string();
         assert!(error.contains("map.toml:") && error.contains(message), "{error} | {message}");

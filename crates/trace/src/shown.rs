@@ -44,6 +44,14 @@ impl ShownPath for Path {
 /// `invalid type: string "8", expected f64` becomes `invalid type: the text "8", expected a number`. Other messages stay as they are.
 pub fn plain_type(message: &str) -> String {
     let message = printable(message);
+    for (of_parser, plain) in [("unknown field ", "unknown key "), ("missing field ", "missing key ")] {
+        if let Some(rest) = message.strip_prefix(of_parser) {
+            return format!("{plain}{rest}");
+        }
+    }
+    if message.starts_with("invalid float, ") || message.starts_with("invalid integer, ") {
+        return "this is no number\nhint: write it with one decimal point, as 3.0 or 1.5e6".to_owned();
+    }
     let Some((kind, (found, expected))) = ["invalid type: ", "invalid value: "]
         .into_iter()
         .find_map(|kind| Some((kind, message.strip_prefix(kind)?.rsplit_once(", expected ")?)))
@@ -181,7 +189,11 @@ mod tests {
                 "invalid value: the number `-1`, expected a whole number from 0 on",
             ),
             ("invalid type: map, expected a sequence", "invalid type: a table, expected a list in brackets"),
-            ("unknown field `a\u{1b}`, expected `b`", r"unknown field `a\u{1b}`, expected `b`"),
+            (
+                "invalid float, expected nothing",
+                "this is no number\nhint: write it with one decimal point, as 3.0 or 1.5e6",
+            ),
+            ("unknown field `a\u{1b}`, expected `b`", r"unknown key `a\u{1b}`, expected `b`"),
         ] {
             assert_eq!(plain_type(message), plain);
         }

@@ -58,15 +58,15 @@ impl Misspelt {
         let error = error.with_line(*line);
         let hint = format!("did you mean `{meant}`{}?", if *is_missing { ", which is missing" } else { "" });
         match &error {
-            ConfigError::Syntax { message, .. } if message.starts_with("unknown field `") => error.with_hint(&hint),
             // These have their hint.
             ConfigError::Syntax { message, .. }
-                if ["there is no role `", "unknown key `"].iter().any(|begin| message.starts_with(begin)) =>
+                if message.starts_with("there is no role `") || message.contains("\nhint: did you mean ") =>
             {
                 error
             }
+            ConfigError::Syntax { message, .. } if message.starts_with("unknown key `") => error.with_hint(&hint),
             _ => {
-                let message = format!("unknown field `{}`\nhint: {hint}", trace::printable(written));
+                let message = format!("unknown key `{}`\nhint: {hint}", trace::printable(written));
                 ConfigError::Syntax { path: error.path().to_owned(), line: *line, message }
             }
         }

@@ -76,11 +76,7 @@ impl Wrong {
             }
             ConfigError::Syntax { message, .. } => match message {
                 // A channel map has roles as keys.
-                message
-                    if ["unknown field `", "unknown key `", "there is no role `"]
-                        .iter()
-                        .any(|begin| message.starts_with(begin)) =>
-                {
+                message if ["unknown key `", "there is no role `"].iter().any(|begin| message.starts_with(begin)) => {
                     let mut names = all_quoted(message).into_iter();
                     names.next().map_or(Self::Other, |key| Self::Unknown { key, known: names.collect() })
                 }
@@ -94,7 +90,7 @@ impl Wrong {
                         None => Self::Value { key },
                     }
                 }),
-                message if message.starts_with("missing field `") => {
+                message if message.starts_with("missing key `") => {
                     quoted(message).map_or(Self::Other, |key| Self::Missing { table: None, key })
                 }
                 message => {

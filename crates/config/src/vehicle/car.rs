@@ -204,7 +204,7 @@ struct RawOwnLockUp {
 fn incomplete_table(source: &Source) -> Option<ConfigError> {
     let of_valve = source.parse::<RawOwnClutches>().err().map(|error| (error, WHOLE_CLUTCH_VALVE));
     let of_lock_up = source.parse::<RawOwnLockUp>().err().map(|error| (error, WHOLE_LOCK_UP));
-    let is_missing = |error: &ConfigError| error.what().starts_with("missing field");
+    let is_missing = |error: &ConfigError| error.what().starts_with("missing key");
     let (error, hint) = [of_valve, of_lock_up].into_iter().flatten().find(|(error, _)| is_missing(error))?;
     Some(error.with_hint(hint))
 }

@@ -41,11 +41,11 @@ fn every_unknown_key_and_every_value_out_of_range_of_a_vehicle_file_is_named_wit
         .replacen("front_area_m2 = ", "front_area_m2 = \"\" #", 1);
     let found = errors(&text, &vehicle);
     assert_eq!(found.len(), 4, "{found:#?}");
-    assert!(has(&found, &text, "mas_kg", "unknown field `mas_kg`"), "{found:#?}");
+    assert!(has(&found, &text, "mas_kg", "unknown key `mas_kg`"), "{found:#?}");
     let meant = "hint: did you mean `mass_kg`, which is missing?";
     assert!(found.iter().any(|error| error.ends_with(meant)), "{found:#?}");
     assert!(has(&found, &text, "wheel_radius_m = 1000", "`vehicle.wheel_radius_m` is 1000"), "{found:#?}");
-    assert!(has(&found, &text, "more = ", "unknown field `more`"), "{found:#?}");
+    assert!(has(&found, &text, "more = ", "unknown key `more`"), "{found:#?}");
     assert!(has(&found, &text, "front_area_m2 = \"\"", "invalid type: the text"), "{found:#?}");
     assert!(errors(VEHICLE, &vehicle).is_empty());
 }
@@ -55,7 +55,7 @@ fn a_key_that_is_missing_without_another_in_its_place_is_named_alone() {
     let text = VEHICLE.replacen("mass_kg = 1500", "", 1).replacen("drag_coefficient = ", "drag_coefficient = 5000", 1);
     let found = errors(&text, &vehicle);
     assert_eq!(found.len(), 2, "{found:#?}");
-    assert!(has(&found, &text, "[vehicle]", "missing field `mass_kg`"), "{found:#?}");
+    assert!(has(&found, &text, "[vehicle]", "missing key `mass_kg`"), "{found:#?}");
     assert!(has(&found, &text, "drag_coefficient", "`vehicle.drag_coefficient` is 5000"), "{found:#?}");
 }
 
@@ -135,7 +135,7 @@ fn a_short_vehicle_file_names_the_unknown_key_and_the_missing_one_that_is_meant(
                 [vehicle]\nmas_kg = 1650.0\nwheel_radius_m = 0.32\n";
     let found = errors(text, &vehicle);
     assert_eq!(found.len(), 2, "{found:#?}");
-    let named = "unknown field `mas_kg`\nhint: did you mean `mass_kg`, which is missing?";
+    let named = "unknown key `mas_kg`\nhint: did you mean `mass_kg`, which is missing?";
     assert!(has(&found, text, "mas_kg", named), "{found:#?}");
     assert!(has(&found, text, "max_torque_n_m", "`engine.max_torque_n_m` is 1000000000"), "{found:#?}");
 }
@@ -354,7 +354,7 @@ fn all_errors_of_a_file_that_another_one_names_are_said() {
     let path = folder.with("e.toml", &named);
     let found = errors_of(path.to_str().unwrap(), &named);
     assert_eq!(found.len(), 2, "{found:#?}");
-    assert!(found[0].contains("v.toml:") && found[0].contains("unknown field `mas_kg`"), "{found:#?}");
+    assert!(found[0].contains("v.toml:") && found[0].contains("unknown key `mas_kg`"), "{found:#?}");
     assert!(found[1].contains("v.toml:") && found[1].contains("`vehicle.wheel_radius_m` is 1000"), "{found:#?}");
     // Two files that name each other end.
     let car = include_str!("../../../../vehicles/eight_speed.toml");

@@ -54,6 +54,6 @@ fn wrong_values_of_a_cylinder_are_named_with_their_line() {
     // A spring cannot press harder on its stop than at the kiss point.
     assert!(error("preload_n = 450", "preload_n = 700").contains("is 700, expected 0 to 600"));
     assert!(error("temperature_degc = 80", "temperature_degc = 353").contains("expected -40 to 150"));
-    assert!(error("exhaust_factor = 1.0", "exhaust = 1.0").contains("unknown field `exhaust`"));
+    assert!(error("exhaust_factor = 1.0", "exhaust = 1.0").contains("unknown key `exhaust`"));
     assert!(error("enabled = true\nstroke_m", "enabled = 1\nstroke_m").contains("expected true or false"));
 }

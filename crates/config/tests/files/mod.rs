@@ -57,7 +57,7 @@ fn an_error_of_two_files_names_the_one_that_the_value_is_from() {
     assert!(error.starts_with(&format!("{}:{line}: `vehicle.mass_kg` is 1", bad.display())), "{error}");
     let unknown = folder.with("unknown.toml", "[design.torque_phase]\n\nmodel_eror = 5\n");
     let error = VehicleFile::read_with(&good, &unknown).unwrap_err().to_string();
-    assert!(error.starts_with(&format!("{}:3: unknown field `model_eror`", unknown.display())), "{error}");
+    assert!(error.starts_with(&format!("{}:3: unknown key `model_eror`", unknown.display())), "{error}");
     let broken = folder.with("broken.toml", "[design.torque_phase]\nmodel_error_max_rad_s2 =\n");
     let error = VehicleFile::read_with(&good, &broken).unwrap_err().to_string();
     assert!(error.starts_with(&format!("{}:2: ", broken.display())), "{error}");

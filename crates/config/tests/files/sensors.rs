@@ -60,7 +60,7 @@ fn a_wrong_error_of_a_sensor_is_named_with_its_place() {
     assert!(wrong("missing_share = 5").ends_with("expected 0 to 1\nhint: 5 % is 0.05 as a fraction"));
     assert!(wrong("burst_s = 50").ends_with("expected 0 to 10\nhint: 50 ms is 0.05 s"));
     assert!(wrong("outliers = 1.5").contains("`sensors.wheel.outliers`: is 1.5, expected an integer"));
-    assert!(wrong("scael = 1").contains("unknown field `scael`"));
+    assert!(wrong("scael = 1").contains("unknown key `scael`"));
     let missing = bench_error("teeth = 48\n", "");
     let line = line_of(BENCH, "[sensors.wheel]");
     assert_eq!(missing, format!("e.toml:{line}: `sensors.wheel`: missing `teeth`"));

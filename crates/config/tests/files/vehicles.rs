@@ -42,9 +42,9 @@ fn a_value_in_the_wrong_unit_gets_file_line_key_range_and_hint() {
 #[test]
 fn an_unknown_key_a_missing_key_and_a_wrong_type_are_named() {
     let unknown = vehicle_error("slip_scale = 0.1", "slip_scale = 0.1\nslip_scal = 0.1");
-    assert!(unknown.contains("unknown field `slip_scal`"), "{unknown}");
+    assert!(unknown.contains("unknown key `slip_scal`"), "{unknown}");
     let missing = vehicle_error("slip_scale = 0.1", "");
-    assert!(missing.contains("missing field `slip_scale`"), "{missing}");
+    assert!(missing.contains("missing key `slip_scale`"), "{missing}");
     let line = line_of(VEHICLE, "slip_scale");
     let wrong = vehicle_error("slip_scale = 0.1", "slip_scale = \"0.1\"");
     assert!(
@@ -242,7 +242,7 @@ fn what_a_budget_leaves_out_of_valve_and_stroke_has_defaults_and_what_it_holds_i
             "is above `kiss_pressure_pa`, [54000.0, 66000.0] Pa\nhint: the return spring",
         ),
         ("leak_m3_s_pa = 1e-12", "fill.leak_m3_s_pa` is 1e-12, expected 2e-12 to"),
-        ("volume_m3 = [1, 2]", "unknown field `volume_m3`"),
+        ("volume_m3 = [1, 2]", "unknown key `volume_m3`"),
     ] {
         let error = with_budget("", fill).unwrap_err();
         assert!(error.contains(expected), "{error}");

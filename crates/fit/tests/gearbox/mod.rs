@@ -241,7 +241,7 @@ fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
         ("[clutch.E.error_bounds]\nfriction_factor = [1.1, 1.2]", "does not contain 1"),
         ("[clutch.E.error_bounds]\nvalve_delay_s = [0.03, 0.0]", "expected [minimum, maximum]"),
         ("[clutch.E.error_bounds]\nvalve_hysteresis_pa = -1", "clutch.E.error_bounds.valve_hysteresis_pa"),
-        ("[clutch.E.error_bounds]\nfriction = 0.1", "unknown field"),
+        ("[clutch.E.error_bounds]\nfriction = 0.1", "unknown key"),
         ("[error_bounds]\nconverter_share = 2", "error_bounds.converter_share"),
         ("[error_bounds]\nvalve_error_scale = 0", "error_bounds.valve_error_scale"),
     ] {
