@@ -327,6 +327,15 @@ fn a_log_with_nothing_in_it_and_one_that_is_cut_are_refused() {
     };
     let error = refused(&wetclutch(&["inspect", &table("none.mf4", 0)]));
     assert!(error.contains("none.mf4: there are no samples in it\nhint: check that the recorder"), "{error}");
+    // Of another bus.
+    let dbc = folder
+        .write("other.dbc", "VERSION \"\"\nNS_ :\nBS_:\nBU_: A\nBO_ 256 M: 8 A\n SG_ S : 0|16@1+ (1,0) [0|0] \"\" A\n");
+    let frames = folder.write("frames.log", "(1.000000) can0 123#0102\n(1.010000) can0 124#0102\n");
+    let error = refused(&wetclutch(&["inspect", &frames, "--dbc", &dbc]));
+    assert!(
+        error.contains("none of its frames is of a message of the DBC; 2 of 2 frames, of 2 identifiers, are not in the DBC: 0x123, 0x124\nhint: give"),
+        "{error}"
+    );
     let whole = std::fs::read(table("whole.parquet", 100)).unwrap();
     let cut = folder.write("cut.parquet", &whole[..whole.len() / 2]);
     let error = refused(&wetclutch(&["inspect", &cut]));

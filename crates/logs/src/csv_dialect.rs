@@ -160,14 +160,14 @@ fn no_table(head: &str, lines: &[&str]) -> String {
         let why = if has_returns {
             "its lines end with a carriage return alone\nhint: save it with line feeds"
         } else {
-            "there are no rows"
+            "there are no rows\nhint: check that the recorder has written samples"
         };
         return why.to_owned();
     }
     // A comma in a cell between commas was in quotation marks.
     let quoted = lines.iter().flat_map(|line| cells(line, b',')).find(|cell| has_decimal(cell, b','));
     quoted.map_or(
-        "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns, `,` `;` `|` or a tab between them), Parquet, MDF 4, candump, ASC or BLF".to_owned(),
+        "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns, `,` `;` `|` or a tab between them), Parquet, MDF 4, candump, ASC, BLF, PCAN or SavvyCAN".to_owned(),
         |cell| format!("numbers have commas, and commas separate the columns; the first is `{}`\nhint: write them with decimal points, or `;` between the columns", error::shown(&cell)),
     )
 }

@@ -51,6 +51,10 @@ const NOT_READ: &[(&[u8], &str)] = &[
         "this is HDF5, or a MAT-file of version 7.3\nhint: save its channels as CSV, Parquet or MDF 4, or read the MAT-file by `wetclutch.read` of the Python package",
     ),
     (
+        b"MATLAB 7.3 MAT-file",
+        "this is a MAT-file of version 7.3\nhint: save its channels as CSV, Parquet or MDF 4, or read it by `wetclutch.read` of the Python package",
+    ),
+    (
         b"MATLAB 5.0 MAT-file",
         "this is a MAT-file\nhint: save its channels as CSV, Parquet or MDF 4, or read it by `wetclutch.read` of the Python package",
     ),
@@ -61,7 +65,7 @@ const NOT_READ: &[(&[u8], &str)] = &[
     (b"TDSm", "this is a TDMS file\nhint: save its channels as CSV, Parquet or MDF 4"),
     (b"%PDF", "this is a PDF"),
 ];
-const OLD_MDF: &str = "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf";
+const OLD_MDF: &str = "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf, or read it by `wetclutch.read` of the Python package";
 const OTHER_FRAMES: &str = "these are frames of a bus in a form that is not read (a table of frames)\n\
                             hint: convert it, for example with python-can: `python -m can.logconvert IN OUT.log`";
 const WITHOUT_STAMPS: &str =

@@ -55,7 +55,7 @@ impl ParquetLog {
         let reader = SerializedFileReader::new(file).map_err(|error| cut(path, length, &error))?;
         check_places(path, length, &reader)?;
         if reader.metadata().file_metadata().num_rows() == 0 {
-            return Err(LogError::file(path, "there are no rows"));
+            return Err(LogError::file(path, "there are no rows\nhint: check that the recorder has written samples"));
         }
         let leaves: Vec<ColumnDescPtr> = reader.metadata().file_metadata().schema_descr().columns().to_vec();
         let titles: Vec<String> = leaves.iter().map(|leaf| leaf.path().string()).collect();

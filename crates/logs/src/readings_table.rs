@@ -137,7 +137,10 @@ impl Stream for Readings<'_> {
         for _ in 0..self.log.batch {
             if !read_row(&self.log.path, &mut self.records, 0)? {
                 if 2 * self.unread > self.rows || self.rows == 0 {
-                    let first = self.first_unread.as_deref().unwrap_or("there are no rows");
+                    let first = self
+                        .first_unread
+                        .as_deref()
+                        .unwrap_or("there are no rows\nhint: check that the recorder has written samples");
                     let message = format!(
                         "{} of {} rows are no readings, {first}\nhint: a row has time, name, value and unit",
                         self.unread, self.rows

@@ -178,7 +178,7 @@ fn what_holds_nothing_is_named() {
             "{mark:?}"
         );
     }
-    assert!(message("names", b"time_s,a\n").ends_with("there are no rows"));
+    assert!(message("names", b"time_s,a\n").contains("there are no rows"));
     for (bytes, said) in [
         (&b"\x1f\x8b\x08\0"[..], "the file is packed with gzip\nhint: unpack it"),
         (
@@ -187,6 +187,7 @@ fn what_holds_nothing_is_named() {
         ),
         (b"\xfd7zXZ\0\0\x04", "the file is packed with xz\nhint: "),
         (b"MATLAB 5.0 MAT-file, Platform", "this is a MAT-file\nhint: save its channels"),
+        (b"MATLAB 7.3 MAT-file, Platform", "this is a MAT-file of version 7.3\nhint: save its channels"),
         (b"\x89HDF\r\n\x1a\n", "this is HDF5, or a MAT-file of version 7.3\nhint: "),
         (b"MDF     3.30    ", "this is MDF of version 2 or 3\nhint: convert it"),
         (b"  vcan0  122   [2]  40 1F\n  vcan0  122   [2]  44 1F\n", "without time stamps\nhint: log with `candump -L`"),
@@ -198,7 +199,7 @@ fn what_holds_nothing_is_named() {
         assert_eq!(native, error);
     }
     let no_rows = std::fs::read(data("no_rows.parquet")).unwrap();
-    assert!(message("no_rows", &no_rows).ends_with("there are no rows"));
+    assert!(message("no_rows", &no_rows).contains("there are no rows"));
     let brotli = message("brotli", &std::fs::read(data("brotli.parquet")).unwrap());
     assert!(
         brotli.contains("` is packed with brotli, which is not read\nhint: write the file with zstd, snappy,"),

@@ -196,7 +196,7 @@ impl<'a> Decoder<'a> {
         maximum.sort_by_key(|(id, count)| (std::cmp::Reverse(**count), **id));
         let ids = maximum.iter().take(SHOWN).map(|(key, _)| shown(**key));
         notes.push(format!(
-            "{} of {} frames, of {} identifiers, are not in the DBC: {}{}",
+            "{} of {} frames, of {} identifiers, {NOT_IN_DBC}: {}{}",
             self.unknown_frames,
             self.frames,
             self.unknown.len(),
@@ -206,6 +206,9 @@ impl<'a> Decoder<'a> {
         notes
     }
 }
+
+/// Words of the note about frames that no message of the DBC describes.
+pub const NOT_IN_DBC: &str = "are not in the DBC";
 
 /// An identifier as messages show it, and whether it is an extended one.
 fn shown((extended, id): (bool, u32)) -> String {
