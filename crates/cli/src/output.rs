@@ -14,6 +14,7 @@ use std::time::Instant;
 
 use indicatif::ProgressDrawTarget;
 use serde::Serialize;
+use serde_json::ser::{Formatter, PrettyFormatter};
 use trace::{FileUse, ShownPath as _, is_unprintable, printable, shown_units};
 
 use crate::failure::Failure;
@@ -221,7 +222,74 @@ pub(crate) fn json(result: &impl Serialize) -> Result<(), Failure> {
         result: &'a R,
     }
     let versioned = Versioned { json_version: JSON_VERSION, result };
-    Ok(raw_line(&escaped_json(&serde_json::to_string_pretty(&versioned)?))?)
+    Ok(raw_line(&escaped_json(&pretty_json(&versioned)?))?)
+}
+
+/// JSON with a line for each value, and numbers as people write them: 0.89, not 0.8900000000000001.
+pub(crate) fn pretty_json(result: &impl Serialize) -> Result<String, serde_json::Error> {
+    let mut json = Vec::new();
+    result.serialize(&mut serde_json::Serializer::with_formatter(&mut json, Pretty::new()))?;
+    Ok(String::from_utf8_lossy(&json).into_owned())
+}
+
+/// As the pretty format, with numbers as people write them.
+pub(crate) struct Pretty(PrettyFormatter<'static>);
+
+impl Pretty {
+    pub(crate) fn new() -> Self {
+        Self(PrettyFormatter::new())
+    }
+}
+
+/// The number with few digits that the last bits of this one have missed: 0.89 of 0.8900000000000001. Other numbers stay as they are.
+fn without_noise(number: f64) -> f64 {
+    const FEW: usize = 8;
+    let rounded = format!("{number:.13e}");
+    let digits = rounded.split('e').next().unwrap_or_default().trim_end_matches('0');
+    let count = digits.chars().filter(char::is_ascii_digit).count();
+    if count <= FEW { rounded.parse().unwrap_or(number) } else { number }
+}
+
+impl Formatter for Pretty {
+    fn write_f64<W: io::Write + ?Sized>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
+        self.0.write_f64(writer, without_noise(value))
+    }
+
+    fn begin_array<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.begin_array(writer)
+    }
+
+    fn end_array<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.end_array(writer)
+    }
+
+    fn begin_array_value<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        self.0.begin_array_value(writer, first)
+    }
+
+    fn end_array_value<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.end_array_value(writer)
+    }
+
+    fn begin_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.begin_object(writer)
+    }
+
+    fn end_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.end_object(writer)
+    }
+
+    fn begin_object_key<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        self.0.begin_object_key(writer, first)
+    }
+
+    fn begin_object_value<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.begin_object_value(writer)
+    }
+
+    fn end_object_value<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.end_object_value(writer)
+    }
 }
 
 /// JSON without characters that are not printed: they stand in strings alone.
@@ -250,6 +318,20 @@ pub(crate) fn raw_line(text: &str) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_json_are_as_people_write_them() {
+        let json = pretty_json(
+            &serde_json::json!({ "a": [0.890_000_000_000_000_1, 19.999999999999996, 1e300, -0.1, 5], "b": 1760000.0000000002 }),
+        );
+        let values = ["0.89", "20.0", "1e+300", "-0.1", "5"].map(|value| format!("    {value}")).join(",\n");
+        assert_eq!(json.unwrap(), format!("{{\n  \"a\": [\n{values}\n  ],\n  \"b\": 1760000.0\n}}"));
+        // What has more digits keeps all of them.
+        for exact in [1.2582709347451813, 0.1 + 0.2 + 1e-9, f64::MIN_POSITIVE, 1.0 / 3.0, 123_456_789.0] {
+            assert_eq!(without_noise(exact).to_bits(), exact.to_bits(), "{exact}");
+        }
+        assert_eq!([0.275_000_000_000_000_04, 0.40000000000000363].map(without_noise), [0.275, 0.4]);
+    }
 
     #[test]
     fn a_title_that_is_wider_than_its_cells_takes_several_lines() {

@@ -93,7 +93,11 @@ fn numbers_of_the_command_line_have_ranges() {
     {
         let output = wetclutch(&[command, "study.toml", option, bad]);
         assert_eq!(output.status.code(), Some(2));
-        assert!(stderr(&output).contains(&format!("invalid value '{bad}'")), "{}", stderr(&output));
+        let text = stderr(&output);
+        assert!(
+            text.contains(&format!("invalid value '{bad}'")) && text.contains("expected a whole number from 1 to"),
+            "{text}"
+        );
     }
 }
 

@@ -157,9 +157,12 @@ fn columns_come_in_the_order_that_is_asked_for() {
     said(&output);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.starts_with("time_s,health,oncoming_pressure_estimate_pa\n0,good,0\n"), "{}", &text[..200]);
-    for twice in ["health,health", "oncoming_duty_percent"] {
-        assert!(refused(&estimate(&log, &["--columns", twice])).contains("there is no column `"), "{twice}");
-    }
+    let refusal = |columns: &str| refused(&estimate(&log, &["--columns", columns]));
+    assert!(refusal("health,health").contains("--columns: `health` is given twice\nhint: name each column once"));
+    assert!(
+        refusal("oncoming_duty_percent")
+            .contains("there is no column `oncoming_duty_percent`\nhint: did you mean `oncoming_")
+    );
 }
 
 #[test]

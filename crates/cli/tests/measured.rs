@@ -70,7 +70,7 @@ fn a_suggested_map_gives_the_same_estimate_as_the_names_of_the_program() {
     assert!(printed(&mapped) == expected, "{}", stderr(&mapped));
     let shifts = printed(&wetclutch(&["inspect", &log, "--map", &map, "--shifts", "--ratios", "2.5,1.0"]));
     assert!(
-        shifts.starts_with("1 shifts from 0.00 to 9.50 s\n") && shifts.contains("\n1-2    power-on upshift"),
+        shifts.starts_with("1 shift from 0.00 to 9.50 s\n") && shifts.contains("\n1-2    power-on upshift"),
         "{shifts}"
     );
 }

@@ -5,6 +5,7 @@ use minijinja::{Environment, Value, context};
 use observer::Phase;
 use study::Comparison;
 use trace::ShownPath as _;
+use trace::shown_units::sentence;
 use trace::units::mpa;
 
 use crate::shift_figure::{drive_figure, page_figure, shift_figure};
@@ -158,5 +159,5 @@ pub fn findings(comparison: &Comparison) -> Vec<String> {
             )
         });
     }
-    sentences
+    sentences.iter().map(|text| sentence(text)).collect()
 }

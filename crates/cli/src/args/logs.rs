@@ -7,7 +7,7 @@ use config::vehicle::short::ValveKind;
 use trace::TableFormat;
 use wetclutch::estimate::{GearPair, ShiftChoice};
 
-use super::{MethodChoice, ObserverChoice, OpenOutput, PageChoice, Threads, within};
+use super::{MethodChoice, ObserverChoice, OpenOutput, PageChoice, Threads, whole, within};
 
 /// Which channels of a log are which signals.
 #[derive(Debug, Clone, Args)]
@@ -117,7 +117,7 @@ pub(crate) struct Estimate {
     #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,
     /// Only the Nth shift of the log
-    #[arg(long, value_name = "N", conflicts_with = "shifts", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", conflicts_with = "shifts", value_parser = whole(1..=u32::MAX))]
     pub(crate) shift: Option<u32>,
     /// Only shifts between these gears, named as in the table of shifts, such as 1-2,2-3
     #[arg(long, value_name = "FROM-TO,...", value_delimiter = ',')]
@@ -158,6 +158,9 @@ pub(crate) struct Watch {
     /// With --serve: open the page in the browser
     #[arg(long, requires = "serve")]
     pub(crate) open: bool,
+    /// Print the shifts as JSON when the log ends, and show nothing in the terminal until then
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 impl Watch {
@@ -178,7 +181,7 @@ impl Watch {
             shifts: Vec::new(),
             follow: true,
             format: None,
-            json: false,
+            json: self.json,
             threads: Threads::ALL,
         }
     }

@@ -5,8 +5,10 @@ mod logs;
 mod studies;
 mod unused;
 
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
 use trace::ShownUnits;
@@ -514,6 +516,17 @@ pub(crate) struct PageChoice {
     /// Open the page in the browser
     #[arg(id = "open", long = "open", requires = "page")]
     pub(crate) is_opened: bool,
+}
+
+/// A whole number within these limits.
+fn whole<N>(range: RangeInclusive<N>) -> impl Fn(&str) -> Result<N, String> + Clone
+where
+    N: Copy + PartialOrd + Display + FromStr,
+{
+    move |text| match text.parse::<N>() {
+        Ok(value) if range.contains(&value) => Ok(value),
+        _ => Err(format!("expected a whole number from {} to {}", range.start(), range.end())),
+    }
 }
 
 /// A number in this range, as a vehicle file has it.

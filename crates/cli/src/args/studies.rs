@@ -8,7 +8,7 @@ use std::str::FromStr;
 use car::ObserverKind;
 use clap::{Args, ValueEnum};
 
-use super::{Open, OpenOutput, PhaseChoice};
+use super::{Open, OpenOutput, PhaseChoice, whole};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ObserverChoice {
@@ -87,7 +87,7 @@ pub(crate) struct Bench {
     pub(crate) vehicle: Option<PathBuf>,
     /// Number of cars sampled for each shift; friction, valve gains, converter and piston strokes differ from the vehicle file
     #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "vehicle")]
+    #[arg(value_parser = whole(1..=100_000_u32), requires = "vehicle")]
     pub(crate) draws: u32,
     /// Seed of the first car; the next cars have the next seeds
     #[arg(long, value_name = "N", default_value_t = 1, requires = "vehicle")]
@@ -135,7 +135,7 @@ pub(crate) struct StudyOptions {
 #[derive(Debug, Args)]
 pub(crate) struct Threads {
     /// Number of threads; default: as many as the machine has
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=1024_u16))]
     threads: Option<u16>,
 }
 
@@ -204,11 +204,11 @@ pub(crate) struct WorstCaseOptions {
     pub(crate) phase: PhaseChoice,
     /// Number of worst runs of the study to start searches from
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 4)]
-    #[arg(value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(value_parser = whole(1..=1000_u16))]
     pub(crate) starts: u16,
     /// Maximum number of steps of each search
     #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 200)]
-    #[arg(value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(value_parser = whole(1..=1_000_000_u64))]
     pub(crate) iterations: u64,
     /// Folder for the page, and for each worst case a study file and a figure
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-worst-case")]

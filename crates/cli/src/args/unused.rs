@@ -22,6 +22,7 @@ impl Command {
             Self::Convert(_) | Self::Init(_) | Self::Export(_) | Self::Completions(_) | Self::Man(_) => {
                 Some("files have SI units")
             }
+            Self::Inspect(of) if !of.shifts => Some("channels have the units of the log"),
             Self::Compare(of)
                 if of.output.is_none()
                     && [&of.a, &of.b].iter().all(|path| path.extension() == Some("toml".as_ref())) =>
@@ -53,7 +54,8 @@ impl Command {
             Self::Compare(of) => of.json,
             Self::Check(of) => of.json,
             Self::Export(of) => of.json,
-            Self::Watch(_) | Self::Completions(_) | Self::Man(_) => false,
+            Self::Watch(of) => of.json,
+            Self::Completions(_) | Self::Man(_) => false,
         }
     }
 

@@ -116,7 +116,13 @@ fn inspect_log(options: &Inspect, path: &Path) -> Result<Option<Value>, Failure>
     }
     let inspection = logs::inspect(&mut log)?;
     if inspection.channels.iter().all(|summary| summary.counts.total() == 0) {
-        return Err(nothing_in(path, "samples"));
+        return Err(match inspection.notes.iter().find(|note| note.contains(logs::can::NOT_IN_DBC)) {
+            Some(unknown) => Failure::Input(format!(
+                "{}: none of its frames is of a message of the DBC; {unknown}\nhint: give the DBC of this bus with --dbc",
+                path.shown()
+            )),
+            None => nothing_in(path, "samples"),
+        });
     }
     if options.json {
         return Ok(Some(inspect_json::channels(path, &log, &inspection)));
@@ -322,7 +328,8 @@ fn shifts(options: &Inspect, path: &Path, log: &mut Log, map: &ChannelMap) -> Re
     }
     remarks(&notes);
     say_origin(origin_s)?;
-    output::line(&format!("{} shifts from {:.2} to {:.2} s", found.len(), first_s - origin_s, last_s - origin_s))?;
+    let shifts = if found.len() == 1 { "shift" } else { "shifts" };
+    output::line(&format!("{} {shifts} from {:.2} to {:.2} s", found.len(), first_s - origin_s, last_s - origin_s))?;
     if !found.is_empty() {
         let titles = [
             "shift",

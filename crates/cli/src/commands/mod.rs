@@ -122,7 +122,7 @@ fn write_json_list<'a, N: AsRef<str> + 'a>(
 ) -> Result<(), Failure> {
     let write = |writer: &mut (dyn io::Write + Send)| {
         let mut writer = BufWriter::new(writer);
-        serde_json::Serializer::pretty(&mut writer).collect_seq(objects)?;
+        serde_json::Serializer::with_formatter(&mut writer, output::Pretty::new()).collect_seq(objects)?;
         writer.write_all(b"\n")?;
         writer.flush()
     };

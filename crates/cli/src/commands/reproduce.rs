@@ -8,6 +8,7 @@ use report::reproduction::{agreeing, ours};
 use study::Chapter;
 use study::statements::Case;
 use trace::ShownPath as _;
+use trace::shown_units::sentence;
 
 use crate::args::Reproduce;
 use crate::browser;
@@ -30,7 +31,7 @@ pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
     bar.finish_and_clear();
     let reproduction = Reproduction::of(&chapter, &vehicle, &experiments, &study)?;
     let numbers = numbers(&chapter);
-    let json = format!("{numbers:#}\n");
+    let json = output::pretty_json(&numbers)? + "\n";
     let texts = [&reproduction.html, &reproduction.markdown, &json];
     for (name, text) in FILES.iter().zip(texts) {
         write_text(&options.output.join(name), text)?;
@@ -48,7 +49,7 @@ fn print(chapter: &Chapter, page: &Path) -> Result<(), Failure> {
     for row in &chapter.statements {
         let verdict = row.agrees.map_or("", |agrees| if agrees { "agrees" } else { "differs" });
         let case = row.case.map_or_else(String::new, |case| format!(" ({})", Case::label(case)));
-        let line = format!("{verdict:7} {:7} {}{case}: {}", row.experiment, row.claim, ours(row));
+        let line = format!("{verdict:7} {:7} {}{case}: {}", row.experiment, row.claim, sentence(&ours(row)));
         output::line(&line.replace('’', "'").replace('−', "-"))?;
     }
     output::line("")?;

@@ -7,6 +7,7 @@ use car::{Car, Sensors, ShiftClutch};
 use car::{ElementErrors, ErrorBudget};
 use drivetrain::Real;
 use serde::Serialize;
+use trace::quantity;
 
 use super::matrix::{MatrixShift, controlling_of};
 use super::nominal::{NominalShift, nominal_shifts};
@@ -87,7 +88,7 @@ impl ShiftErrorKind {
             Self::ValveGain | Self::OtherValveGain => percent(budget.widest(ElementErrors::valve_gain)),
             Self::ValveLag => percent(budget.widest(ElementErrors::valve_lag)),
             Self::ValveDelay => format!("{:.0} ms", 1e3 * budget.widest(ElementErrors::valve_delay)),
-            Self::KissPoint => format!("{:.0} kPa", 1e-3 * budget.widest(|element| element.valve_hysteresis_pa)),
+            Self::KissPoint => quantity(1e-3 * budget.widest(|element| element.valve_hysteresis_pa), "kPa", 0),
             Self::Converter => percent(budget.converter),
             Self::EngineTorque => percent(budget.engine),
             Self::Inertia => percent(budget.inertia),

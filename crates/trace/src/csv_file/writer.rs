@@ -369,6 +369,9 @@ fn put_digits(bytes: &mut Vec<u8>, at: usize, text: &[u8]) -> usize {
     put(bytes, at, text)
 }
 
+/// A number with a smaller exponent is written with it.
+const MOST_ZEROS: i32 = -15;
+
 /// A number that is zero, none, or of a size whose text may have an exponent.
 #[inline(never)]
 fn put_odd_number(bytes: &mut Vec<u8>, at: usize, number: f64) -> usize {
@@ -381,7 +384,11 @@ fn put_odd_number(bytes: &mut Vec<u8>, at: usize, number: f64) -> usize {
     let mut digits = zmij::Buffer::new();
     match digits.format(number).split_once('e') {
         None => put(bytes, at, digits.format(number).as_bytes()),
-        Some((mantissa, exponent)) => put(bytes, at, &expanded(mantissa, exponent.parse().unwrap_or(0))),
+        Some((mantissa, exponent)) => match exponent.parse().unwrap_or(0) {
+            // Zeros that nobody reads.
+            ..MOST_ZEROS => put(bytes, at, digits.format(number).as_bytes()),
+            exponent => put(bytes, at, &expanded(mantissa, exponent)),
+        },
     }
 }
 

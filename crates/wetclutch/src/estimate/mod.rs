@@ -4,6 +4,7 @@ pub mod gearbox;
 mod input;
 pub(crate) mod live;
 mod log_checks;
+mod no_column;
 pub mod one_shift;
 pub(crate) mod output;
 pub mod selection;

@@ -42,14 +42,17 @@ pub(super) fn estimate(
         write_json_list(json, cells.into_iter().map(JsonObject::of))?;
     }
     let found = found.with_times_from_origin();
-    report(&found, file, setup.is_output_free(output), say)?;
+    if !setup.arguments.json {
+        table(&found, file, setup.is_output_free(output), say)?;
+    }
+    findings(&found.drive).iter().for_each(|sentence| say.note(sentence));
     found.said_of_sensors().into_iter().for_each(|sentence| say.note(sentence));
     finish(setup, output, places.as_ref(), || found.page(file, path), say)?;
     learnt_file.map_or(Ok(()), |path| Kept::of(path, file, &found.learnt).write(say))
 }
 
-/// The shifts as a table, and what was found.
-fn report(found: &DriveEstimates, file: &CarFile, is_output_free: bool, say: &mut Messages) -> Result<(), Failure> {
+/// The shifts as a table.
+fn table(found: &DriveEstimates, file: &CarFile, is_output_free: bool, say: &mut Messages) -> Result<(), Failure> {
     let (titles, mut rows) = shift_rows(&found.drive, file);
     let more = rows.len().saturating_sub(SHOWN);
     rows.truncate(SHOWN);
@@ -57,6 +60,5 @@ fn report(found: &DriveEstimates, file: &CarFile, is_output_free: bool, say: &mu
         say.table(&shift_lines(&titles, &rows, more), is_output_free)?;
     }
     shift_words(&found.drive, file).iter().for_each(|(word, meaning)| say.note(&format!("{word}: {meaning}")));
-    findings(&found.drive).iter().for_each(|sentence| say.note(sentence));
     Ok(())
 }

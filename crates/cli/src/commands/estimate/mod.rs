@@ -61,7 +61,7 @@ impl Setup<'_> {
 
     /// Whether the table of shifts goes to standard output.
     fn is_output_free(&self, output: Option<&Path>) -> bool {
-        (output.is_some() || self.live.is_some()) && !self.arguments.json
+        output.is_some() || self.live.is_some()
     }
 
     /// The shifts of a log in JSON, where they are wanted.
@@ -132,7 +132,7 @@ fn finish(
 pub(super) struct Messages {
     held: Option<Held>,
     /// Its shifts, where they are wanted in JSON.
-    result: Option<Value>,
+    pub(super) result: Option<Value>,
 }
 
 /// What is shown when a log is done.
@@ -236,7 +236,7 @@ fn each_log<S: Sync>(
 }
 
 /// Prints what is known of the logs, where it is wanted.
-fn print_json(options: &Estimate, logs: Vec<Value>) -> Result<(), Failure> {
+pub(super) fn print_json(options: &Estimate, logs: Vec<Value>) -> Result<(), Failure> {
     if options.json { output::json(&json!({ "logs": logs })) } else { Ok(()) }
 }
 

@@ -32,7 +32,7 @@ pub(super) fn estimate(
     }
     let found = found.with_times_from_origin();
     found.findings.iter().for_each(|sentence| say.note(sentence));
-    report(&found, setup.is_output_free(output), say)?;
+    report(&found, setup, output, say)?;
     if options.sensors.is_none() {
         say.note(WITHOUT_SENSORS);
     }
@@ -47,12 +47,15 @@ pub(super) fn estimate(
 }
 
 /// The shifts as a table, if there are any.
-fn report(found: &ShiftEstimates, is_output_free: bool, say: &mut Messages) -> Result<(), Failure> {
+fn report(found: &ShiftEstimates, setup: &Setup<'_>, output: Option<&Path>, say: &mut Messages) -> Result<(), Failure> {
     if found.shifts.is_empty() {
         return Ok(());
     }
-    let (titles, rows) = shift_rows(&found.shifts, SHOWN);
-    say.table(&shift_lines(&titles, &rows, found.shifts.len() - rows.len()), is_output_free)?;
+    if !setup.arguments.json {
+        let (titles, rows) = shift_rows(&found.shifts, SHOWN);
+        let lines = shift_lines(&titles, &rows, found.shifts.len() - rows.len());
+        say.table(&lines, setup.is_output_free(output))?;
+    }
     let others = || found.shifts.iter().filter(|shift| !shift.of_vehicle);
     if let Some(first) = others().next() {
         say.note(&format!(

@@ -15,7 +15,7 @@ use trace::ShownPath as _;
 use self::screen::Screen;
 use self::server::Server;
 use self::view::View;
-use super::estimate::{Messages, live};
+use super::estimate::{Messages, live, print_json};
 use crate::args::Watch;
 use crate::browser;
 use crate::failure::Failure;
@@ -27,7 +27,8 @@ const REDRAWN: Duration = Duration::from_millis(50);
 
 pub(crate) fn watch(options: &Watch) -> Result<(), Failure> {
     let terminal = Term::stdout();
-    if !terminal.is_term() && options.serve.is_none() {
+    let draws = terminal.is_term() && !options.json;
+    if !draws && !options.json && options.serve.is_none() {
         let message = "standard output is no terminal to draw in\nhint: --serve shows the estimate on a page, `wetclutch estimate --follow` writes it";
         return Err(Failure::Input(message.to_owned()));
     }
@@ -46,7 +47,7 @@ pub(crate) fn watch(options: &Watch) -> Result<(), Failure> {
         if let Some(server) = &server {
             scope.spawn(|| server.serve(scope, &title, &view, &has_ended));
         }
-        if terminal.is_term() {
+        if draws {
             scope.spawn(|| {
                 let mut screen = Screen::new(terminal, &title, address.as_deref());
                 while !has_ended.load(Ordering::Relaxed) {
@@ -61,8 +62,10 @@ pub(crate) fn watch(options: &Watch) -> Result<(), Failure> {
         let _ending = Ending(&has_ended);
         live(&arguments, (&view, &stop), &mut messages)
     });
+    let found = messages.result.take();
     let shown = messages.show(&options.log);
-    result.and(shown)
+    result.and(shown)?;
+    print_json(&arguments, found.into_iter().collect())
 }
 
 /// Ends what shows an estimate when the estimate ends, in whatever way.

@@ -9,6 +9,7 @@ use trace::signal::{self, OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, RE
 use trace::{Cell, ColumnKind};
 
 use crate::Error;
+use crate::estimate::no_column::no_column;
 
 /// What a row of the estimate is made from.
 #[derive(Clone, Copy)]
@@ -97,7 +98,7 @@ impl<'a> Row<'a> {
     /// of [`CLUTCH`].
     fn clutch(&self, which: usize, what: usize) -> f64 {
         let Some(clutch) = self.estimate.clutches.map(|clutches| clutches[which]) else { return f64::NAN };
-        if clutch.element.is_one_way() && ![TORQUE, TORQUE_DEVIATION].contains(&what) {
+        if !clutch.element.has_pressure() && ![TORQUE, TORQUE_DEVIATION].contains(&what) {
             // It has a torque alone.
             return f64::NAN;
         }
@@ -355,11 +356,7 @@ pub(crate) fn chosen(
     for name in names.iter().map(|name| name.trim()).filter(|name| *name != signal::TIME) {
         let Some(at) = all.iter().position(|column| column.name == name) else {
             let known: Vec<&str> = all.iter().map(|column| column.name.as_str()).collect();
-            return Err(Error::Input(format!(
-                "--columns: there is no column `{}`, or it is there twice\nhint: the other columns are {}",
-                name.escape_debug(),
-                known.join(", ")
-            )));
+            return Err(no_column(name, &known, chosen.iter().any(|column: &Column| column.name == name)));
         };
         chosen.push(all.remove(at));
     }

@@ -5,6 +5,7 @@ use observer::{ChannelHealth, Channels, Estimate, Health, Input, Phase, Reading}
 use study::{EstimateColumns, LogSample, OutputColumn};
 use trace::{Cell, ColumnKind, signal};
 
+use crate::estimate::no_column::no_column;
 use crate::estimate::output::{Destination, Output};
 use crate::{Error, Table};
 
@@ -88,11 +89,7 @@ pub(crate) fn chosen(
     for name in names.iter().map(|name| name.trim()).filter(|name| *name != signal::TIME) {
         let Some(at) = all.iter().position(|column| column.name() == name) else {
             let known: Vec<&str> = all.iter().map(Column::name).collect();
-            return Err(Error::Input(format!(
-                "--columns: there is no column `{}`, or it is there twice\nhint: the other columns are {}",
-                name.escape_debug(),
-                known.join(", ")
-            )));
+            return Err(no_column(name, &known, chosen.iter().any(|column: &Column| column.name() == name)));
         };
         chosen.push(all.remove(at));
     }
