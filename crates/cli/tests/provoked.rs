@@ -402,7 +402,12 @@ fn cars_that_are_not_as_their_file_says_are_warned_of() {
     let faults = std::fs::read_to_string(format!("{ROOT}drives/faults.toml")).unwrap();
     simulated(&faults);
     warned("drive/faults_measured.csv", "warning: one of C, D slips in gear 5, 7 since ");
-    simulated(&faults.replace("element = \"C\"\nfriction_factor = 0.1", "element = \"D\"\nfriction_factor = 0.05"));
+    // Two weak elements.
+    let weak = |element: &str| {
+        format!("[[fault]]\nkind = \"weak-clutch\"\nelement = \"{element}\"\nfriction_factor = 0.06\nfrom_s = 20\n")
+    };
+    let drive = faults.split("[[fault]]").next().unwrap();
+    simulated(&format!("{drive}{}{}", weak("A"), weak("C")));
     warned("drive/faults_measured.csv", "in all: no single element explains it\nhint: check the line pressure");
     simulated(&faults.replace(
         "element = \"C\"\nfriction_factor = 0.1\nfrom_s = 60",

@@ -92,8 +92,8 @@ fn over_speed(over: &OverSpeed, car: &Car) -> String {
     let [from, to] = [gears.from, gears.to].map(|gear| car.gear_name(gear));
     let in_gear = if from == to { format!("in gear {from}") } else { format!("in the shift {from}-{to}") };
     format!(
-        "warning: the engine turns at {} {in_gear} at {time_s:.2} s, and its torque map ends at {}: beyond, the last torque of the \
-         map is used\nhint: a gearbox controller would refuse such a shift; check [[shift]], the schedule and the grade",
+        "warning: the engine turns at {} {in_gear} at {time_s:.2} s, and its torque map ends at {}: beyond, a \
+         speed limiter takes its torque away\nhint: a gearbox controller would refuse such a shift; check [[shift]], the schedule and the grade",
         quantity(rpm(engine_rad_s), "rpm", 0),
         quantity(rpm(map_rad_s), "rpm", 0)
     )

@@ -108,7 +108,7 @@ pub fn simulate_car_drive_while(
             );
             return Err(CarError::Request(message));
         }
-        let map_rad_s = model.car.engine.torque_n_m.rows().last().copied().unwrap_or(f64::INFINITY);
+        let map_rad_s = model.engine_map_rad_s();
         if engine_rad_s > summary.over_speed.map_or(map_rad_s, |over| over.engine_rad_s) {
             let gear = run.controller().gear();
             let gears = ShiftCommand::between(gear, run.controller().shift().map_or(gear, |shift| shift.to));

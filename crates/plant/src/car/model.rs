@@ -41,6 +41,9 @@ const SYNCHRONISER_N_M: f64 = 40.0;
 /// Torque above which a dog between the members of planetary sets cannot be taken out, N m \[chosen\].
 const LOADED_DOG_N_M: f64 = 5.0;
 
+/// The speed limiter takes the torque of the engine away within this fraction above the last speed of its map \[chosen\].
+const LIMITER: f64 = 0.05;
+
 /// What an element of the car is.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Part {
@@ -190,6 +193,8 @@ pub struct CarModel {
     pub(super) parts: Vec<Part>,
     has_stroke: bool,
     is_small: bool,
+    /// Last speed of the engine's map, rad/s.
+    map_rad_s: f64,
 }
 
 impl CarModel {
@@ -226,7 +231,8 @@ impl CarModel {
         }
         let has_stroke = car.clutches.iter().flatten().any(|clutch| clutch.has_stroke);
         let is_small = train.freedoms <= SMALL_FREEDOMS && packs <= SMALL_PACKS;
-        Ok(Self { car, train, parts, has_stroke, is_small })
+        let map_rad_s = car.engine.torque_n_m.rows().last().copied().unwrap_or(f64::MAX);
+        Ok(Self { car, train, parts, has_stroke, is_small, map_rad_s })
     }
 
     /// Place of the clutch between engine and gearbox input among the elements.
@@ -240,6 +246,11 @@ impl CarModel {
             Part::Friction(slot, clutch) => Some((*slot, clutch)),
             _ => None,
         }
+    }
+
+    /// Last speed of the engine's map, rad/s: a limiter takes the torque away beyond.
+    pub fn engine_map_rad_s(&self) -> f64 {
+        self.map_rad_s
     }
 
     /// Whether a piston has a stroke, so that the oil in the cylinders is part of the state.
@@ -374,7 +385,11 @@ impl CarModel {
             engine_rad_s,
             turbine_rad_s,
             output_rad_s,
-            engine_n_m: if engine_n_m > 0.0 { engine_n_m * u.engine_share } else { engine_n_m },
+            engine_n_m: if engine_n_m > 0.0 {
+                engine_n_m * u.engine_share * self.limited(engine_rad_s)
+            } else {
+                engine_n_m
+            },
             pump_n_m,
             converter_n_m,
             shaft_n_m: car.driveline.shaft_torque_with_backlash(x[TWIST], twist_rate, car.backlash_rad),
@@ -382,6 +397,12 @@ impl CarModel {
             tyre_n: car.tyre.force(car.road.wheel_radius_m * x[WHEEL], x[VEHICLE]),
             elements_n_m: [0.0; MAX_ELEMENTS],
         }
+    }
+
+    /// Fraction of the driving engine torque that the speed limiter leaves.
+    #[inline(always)]
+    fn limited(&self, engine_rad_s: f64) -> f64 {
+        (1.0 - (engine_rad_s - self.map_rad_s) / (LIMITER * self.map_rad_s)).clamp(0.0, 1.0)
     }
 
     /// Torque of an element that slips or is open, N m.
