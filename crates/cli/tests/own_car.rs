@@ -254,5 +254,5 @@ fn check_warns_of_values_that_no_car_has_and_refuses_an_engine_without_torque() 
     let warned = said(&wetclutch(&["check", &folder.path("8hp.toml")]));
     assert!(warned.contains("\"5\" engages the same elements as \"3\""), "{warned}");
     let warned = said(&check("name = \"car\"\ngearbox = \"8hp.toml\"\n"));
-    assert!(warned.contains("warning: gearbox: \"5\" engages the same elements as \"3\""), "{warned}");
+    assert!(warned.contains("8hp.toml:20: `gear.5.engaged`: \"5\" engages the same elements as \"3\""), "{warned}");
 }

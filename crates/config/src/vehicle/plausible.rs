@@ -5,9 +5,9 @@
 use car::ShiftClutch;
 use drivetrain::road::GRAVITY_M_S2;
 use drivetrain::{ClutchValve, Converter, Driveline, Engine, RoadLoad, Tyre};
-use geartrain::Finding;
 
 use super::{CarFile, VehicleFile};
+use crate::{GearboxFile, Source};
 
 /// What a car is judged by.
 struct Parts<'v> {
@@ -107,7 +107,7 @@ impl CarFile {
         .implausible()
         .into_iter()
         .chain(self.slipping_elements())
-        .chain(self.gearbox.warnings.iter().map(of_gearbox))
+        .chain(of_gearbox(&self.gearbox_source))
         .collect()
     }
 }
@@ -245,10 +245,9 @@ impl Judged {
     }
 }
 
-/// A warning of the gearbox.
-fn of_gearbox(finding: &Finding) -> String {
-    let hint = finding.fault.hint().map(|hint| format!("\nhint: {hint}")).unwrap_or_default();
-    format!("gearbox: {finding}{hint}")
+/// The warnings of a gearbox file, each at its line.
+fn of_gearbox(source: &Source) -> Vec<String> {
+    GearboxFile::from_source(source.clone()).map(|file| file.warnings).unwrap_or_default()
 }
 
 /// A number with three digits that count.
