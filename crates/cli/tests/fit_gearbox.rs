@@ -144,6 +144,21 @@ fn logs_that_cannot_be_fitted_are_refused_with_a_reason() {
     }
 }
 
+#[test]
+fn shifts_that_one_way_clutches_make_are_refused_with_their_reason() {
+    let folder = Folder::new("fit-one-way");
+    let drive = folder.write("up.toml", "name = \"up\"\n[[segment]]\nduration_s = 25\nthrottle = 0.3\n");
+    let car = format!("{ROOT}vehicles/three_speed_th400.toml");
+    said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
+    let log = folder.path("sim/up_measured.csv");
+    let text = refused(&wetclutch(&["fit", &log, "--vehicle", &car, "-o", &folder.path("fitted.toml")]));
+    assert!(
+        text.contains("not used: 1-2 at ") && text.contains("s: one of its elements is a one-way clutch or a dog"),
+        "{text}"
+    );
+    assert!(text.contains("shifts of the logs can be fitted\nhint: the lines `not used` have the reasons"), "{text}");
+}
+
 /// A table with one column multiplied.
 fn scaled(text: &str, column: &str, factor: f64) -> String {
     let names = text.lines().next().unwrap();

@@ -33,13 +33,22 @@ impl CarBeyondBounds {
         let side = if size < 0.0 { "below" } else { "above" };
         let than =
             if matches!(quantity, CarQuantity::Delay(_)) { "the middle of its bounds" } else { "the vehicle file" };
+        let about = about(size, std_dev, unit);
         Some(format!(
-            "warning: by the shifts the car is outside its error budget, from {since_s:.1} s on: {name} is about {:.0} +-{std_dev:.0} {unit} {side} {than}, \
+            "warning: by the shifts the car is outside its error budget, from {since_s:.1} s on: {name} is {about} {side} {than}, \
              and the budget allows {bound:.0} {unit}{cause}. The guaranteed ranges do not hold. `wetclutch fit` fits the file to the log; or widen the \
              error budget",
-            size.abs(),
         ))
     }
+}
+
+/// The size of a difference with its standard deviation. A quantity that has nearly gone is beyond what the linear model measures.
+fn about(size: f64, std_dev: f64, unit: &str) -> String {
+    const NEARLY_GONE_PERCENT: f64 = -90.0;
+    if unit == "%" && size < NEARLY_GONE_PERCENT {
+        return format!("more than {:.0} %", -NEARLY_GONE_PERCENT);
+    }
+    format!("about {:.0} +-{std_dev:.0} {unit}", size.abs())
 }
 
 /// Name of a quantity, and what else may cause it.
@@ -81,5 +90,18 @@ fn words(quantity: CarQuantity, car: &Car, tables: &ShiftTables<f64>) -> (String
             (format!("the turbine-side inertia in the shifts between {low} and {high}"), "")
         }
         CarQuantity::Stiffness => ("the stiffness of the drive shafts".to_owned(), ""),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_more_than_a_hundred_per_cent_below() {
+        assert_eq!(about(-117.0, 12.0, "%"), "more than 90 %");
+        assert_eq!(about(-62.0, 9.0, "%"), "about 62 +-9 %");
+        assert_eq!(about(110.0, 9.0, "%"), "about 110 +-9 %");
+        assert_eq!(about(-117.0, 12.0, "kPa"), "about 117 +-12 kPa");
     }
 }

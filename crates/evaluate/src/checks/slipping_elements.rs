@@ -242,6 +242,11 @@ impl<'c> SlippingElements<'c> {
         let which = which.collect::<Vec<_>>().join(", ");
         let first_s = self.first_s.unwrap_or(f64::NAN);
         let names = |of: &[usize]| of.iter().map(|element| self.name(*element)).collect::<Vec<_>>().join(", ");
+        let many = |of: &[usize]| of.len() > 1;
+        let holds = |of: &[usize]| if many(of) { "hold" } else { "holds" };
+        let holds_not = |of: &[usize]| if many(of) { "do not hold" } else { "does not hold" };
+        let its_command = |of: &[usize]| if many(of) { "their commands" } else { "its command" };
+        let its_valve = |of: &[usize]| if many(of) { "their valves are stuck" } else { "its valve is stuck" };
         let is_swapped = changed.iter().any(|pair| pair[0] == *on && pair[1] == *off);
         let same_on = changed.iter().all(|pair| pair[1] == *on);
         let same_off = changed.iter().all(|pair| pair[0] == *off);
@@ -252,11 +257,18 @@ impl<'c> SlippingElements<'c> {
                 names(on)
             )
         } else if same_on && (pairs.len() > 1 || !same_off) {
-            format!("{} holds without its command: its valve is stuck", names(on))
+            format!("{} {} without {}: {}", names(on), holds(on), its_command(on), its_valve(on))
         } else if same_off && pairs.len() > 1 {
-            format!("{} does not hold in spite of its command: its valve is stuck", names(off))
+            format!("{} {} in spite of {}: {}", names(off), holds_not(off), its_command(off), its_valve(off))
         } else {
-            format!("{} does not hold in spite of its command, and {} holds without one", names(off), names(on))
+            format!(
+                "{} {} in spite of {}, and {} {} without one",
+                names(off),
+                holds_not(off),
+                its_command(off),
+                names(on),
+                holds(on)
+            )
         };
         Some(format!(
             "warning: the speeds are {which}, since {first_s:.1} s: {cause}\nhint: check these valves and their connectors; also possible: `gear` is not that of the car, or the gearbox file has other gears"

@@ -49,7 +49,7 @@ pub(super) fn fit(
     let Recorded { shifts, driving, skipped: not_used, .. } = recorded;
     let (fitted_shifts, held_out) = divided(shifts);
     if fitted_shifts.is_empty() {
-        return Err(no_shift(file, logs));
+        return Err(no_shift(file, logs, &not_used));
     }
     let found = fit::gearbox::fit(file, &tables, &fitted_shifts, &driving, &mut |at| {
         progress(FitProgress::Fitting { shifts: at.shifts, iteration: at.iteration + 1 });
@@ -148,7 +148,15 @@ fn divided(shifts: Vec<ShiftLog>) -> (Vec<ShiftLog>, Vec<ShiftLog>) {
     (logs(fitted), logs(held_out))
 }
 
-fn no_shift(car: &CarFile, logs: &[LogInput<'_>]) -> Error {
+fn no_shift(car: &CarFile, logs: &[LogInput<'_>], not_used: &[String]) -> Error {
+    if !not_used.is_empty() {
+        let message = format!(
+            "none of the {} shifts of the logs can be fitted\n\
+             hint: the lines `not used` have the reasons; a fit needs shifts from one clutch or brake to another, with their commands",
+            not_used.len()
+        );
+        return FitError::Input(message).into();
+    }
     let log = logs.first().map(|log| shell_quoted(log.path)).unwrap_or_default();
     FitError::Input(format!(
         "the logs have no shift between two gears that can be fitted\n\
