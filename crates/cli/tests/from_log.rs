@@ -95,9 +95,17 @@ fn init_takes_ratios_and_final_ratio_of_a_log_and_says_what_it_does_not_show() {
     let output =
         |more: &[&str]| wetclutch(&[&["init", "--from-log", &log, "--mass-kg", "1500", "-o", &other], more].concat());
     assert!(refused(&output(&["--map", &map])).contains("hint: give it with --wheel-radius-m"));
+    // A table with the names of the program needs no map.
+    said(&output(&radius));
+    let with_map = folder.read("other.toml");
+    std::fs::remove_file(&other).unwrap();
+    said(&output(&[&radius[..], &["--map", &map, "--force"]].concat()));
+    assert!(folder.read("other.toml") == with_map && with_map.contains("[converter]\nspeed_ratio"));
+    let renamed = folder.write("renamed.csv", text.replacen("turbine_speed_rad_s", "nT", 1));
+    let refusal = refused(&wetclutch(&["init", "--from-log", &renamed, "--mass-kg", "1500", "-o", &other]));
     assert!(
-        refused(&output(&radius))
-            .contains("needs the turbine and the output speed, and turbine_speed is not mapped\nhint: give --map")
+        refusal.contains("needs the turbine and the output speed, and turbine_speed is not mapped\nhint: give --map"),
+        "{refusal}"
     );
     let constant = folder.write(
         "constant.csv",

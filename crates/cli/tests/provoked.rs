@@ -61,7 +61,8 @@ fn a_clutch_that_fills_too_slowly_and_is_too_weak_is_named_by_its_shift() {
 fn channels_and_maps_that_do_not_fit_the_command_are_named() {
     let folder = Folder::new("no-map");
     let log = folder.write("log.csv", "time_s,turbine_speed_rad_s,output_speed_rad_s\n0,1,2\n0.01,2,3\n0.02,2,3\n");
-    provokes(&["inspect", &log, "--shifts"], "--shifts needs the channels of the signals");
+    let other = folder.write("other.csv", "time_s,nT,nO\n0,1,2\n0.01,2,3\n0.02,2,3\n");
+    provokes(&["inspect", &other, "--shifts"], "--shifts needs the channels of the signals");
     provokes(&["inspect", &log, "--channel", "engine"], "`engine` is not ROLE=NAME");
     let map = folder.write("map.toml", "dbc = \"no.dbc\"\n[channel.engine_speed]\nname = \"N\"\n");
     provokes(&["inspect", &log, "--map", &map], "`dbc` names ");

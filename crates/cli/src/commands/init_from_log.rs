@@ -8,7 +8,7 @@ use logs::{Log, Reading, Readings, Role, SeenGear, SeenGears};
 use trace::{ShownPath as _, quantity};
 
 use crate::args::{Init, LaunchChoice, available_threads};
-use crate::commands::channel_map;
+use crate::commands::{channel_map, or_own_names};
 use crate::failure::Failure;
 use crate::output;
 
@@ -112,6 +112,7 @@ impl FromLog {
             map.gearbox.wheel_radius_m.get_or_insert(radius_m);
         }
         let mut log = Log::open(path, &map.open)?.on_threads(available_threads());
+        let map = or_own_names(map, &log)?;
         map.resolve(&log)?;
         let missing = [Role::TurbineSpeed, Role::OutputSpeed].into_iter().find(|role| !map.has(*role));
         if let Some(role) = missing {

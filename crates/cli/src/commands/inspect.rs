@@ -15,7 +15,7 @@ use crate::commands::inspect_drive::{Drive, has_command, page, write_converter};
 use crate::commands::inspect_json;
 use crate::commands::suggested::by_values;
 use crate::commands::written::{head, is_page, replaces_only};
-use crate::commands::{channel_map, check_output, not_an_input, shown_from_s};
+use crate::commands::{channel_map, check_output, not_an_input, or_own_names, shown_from_s};
 use crate::failure::Failure;
 use crate::output;
 
@@ -98,6 +98,7 @@ fn inspect_log(options: &Inspect, path: &Path) -> Result<Option<Value>, Failure>
         return Ok(None);
     }
     if options.shifts {
+        map = or_own_names(map, &log)?;
         if map.channels.is_empty() {
             return Err(Failure::Input(
                 "--shifts needs the channels of the signals\nhint: give --map MAP.toml (`inspect --suggest` writes a first one) or --channel"

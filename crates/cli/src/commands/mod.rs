@@ -69,9 +69,9 @@ use std::path::{Path, PathBuf};
 
 use config::{Kind, Source};
 use indicatif::{ProgressBar, ProgressStyle};
-use logs::ChannelMap;
+use logs::{ChannelMap, Log};
 use serde::{Serialize, Serializer};
-use trace::{Cell, CsvWriter, ShownPath as _, Trace, WholeFile};
+use trace::{Cell, CsvWriter, ShownPath as _, Trace, WholeFile, signal};
 
 use crate::args::Mapping;
 use crate::failure::Failure;
@@ -194,6 +194,17 @@ fn channel_map_of_car(options: &Mapping, wheel_radius_m: f64) -> Result<ChannelM
     let mut map = channel_map(options)?;
     map.gearbox.wheel_radius_m.get_or_insert(wheel_radius_m);
     Ok(map)
+}
+
+/// This map, or where it maps nothing that of a table with the column names of the program.
+fn or_own_names(map: ChannelMap, log: &Log) -> Result<ChannelMap, Failure> {
+    let has = |name: &str| log.channels().iter().any(|channel| channel.name == name);
+    if !map.channels.is_empty() || !has(signal::TURBINE_SPEED) || !has(signal::OUTPUT_SPEED) {
+        return Ok(map);
+    }
+    let suggested = logs::suggest(log.channels(), &[], None);
+    let own = ChannelMap::of_text(Path::new("the map of the column names"), &suggested)?;
+    Ok(ChannelMap { channels: own.channels, ..map })
 }
 
 /// The channel map of the options.
