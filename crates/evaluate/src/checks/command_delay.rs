@@ -38,7 +38,7 @@ const FRACTION: f64 = 0.15;
 const BESIDE_N_M: f64 = 5.0;
 const MAXIMUM: f64 = 3.0;
 /// Shifts up and shifts down that are needed to judge, each \[chosen\]: an error of friction, gain or torque moves them in opposite directions.
-const ENOUGH_SHIFTS: u32 = 2;
+const ENOUGH_SHIFTS: u32 = 5;
 /// Delay from which on it is reported, s \[chosen\]: above what errors of friction, valves and strokes within the default bounds look like, as far
 /// as the filter has not learnt lag and delay of the valves.
 const REPORTED_S: f64 = 0.065;
