@@ -40,7 +40,7 @@ fn check_of_a_car_prints_its_gears_capacities_and_shifts_and_draws_its_gearbox()
     let vehicle = car(&folder, "car.toml", "turbine_inertia_kg_m2 = { \"1-2\" = 0.09 }\n");
     let text = printed(&wetclutch(&["check", &vehicle, "-o", &folder.path("out")]));
     // A ratio with its step; the pressure and friction of this car with the torque of its engine; the inertia of its file.
-    for part in ["2.1039  1.488", "C        clutch      6        582        278        1    2.09", "0.0900   0.0092"] {
+    for part in ["2.1039  1.488", "C        clutch      6        582         278        1    2.09", "0.0900   0.0092"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(text.contains("278 N m in R, 1; 203 N m in 2, 3, 4, 5, 6, 7, 8"), "{text}");

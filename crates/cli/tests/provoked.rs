@@ -63,7 +63,7 @@ fn channels_and_maps_that_do_not_fit_the_command_are_named() {
     let log = folder.write("log.csv", "time_s,turbine_speed_rad_s,output_speed_rad_s\n0,1,2\n0.01,2,3\n0.02,2,3\n");
     let other = folder.write("other.csv", "time_s,nT,nO\n0,1,2\n0.01,2,3\n0.02,2,3\n");
     provokes(&["inspect", &other, "--shifts"], "--shifts needs the channels of the signals");
-    provokes(&["inspect", &log, "--channel", "engine"], "`engine` is not ROLE=NAME");
+    provokes(&["inspect", &log, "--channel", "engine"], "`engine` is not SIGNAL=NAME");
     let map = folder.write("map.toml", "dbc = \"no.dbc\"\n[channel.engine_speed]\nname = \"N\"\n");
     provokes(&["inspect", &log, "--map", &map], "`dbc` names ");
     let semicolons = folder.write("semicolons.csv", std::fs::read_to_string(&log).unwrap().replace(',', ";"));

@@ -19,7 +19,7 @@ fn results_are_shown_in_the_units_that_are_wanted() {
     assert!((10.0 * mpa - bar).abs() < 0.006, "{mpa} MPa, {bar} bar");
     let (n_m, lb_ft) = (number_behind(&plain, "MPa, holds "), number_behind(&text, "bar, holds "));
     assert!((n_m / 1.355_818 - lb_ft).abs() < 0.6, "{n_m} N m, {lb_ft} lb ft");
-    assert!(text.contains("holds lb ft  asked lb ft") && !text.contains("N m  "), "{text}");
+    assert!(text.contains("holds lb ft  needed lb ft") && !text.contains("N m  "), "{text}");
 }
 
 #[test]

@@ -103,7 +103,7 @@ impl Text<'_> {
             }
         };
         let quoted = first.split('`').nth(1).unwrap_or_default();
-        if ["unknown key `", "there is no role `"].iter().any(|begin| first.starts_with(begin)) {
+        if ["unknown key `", "there is no signal `"].iter().any(|begin| first.starts_with(begin)) {
             let is_it = |entry: &&Entry| self.is_here(&entry.key) && entry.name(self.text) == quoted;
             return entries.iter().find(is_it).map(|entry| entry.key.clone()).or_else(|| self.whole_line());
         }

@@ -221,7 +221,7 @@ impl Fit {
         );
         when(
             !self.available.pressure,
-            "for valve gain, spring and friction singly, measure the pressure of the oncoming clutch in one shift; ten show no more",
+            "to separate valve gain, spring and friction, measure the pressure of the oncoming clutch in one shift; ten shifts show no more",
         );
         when(
             self.fill.is_some_and(|fill| fill.verdict() == Verdict::NotIdentifiable),

@@ -205,14 +205,14 @@ impl ChannelMap {
         wrong
     }
 
-    /// Takes `ROLE=NAME` or `ROLE=NAME [UNIT]`, in place of an entry with this role.
+    /// Takes `SIGNAL=NAME` or `SIGNAL=NAME [UNIT]`, in place of an entry with this role.
     ///
     /// # Errors
     /// There is no such role, or no name.
     pub fn set(&mut self, text: &str) -> Result<(), LogError> {
         let wrong = || {
             LogError::map(format!(
-                "`{}` is not ROLE=NAME\nhint: for example engine_speed=\"N_Eng [rpm]\"",
+                "`{}` is not SIGNAL=NAME\nhint: for example engine_speed=\"N_Eng [rpm]\"",
                 error::shown(text)
             ))
         };
@@ -261,7 +261,7 @@ fn known_role(name: &str) -> Result<(Role, Option<String>), String> {
     let of_element = Role::of_element(name).map(|(role, element)| (role, Some(element.to_lowercase())));
     of_element
         .or_else(|| Role::parse(name).map(|role| (role, None)))
-        .ok_or_else(|| format!("there is no role `{}`\nhint: the roles are {}", error::shown(name), names()))
+        .ok_or_else(|| format!("there is no signal `{}`\nhint: the signals are {}", error::shown(name), names()))
 }
 
 /// The text of a map as TOML; or the line, counted from 1, and the message.
@@ -552,7 +552,7 @@ mod tests {
         assert_eq!((map.channels[0].names[0].as_str(), map.channels[0].unit.as_deref()), ("N_Mot", Some("1/min")));
         let error = map.set("speed=N").unwrap_err().to_string();
         assert!(
-            error.starts_with("there is no role `speed`\nhint: the roles are engine_speed, turbine_speed"),
+            error.starts_with("there is no signal `speed`\nhint: the signals are engine_speed, turbine_speed"),
             "{error}"
         );
         assert!(map.set("engine_speed").is_err() && map.set("engine_speed= ").is_err());

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::common::{Folder, data, read, with_dbc};
 use logs::{ChannelMap, Log, LogError, OpenOptions, Quality, Reading, Readings, Role, RoleSummary, Steps};
 
-/// A map of `ROLE=NAME` entries.
+/// A map of `SIGNAL=NAME` entries.
 fn map(entries: &[&str]) -> ChannelMap {
     let mut map = ChannelMap::default();
     entries.iter().for_each(|entry| map.set(entry).unwrap());
@@ -291,7 +291,7 @@ fn a_channel_is_the_speed_of_one_shaft() {
 fn a_wrong_map_is_refused_with_its_key() {
     let folder = Folder::new("maps");
     for (text, message) in [
-        ("[channel.speed]\nname = \"a\"\n", "there is no role `speed`\nhint: the roles are"),
+        ("[channel.speed]\nname = \"a\"\n", "there is no signal `speed`\nhint: the signals are"),
         ("[channel.gear]\n", "`channel.gear.name` or `channel.gear.names` must name the channel"),
         ("[channel.gear]\nnames = [\"a\", \"b\"]\n", "`channel.gear.combine` is missing"),
         ("[channel.gear]\nname = \"a\"\nscale = 0\n", "`channel.gear.scale` is 0"),

@@ -19,7 +19,7 @@ pub(crate) struct Mapping {
     #[arg(long, value_name = "MAP.toml")]
     pub(crate) map: Option<PathBuf>,
     /// Channel of a signal, such as `engine_speed="N_Eng [rpm]"`; replaces that of the map. May be given several times
-    #[arg(long, value_name = "ROLE=NAME")]
+    #[arg(long, value_name = "SIGNAL=NAME")]
     pub(crate) channel: Vec<String>,
 }
 

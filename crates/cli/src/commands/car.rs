@@ -100,5 +100,5 @@ fn torques_asked(car: &Car) -> String {
         }
     }
     let asked: Vec<String> = asked.iter().map(|(torque, gears)| format!("{torque} in {}", gears.join(", "))).collect();
-    format!("asked: the largest turbine torque at full throttle, {}", asked.join("; "))
+    format!("needed: the largest turbine torque at full throttle, {}", asked.join("; "))
 }

@@ -99,7 +99,7 @@ pub(super) fn capacities(gearbox: &Gearbox, capacities: &[Capacity]) -> Result<(
         return Ok(());
     }
     let titles =
-        ["element", "kind", "faces", "holds N m", "asked N m", "in gear", "factor"].map(str::to_owned).to_vec();
+        ["element", "kind", "faces", "holds N m", "needed N m", "in gear", "factor"].map(str::to_owned).to_vec();
     let mut rows = Vec::new();
     for capacity in capacities {
         let element = &gearbox.elements[capacity.element];

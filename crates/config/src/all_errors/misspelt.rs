@@ -60,7 +60,7 @@ impl Misspelt {
         match &error {
             // These have their hint.
             ConfigError::Syntax { message, .. }
-                if message.starts_with("there is no role `") || message.contains("\nhint: did you mean ") =>
+                if message.starts_with("there is no signal `") || message.contains("\nhint: did you mean ") =>
             {
                 error
             }

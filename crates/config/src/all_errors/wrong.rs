@@ -76,7 +76,7 @@ impl Wrong {
             }
             ConfigError::Syntax { message, .. } => match message {
                 // A channel map has roles as keys.
-                message if ["unknown key `", "there is no role `"].iter().any(|begin| message.starts_with(begin)) => {
+                message if ["unknown key `", "there is no signal `"].iter().any(|begin| message.starts_with(begin)) => {
                     let mut names = all_quoted(message).into_iter();
                     names.next().map_or(Self::Other, |key| Self::Unknown { key, known: names.collect() })
                 }
