@@ -213,16 +213,28 @@ pub(crate) fn toml(text: &str) -> io::Result<()> {
 /// Version of the JSON on standard output: it rises when a key goes or gets another meaning, and not with a new key.
 const JSON_VERSION: u32 = 1;
 
+/// A result with the version of its keys.
+#[derive(Serialize)]
+struct Versioned<'a, R> {
+    json_version: u32,
+    #[serde(flatten)]
+    result: &'a R,
+}
+
+impl<'a, R> Versioned<'a, R> {
+    fn of(result: &'a R) -> Self {
+        Self { json_version: JSON_VERSION, result }
+    }
+}
+
 /// A result in JSON on standard output: an object, with the version of its keys.
 pub(crate) fn json(result: &impl Serialize) -> Result<(), Failure> {
-    #[derive(Serialize)]
-    struct Versioned<'a, R> {
-        json_version: u32,
-        #[serde(flatten)]
-        result: &'a R,
-    }
-    let versioned = Versioned { json_version: JSON_VERSION, result };
-    Ok(raw_line(&escaped_json(&pretty_json(&versioned)?))?)
+    Ok(raw_line(&escaped_json(&pretty_json(&Versioned::of(result))?))?)
+}
+
+/// The same with all digits of each number, as gains and certificates need them.
+pub(crate) fn exact_json(result: &impl Serialize) -> Result<(), Failure> {
+    Ok(raw_line(&escaped_json(&serde_json::to_string_pretty(&Versioned::of(result))?))?)
 }
 
 /// JSON with a line for each value, and numbers as people write them: 0.89, not 0.8900000000000001.

@@ -43,7 +43,7 @@ pub(super) fn of_vehicle(
     let designed = design_shift(vehicle, options.phases(), &options.library())?;
     let text: Vec<String> = designed.phases.iter().flat_map(|(phase, design)| lines(*phase, design)).collect();
     if options.json {
-        output::json(&designed.json(source)?)?;
+        output::exact_json(&designed.json(source)?)?;
     } else {
         output::line(&format!("{} ({})", vehicle.name, source.path.shown()))?;
         for line in about {

@@ -135,7 +135,7 @@ fn table(car: &CarFile, options: &Design) -> Result<(), TableError> {
     bar.finish_and_clear();
     if options.json {
         let objects: Vec<_> = rows.iter().map(|row| row.json(car)).collect();
-        output::json(&json!({ "shifts": objects }))?;
+        output::exact_json(&json!({ "shifts": objects }))?;
         return Ok(());
     }
     print(car, options, (model, method, quantity), &rows, &without)?;

@@ -65,7 +65,9 @@ impl<T: Real> GearboxFilter<'_, T> {
             let ranges = self
                 .element(&state.elements, clutch.element)
                 .and_then(|(memory, element)| memory.ranges(element, None));
-            ranges.map_or(T::zero(), |(_, [_, torque_max_n_m])| clutch.alpha.abs() * torque_max_n_m)
+            // A dog holds against the other clutch as well; a one-way clutch never does, and has no part in the second term.
+            let without = if clutch.element.is_dog() { T::infinity() } else { T::zero() };
+            ranges.map_or(without, |(_, [_, torque_max_n_m])| clutch.alpha.abs() * torque_max_n_m)
         });
         [turbine_n_m + inertia_n_m.abs(), off.at_most(on)]
     }
