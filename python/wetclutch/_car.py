@@ -225,10 +225,13 @@ def _is_bound(key: str) -> bool:
 def _text_of(path: str) -> str | None:
     """The text of a file; None of one that is not there."""
     try:
-        with open(path, encoding="utf-8") as file:
+        with open(path, encoding="utf-8", newline="") as file:
             return file.read()
     except FileNotFoundError:
         return None
+    except (UnicodeDecodeError, IsADirectoryError):
+        # Something else, which is not to be replaced.
+        return ""
 
 
 def _with_gearbox(text: str, named: str) -> str:

@@ -232,7 +232,7 @@ def estimate(
     check_range("threads", threads, 1, 1024)
     check_range("shift", shift, 1, 10**9)
     check_car(car)
-    if learnt is not None and "\n" not in learnt:
+    if learnt is not None and (not isinstance(learnt, str) or "\n" not in learnt):
         raise InputError(f"learnt: `{learnt}` is no text of what was learnt", hint="give Estimates.learnt, or the text of such a file")
     options = {
         "observer": observer,

@@ -119,7 +119,7 @@ def _channels(group: Any, prefix: str, around: Any, left_out: list[str]) -> Iter
         if name.startswith(("__", "#")):
             continue
         if hasattr(value, "items"):
-            groups.append((f"{prefix}{name}.", value))
+            groups.append((f"{prefix}{_label(value) or name}.", value))
         elif isinstance(value, list) and value and all(hasattr(of, "items") for of in value):
             # The signals of a structure with time.
             groups.extend((f"{prefix}{_label(of) or f'{name}{at + 1}'}.", of) for at, of in enumerate(value))
@@ -158,13 +158,17 @@ def _numbers(value: Any) -> Any:
     """The value as an array of numbers with one dimension or two; None of what is none."""
     import numpy as np
 
-    values = np.squeeze(np.asarray(value))
+    try:
+        values = np.squeeze(np.asarray(value))
+    except ValueError:
+        # A list of lists of different lengths.
+        return None
     return values if values.ndim in (1, 2) and values.dtype.kind in "biuf" else None
 
 
 def _has_many(value: Any) -> bool:
     """Whether it is a list of something else than numbers, as of words."""
-    return isinstance(value, list) and len(value) > 1
+    return (isinstance(value, list) or getattr(value, "ndim", 0) > 0) and len(value) > 1
 
 
 def _times(vectors: dict[str, Any], around: Any) -> Any:
@@ -178,5 +182,7 @@ def _times(vectors: dict[str, Any], around: Any) -> Any:
             found.append((alike > 1, -list(_TIMES).index(name.lower()), name, values, factor))
     if not found:
         return around
-    _, _, name, values, factor = max(found, key=lambda of: of[:2])
+    is_alike, _, name, values, factor = max(found, key=lambda of: of[:2])
+    if not is_alike and around is not None:
+        return around
     return name, values if factor == 1.0 else factor * values, values

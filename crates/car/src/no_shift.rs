@@ -25,7 +25,7 @@ impl Car {
             ),
             Change::Single { .. } if gearbox.is_same_ratio(from, to) => "both gears have one ratio".to_owned(),
             Change::Single { offgoing, oncoming, .. } if !shift.changes_dog_under_power(gearbox) => format!(
-                "{} off and {} on, one of them a dog: it can be put in in a downshift and taken out in an upshift",
+                "{} off and {} on: a dog goes in only in a downshift, and comes out only in an upshift",
                 self.names(&[*offgoing]),
                 self.names(&[*oncoming])
             ),

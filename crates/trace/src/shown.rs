@@ -49,7 +49,10 @@ pub fn plain_type(message: &str) -> String {
             return format!("{plain}{rest}");
         }
     }
-    if message.starts_with("invalid float, ") || message.starts_with("invalid integer, ") {
+    if ["invalid float", "invalid integer", "invalid mantissa", "invalid exponent"]
+        .iter()
+        .any(|of| message.starts_with(of))
+    {
         return "this is no number\nhint: write it with one decimal point, as 3.0 or 1.5e6".to_owned();
     }
     let Some((kind, (found, expected))) = ["invalid type: ", "invalid value: "]

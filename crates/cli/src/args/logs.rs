@@ -297,6 +297,18 @@ impl Init {
     }
 }
 
+impl Init {
+    /// What connects engine and gearbox, given or usual.
+    pub(crate) fn launch(&self) -> LaunchChoice {
+        let usual = if self.gearbox.as_deref() == Some("dual_clutch_7") {
+            LaunchChoice::Clutch
+        } else {
+            LaunchChoice::Converter
+        };
+        self.launch.unwrap_or(usual)
+    }
+}
+
 /// What connects the engine with the gearbox.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum LaunchChoice {

@@ -77,12 +77,7 @@ fn car(options: &Init, numbers: &Numbers, gearbox: &str, log: Option<&FromLog>) 
         }
         None => (read_gearbox(gearbox)?, from_folder_of(&options.output, gearbox)?, None),
     };
-    let launch = match options.launch {
-        Some(launch) => launch,
-        None if gearbox == "dual_clutch_7" => LaunchChoice::Clutch,
-        None => LaunchChoice::Converter,
-    };
-    let facts = CarFacts { converter: converter_of(log)?, ..facts(options, numbers, named, launch) };
+    let facts = CarFacts { converter: converter_of(log)?, ..facts(options, numbers, named, options.launch()) };
     let text = short_car_file(&facts, &source)?;
     refuse_another(&options.output, &text)?;
     if let Some(path) = &beside {
@@ -100,9 +95,8 @@ fn by_ratios(options: &Init, numbers: &Numbers, log: &FromLog) -> Result<PathBuf
     let path = options.output.with_file_name(&file);
     let source = Source { path: path.clone(), text: log.gearbox_file(&options.name)? };
     refuse_existing(&path, &source.text)?;
-    let launch = options.launch.unwrap_or(LaunchChoice::Converter);
     let converter = log.converter_table()?;
-    let facts = CarFacts { has_stroke: false, converter, ..facts(options, numbers, file, launch) };
+    let facts = CarFacts { has_stroke: false, converter, ..facts(options, numbers, file, options.launch()) };
     let text = short_car_file(&facts, &source)?;
     refuse_another(&options.output, &text)?;
     write_text(&path, &source.text)?;

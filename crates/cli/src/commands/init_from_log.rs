@@ -76,7 +76,7 @@ impl Numbers {
                 quantity(self.engine_torque_n_m, "N m", 0)
             ));
         }
-        let has_converter = options.launch != Some(LaunchChoice::Clutch);
+        let has_converter = options.launch() == LaunchChoice::Converter;
         if has_converter && log.converter.is_ok() {
             found.push("capacity of the converter".to_owned());
         }
@@ -85,8 +85,9 @@ impl Numbers {
         }
         let plates = if options.gearbox.is_some() { "" } else { "elements and plates of the gearbox, " };
         output::note(&format!(
-            "not in {}, and so given or usual values: mass, {plates}inertias, torque ratio of the converter, valves and kiss points",
-            log.path.shown()
+            "not in {}, and so given or usual values: mass, {plates}inertias, {}valves and kiss points",
+            log.path.shown(),
+            if has_converter { "torque ratio of the converter, " } else { "" }
         ));
         if let (true, Err(reason)) = (has_converter, &log.converter) {
             output::note(&format!(

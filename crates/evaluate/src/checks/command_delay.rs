@@ -38,7 +38,7 @@ const FRACTION: f64 = 0.15;
 const BESIDE_N_M: f64 = 5.0;
 const MAXIMUM: f64 = 3.0;
 /// Shifts up and shifts down that are needed to judge, each \[chosen\]: an error of friction, gain or torque moves them in opposite directions.
-const ENOUGH_SHIFTS: u32 = 5;
+const ENOUGH_SHIFTS: u32 = 2;
 /// Delay from which on it is reported, s \[chosen\]: above what errors of friction, valves and strokes within the default bounds look like, as far
 /// as the filter has not learnt lag and delay of the valves.
 const REPORTED_S: f64 = 0.065;
@@ -51,9 +51,8 @@ const LAG_S: f64 = 0.2;
 /// is stronger by a fraction takes it earlier by about that fraction of this time.
 const DEFAULT_STRENGTH: f64 = 0.25;
 const LOAD_S: f64 = 0.3;
-/// Fraction of the difference that the delay leaves at most \[chosen\]: delays from 80 ms on leave 0.25 to 0.78 of it, sampled cars within the default bounds
-/// 0.7 and more.
-const LEFT: f64 = 0.8;
+/// Fraction of the difference that the delay leaves at most \[chosen\].
+const LEFT: f64 = 0.9;
 
 /// Errors of the gain of the valves, over its bound, and offsets of the pressures, over the bound of the hysteresis or half of what the error of the
 /// commands does, whichever is larger, that are tried \[chosen\].

@@ -179,7 +179,7 @@ fn a_shift_between_neighbouring_gears_that_is_not_driven_is_named_with_its_reaso
     let [reverse, one] = ["R", "1"].map(|name| nine.gearbox.gear(name).unwrap());
     assert_eq!(
         nine.why_no_shift([reverse, one]),
-        "B off and A on, one of them a dog: it can be put in in a downshift and taken out in an upshift"
+        "B off and A on: a dog goes in only in a downshift, and comes out only in an upshift"
     );
 }
 

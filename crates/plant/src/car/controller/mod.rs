@@ -270,7 +270,10 @@ impl CarShiftController {
                 |gear: usize| gears[gear].holding.iter().any(|holding| self.car.gearbox.is_dog(holding.element));
             let [first, second] = *self.car.gearbox.forward_gears().first_chunk()?;
             let other = [(first, second), (second, first)].into_iter().find(|&(from, _)| from == gear)?.1;
-            (self.car.converter.is_some() && is_dog(gear) && by_one_clutch(other, gear)).then_some(other)
+            // Both have a valve: what distinguishes these gears opens and closes by a command.
+            let both = self.single(other, gear)?.0;
+            let have_valves = both.iter().all(|(_, clutch)| clutch.is_some());
+            (self.car.converter.is_some() && is_dog(gear) && have_valves).then_some(other)
         })
     }
 
