@@ -139,3 +139,17 @@ def test_words_of_mdf_3_are_the_numbers_behind_them(tmp_path: Path) -> None:
     path = tmp_path / "old.mdf"
     mdf.save(path)
     assert maximum_of(wc.read(path)) == {"gear": 2.0}
+
+
+def test_cells_beside_vectors_and_a_single_signal_are_read(tmp_path: Path) -> None:
+    io = pytest.importorskip("scipy.io")
+    path = tmp_path / "log.mat"
+    of = speeds()
+    cell = np.empty(2, dtype=object)
+    cell[0], cell[1] = {"a": 1.0}, [1.0, 2.0]
+    one = {"values": of["nTurbine"].reshape(-1, 1), "label": "nTurbine", "dimensions": 1}
+    inner = {"t": [1.0, 2.0], "nOutput": of["nOutput"]}
+    io.savemat(path, {"time": of["time"], "mixed": cell, "logged": {"time": of["time"], "signals": one}, "s": inner})
+    with pytest.warns(UserWarning, match="left out"):
+        log = wc.read(path)
+    assert maximum_of(log) == {"logged.nTurbine": pytest.approx(149.5), "s.nOutput": pytest.approx(20.99)}

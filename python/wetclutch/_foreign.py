@@ -183,6 +183,8 @@ def _times(vectors: dict[str, Any], around: Any) -> Any:
     if not found:
         return around
     is_alike, _, name, values, factor = max(found, key=lambda of: of[:2])
-    if not is_alike and around is not None:
+    others = [size for other, of in vectors.items() if other != name for size in of.shape]
+    if not is_alike and around is not None and len(around[1]) in others:
+        # Of another length: these vectors go with the times around them.
         return around
     return name, values if factor == 1.0 else factor * values, values
