@@ -113,7 +113,7 @@ DEFAULTS = {
         (r"error_bounds\.mass_share", "0.25"),
         (r"error_bounds\.valve_error_scale", "1"),
         (r"name|gearbox", "required"),
-        (r"lock_up\.(on|off)_input_rad_s", "required with `lock_up`"),
+        (r"lock_up\.(capacity_n_m|first_gear|ramp_s|on_input_rad_s|off_input_rad_s)", "required with `lock_up`"),
         (r"fill", "with a table `fill`: as in the value column"),
         *OF_VEHICLE,
     ],

@@ -192,9 +192,14 @@ def schema_of_table(places):
     if is_open and all(isinstance(value, dict) for found in values.values() for _, _, value in found) and values:
         # Tables with names of their own, such as those of clutches.
         return {"type": "object", "additionalProperties": schema_of([one for found in values.values() for one in found])}
-    required = sorted(key for key, found in values.items() if is_required(key, found, len(places)))
+    required = sorted(key for key, found in values.items() if has_required(places) and is_required(key, found, len(places)))
     schema = {"type": "object", "properties": dict(sorted(properties.items())), "additionalProperties": is_open}
     return {**schema, "required": required} if required else schema
+
+
+def has_required(places):
+    """Whether what is missing in a file of this kind is not taken: vehicle and gearbox files may be short or of another level."""
+    return all(file.path.parent.name not in ("vehicles", "gearboxes") for file, _, _ in places)
 
 
 def is_required(key, found, tables):
@@ -267,18 +272,6 @@ def write_parts():
     lock_up = re.sub("(?m)^# ", "", car[begin:end])
     more = "[clutch.A]\ndrag_n_m = 1.0\n[clutch.A.error_bounds]\nfriction_factor = [0.9, 1.1]\n"
     (WORK / "vehicles" / "more_of_eight_speed.toml").write_text(f"{car[:begin]}{lock_up}{car[end:]}\n{more}")
-    # Short vehicle files, and gearbox files of the other levels.
-    init = [PROGRAM, "init", "--mass-kg", "1500", "--wheel-radius-m", "0.3", "--final-ratio", "3", "--engine-torque-n-m", "190"]
-    for name, more in [("short_one", ["--ratios", "2.5,1"]), ("short_pulse", ["--ratios", "2.5,1", "--valve", "pulse-width"])]:
-        path = WORK / "vehicles" / f"{name}.toml"
-        subprocess.run([*init, *more, "-o", path], check=True, capture_output=True)
-    (WORK / "vehicles" / "shortest.toml").write_text('name = "c"\ngearbox = "../gearboxes/8hp.toml"\n')
-    (WORK / "gearboxes" / "by_ratios.toml").write_text('name = "r"\nlevel = "ratios"\ngear = [{ name = "1", ratio = 2.5 }, { name = "2", ratio = 1.0 }]\n')
-    (WORK / "gearboxes" / "by_shares.toml").write_text(
-        'name = "s"\nlevel = "shares"\ngear = [{ name = "1", ratio = 2.5, shares = { A = 1.5 } }, { name = "2", ratio = 1.0, shares = { B = 0.6 } }]\n'
-        'element = [{ name = "A", kind = "brake" }, { name = "B", kind = "clutch" }]\n'
-        'shift_mass = [{ gears = ["1", "2"], turbine_kg_m2 = 0.0644, coupling_kg_m2 = -0.0111, output_kg_m2 = 0.1778 }]\n'
-    )
     # Cars with other valves and with all bounds of an element.
     bounds = "friction_factor = [0.9, 1.1]\nvalve_lag_factor = [0.8, 1.2]\nvalve_gain_factor = [0.9, 1.1]\nvalve_delay_s = [0.0, 0.03]\n"
     duty = re.search(r"(?ms)^\[clutch\.b\.valve\].*?(?=^\[)", (WORK / "vehicles" / "two_speed_pwm.toml").read_text()).group(0)
