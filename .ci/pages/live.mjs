@@ -145,9 +145,10 @@ test("sliders move by keys, and those of the figure move its cursor", () => on(a
   const before = await page.$eval("#set-throttle", (input) => input.value);
   await page.keyboard.press("ArrowRight");
   assert.notEqual(await page.$eval("#set-throttle", (input) => input.value), before);
+  // The figure of the new throttle takes the place of the old one and its cursor.
+  await frame(page);
   await page.focus(".plots");
   await page.keyboard.press("ArrowRight");
-  // A loaded machine draws the figure of the new throttle late.
   await page.waitForFunction(() => /^time \d/.test(document.querySelector(".plots .time").textContent));
 }));
 
