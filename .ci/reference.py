@@ -304,6 +304,7 @@ def columns():
         ("simulate", str(WORK / "drives/town.toml"), "--vehicle", str(car), "-o", str(out)),
         ("estimate", str(out / "demo/measured.csv"), "--vehicle", str(demo), "-o", str(out / "one.csv")),
         ("estimate", str(out / "city_measured.csv"), "--vehicle", str(car), "-o", str(out / "car.csv")),
+        ("fit", str(out / "city_measured.csv"), "--vehicle", str(car), "-o", str(out / "fitted.toml"), "--adaptation-table", str(out / "adaptations.csv")),
     ]
     for step in steps:
         done = run(*step)
@@ -314,6 +315,7 @@ def columns():
         ("Its shifts (`OUT_shifts.csv`)", "car_shifts.csv"),
         ("`estimate`, vehicle file of one shift", "one.csv"),
         ("Its shifts (`OUT_shifts.csv`)", "one_shifts.csv"),
+        ("`fit --adaptation-table`", "adaptations.csv"),
         ("`simulate`, drive of a car with a gearbox", "city.csv"),
         ("`simulate`, car of one shift", "demo/trace.csv"),
     ]

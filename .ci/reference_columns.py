@@ -1,6 +1,17 @@
 """What the columns of the outputs mean: the first pattern that is found in a name gives its meaning."""
 
 MEANINGS = [
+    # Adaptation table.
+    (r"^element$", "clutch or brake"),
+    (r"^role$", "`offgoing` or `oncoming`; `all`: the row is of all shifts in which the element slips"),
+    (r"^oil_(from|to)_degc$", "oil temperature of the shifts; empty where the logs have none"),
+    (r"^shifts$", "number of shifts of the row; at most 200 are fitted"),
+    (r"^quantity$|^unit$", "[what is fitted](../how-to/fit.md#adaptation-table), and its unit"),
+    (r"^value$|^lower$|^upper$", "value, and ends of the interval of 95 %"),
+    (r"^value_alone$", "value by the shifts of this row alone: fill time and lag in `value` do not rise with the oil temperature"),
+    (r"^deviation_after_over_before$", "standard deviation after the fit over that before"),
+    (r"^verdict$", "how far the shifts identify it"),
+    (r"^lacks$", "what the logs lack"),
     # Shifts.
     (r"^number$", "number of the shift in the log, from 1"),
     (r"^(from|to)_gear$", "gear before, and after"),

@@ -15,19 +15,29 @@ use crate::work::{self, Report};
 /// A log as Python gives it: its name, its table if it is one in memory, and how its channels are mapped.
 type Given = (PathBuf, Option<Py<Table>>, Mapping);
 
-/// The fitted car, its quantities and the changes of the channel map, those that are not identifiable, statements, notes, how many shifts were fitted, why the given values are kept, and
+/// The fitted car, its quantities, the changes of the channel map and the adaptations, those that are not identifiable, statements, notes, how many shifts were fitted, why the given values are kept, and
 /// the page.
-type Found = (Described, (Table, Table), Vec<String>, Vec<String>, Vec<String>, usize, Option<String>, Option<String>);
+type Found = (
+    Described,
+    (Table, Table, Option<Table>),
+    Vec<String>,
+    Vec<String>,
+    Vec<String>,
+    usize,
+    Option<String>,
+    Option<String>,
+);
 
 /// Fits a car to logs.
 #[pyfunction]
-#[pyo3(signature = (car, logs, sensors, with_page, progress))]
+#[pyo3(signature = (car, logs, sensors, with_page, oil_step_k, progress))]
 pub(crate) fn fit(
     py: Python<'_>,
     car: (String, String, Option<String>),
     logs: Vec<Given>,
     sensors: Option<GivenFile>,
     with_page: bool,
+    oil_step_k: Option<f64>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Found> {
     let (name, text, gearbox) = car;
@@ -44,7 +54,7 @@ pub(crate) fn fit(
             mapped.iter().map(|(path, rows, map)| LogInput { path, memory: rows.as_ref().map(InMemory::Rows), map });
         let inputs: Vec<LogInput<'_>> = inputs.collect();
         let sensors = sensors.map(GivenFile::sensors).transpose()?;
-        let options = FitOptions { sensors, output: None, with_page, interrupt: Some(work.stop()) };
+        let options = FitOptions { sensors, output: None, with_page, oil_step_k, interrupt: Some(work.stop()) };
         let mut notes = Vec::new();
         let found = wetclutch::fit(
             &vehicle,
@@ -57,7 +67,8 @@ pub(crate) fn fit(
         )?;
         Ok((found, notes))
     })?;
-    let tables = (found.intervals().into(), found.channel_map().into());
+    let adaptations = found.adaptations.is_some().then(|| found.adaptation_table().into());
+    let tables = (found.intervals().into(), found.channel_map().into(), adaptations);
     let open = found.not_identifiable().map(str::to_owned).collect();
     let Fitted { vehicle, channels, statements, shifts, kept, page, .. } = found;
     Ok((described(&vehicle), tables, open, [channels, statements].concat(), notes, shifts, kept, page))

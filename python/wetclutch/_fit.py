@@ -35,6 +35,8 @@ class Fit:
         shifts: How many shifts were fitted.
         kept: Why the given values are kept, or None.
         page: The page of the fit as HTML, if it was asked for.
+        adaptations: Fill time, kiss point, lag and friction by clutch, gears and oil temperature, if ``oil_step`` was given: a row for each with
+            its interval, the number of shifts, and in ``lacks`` what the logs lack for it.
     """
 
     car: Car
@@ -46,6 +48,7 @@ class Fit:
     shifts: int
     kept: str | None
     page: str | None
+    adaptations: Table | None
 
     def plot(self) -> Any:
         """Draws each interval on what was known before; needs matplotlib.
@@ -73,6 +76,7 @@ def fit(
     *,
     sensors: Sensors | str | os.PathLike[str] | None = None,
     page: bool = False,
+    oil_step: float | None = None,
     progress: Progress = False,
     executor: None = None,
 ) -> Fit: ...
@@ -83,6 +87,7 @@ def fit(
     *,
     sensors: Sensors | str | os.PathLike[str] | None = None,
     page: bool = False,
+    oil_step: float | None = None,
     progress: Progress = False,
     executor: Any = None,
 ) -> tuple[Fit, ...]: ...
@@ -92,6 +97,7 @@ def fit(
     *,
     sensors: Sensors | str | os.PathLike[str] | None = None,
     page: bool = False,
+    oil_step: float | None = None,
     progress: Progress = False,
     executor: Any = None,
 ) -> Fit | tuple[Fit, ...]:
@@ -104,6 +110,7 @@ def fit(
         logs: A log, or a list or tuple of logs: each a :class:`Log`, or what :func:`read` makes one of. Of many cars, these of each.
         sensors: The sensors of the logs: :class:`Sensors`, or a file whose table ``sensors`` describes them.
         page: Whether to make the page of the fit.
+        oil_step: Step of the oil temperature, K, of the table ``adaptations``: 2 to 200, such as 20. None leaves it out.
         progress: True for a bar, or a function that takes words and the done fraction or None, at most ten times a second.
         executor: Where many cars are fitted: any ``concurrent.futures.Executor``, or a ``dask.distributed.Client``; in this process if it
             is None. Files are read by the workers.
@@ -122,11 +129,11 @@ def fit(
         if len(car) != len(logs):
             raise ValueError(f"there are {len(car)} cars and logs of {len(logs)}, expected logs for each car")
         pairs = [(one, _logs(of)) for one, of in zip(car, logs, strict=True)]
-        return each(executor, partial(_fitted, read_by, page), pairs, progress, "cars")
+        return each(executor, partial(_fitted, read_by, page, oil_step), pairs, progress, "cars")
     if executor is not None:
         raise ValueError("executor is for many cars: give a list of them, and one of the logs of each")
     with reported(progress) as report:
-        return _fitted(read_by, page, (car, _logs(logs)), report)
+        return _fitted(read_by, page, oil_step, (car, _logs(logs)), report)
 
 
 def _logs(logs: Any) -> list[Log]:
@@ -134,12 +141,19 @@ def _logs(logs: Any) -> list[Log]:
     return [log if isinstance(log, Log) else read(log) for log in many]
 
 
-def _fitted(sensors: Sensors | str | None, page: bool, of: tuple[Car, list[Log]], report: Report | None = None) -> Fit:
+def _fitted(
+    sensors: Sensors | str | None,
+    page: bool,
+    oil_step: float | None,
+    of: tuple[Car, list[Log]],
+    report: Report | None = None,
+) -> Fit:
     car, logs = of
     with of_files(sensors, *(log.map for log in logs)):
-        fitted, (intervals, channel_map), not_identifiable, statements, findings, shifts, kept, html = native.fit(
-            car._native, [log._native for log in logs], sensors, page, report
+        fitted, tables, not_identifiable, statements, findings, shifts, kept, html = native.fit(
+            car._native, [log._native for log in logs], sensors, page, oil_step, report
         )
+    intervals, channel_map, adaptations = tables
     return Fit(
         car=Car._of(fitted),
         intervals=Table(intervals),
@@ -150,4 +164,5 @@ def _fitted(sensors: Sensors | str | None, page: bool, of: tuple[Car, list[Log]]
         shifts=shifts,
         kept=kept,
         page=html,
+        adaptations=None if adaptations is None else Table(adaptations),
     )

@@ -186,10 +186,11 @@ def fit(
     logs: Sequence[tuple[str, Table | None, Mapping[str, Any]]],
     sensors: Sensors | str | None,
     with_page: bool,
+    oil_step_k: float | None,
     progress: Callable[[str, float | None], object] | None,
 ) -> tuple[
     tuple[str, str, str, str | None, list[str], list[str]],
-    tuple[Table, Table],
+    tuple[Table, Table, Table | None],
     list[str],
     list[str],
     list[str],

@@ -2,4 +2,6 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
+mod adaptation;
 mod memory;
+mod polled;

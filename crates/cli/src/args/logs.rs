@@ -6,6 +6,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 use config::vehicle::short::ValveKind;
 use trace::TableFormat;
 use wetclutch::estimate::{GearPair, ShiftChoice};
+use wetclutch::fitted::OIL_STEPS_K;
 
 use super::{MethodChoice, ObserverChoice, OpenOutput, PageChoice, Threads, whole, within};
 
@@ -339,7 +340,7 @@ impl From<ValveChoice> for ValveKind {
 
 #[derive(Debug, Args)]
 pub(crate) struct Fit {
-    /// Logs of drives with shifts
+    /// Logs of drives with shifts, or folders of logs
     #[arg(required = true)]
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
@@ -356,6 +357,14 @@ pub(crate) struct Fit {
     /// Write the channel map of --map with the fitted delays, scales and zero offsets
     #[arg(long, value_name = "OUT.toml", requires = "map", conflicts_with = "channel")]
     pub(crate) write_map: Option<PathBuf>,
+    /// Also fit fill time, kiss point, valve lag and friction by clutch, gears and oil temperature, and write them as a table
+    ///
+    /// A row has the value, its interval, the number of shifts, and what the logs lack for it. The temperature is that of the channel `oil_temperature`.
+    #[arg(long, value_name = "TABLE.csv")]
+    pub(crate) adaptation_table: Option<PathBuf>,
+    /// Step of the oil temperature in that table, K
+    #[arg(long, value_name = "K", default_value_t = 20.0, requires = "adaptation_table", allow_negative_numbers = true, value_parser = within(OIL_STEPS_K))]
+    pub(crate) oil_step: f64,
     #[command(flatten)]
     pub(crate) page: PageChoice,
     /// Print what was found as JSON

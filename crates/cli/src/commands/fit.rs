@@ -12,34 +12,40 @@ use wetclutch::{FitOptions, FitProgress, Fitted, LogInput, VehicleFile, fit as f
 
 use crate::args::Fit;
 use crate::commands::assumed::{detail_of_map, detail_of_vehicle};
+use crate::commands::logs_of::logs_of;
 use crate::commands::page::{check_page, write_html};
 use crate::commands::written::{head, replaces_only};
 use crate::commands::{channel_map_of_car, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
 
+/// How the adaptation table begins.
+const ADAPTATION_TITLES: &str = "element,from_gear,to_gear,role,oil_from_degc";
 /// The first line of a channel map that a fit has written.
 const MAP_MARK: &str = "# Written by `wetclutch fit`, with the delays, scales and zero offsets that it found: ";
 
 pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
+    let log_files = logs_of(&options.logs)?;
     let inputs = || {
-        let files = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]);
+        let files = log_files.iter().chain(&options.sensors).chain([&options.vehicle]);
         files.chain(options.mapping.files())
     };
     not_an_input(Some(&options.output), inputs())?;
     check_page(&options.page, inputs())?;
     replaces_only("vehicle file", &options.output, is_vehicle_file)?;
     check_map(options, inputs())?;
+    check_table(options, inputs())?;
     let vehicle = VehicleFile::read(&options.vehicle)?;
     let how = FitOptions {
         sensors: options.sensors.as_deref().map(read_sensors).transpose()?,
         output: Some(options.output.clone()),
         with_page: options.page.page.is_some(),
+        oil_step_k: options.adaptation_table.as_ref().map(|_| options.oil_step),
         interrupt: None,
     };
     let map = channel_map_of_car(&options.mapping, vehicle.wheel_radius_m())?;
-    let logs: Vec<LogInput<'_>> = options.logs.iter().map(|path| LogInput { path, memory: None, map: &map }).collect();
+    let logs: Vec<LogInput<'_>> = log_files.iter().map(|path| LogInput { path, memory: None, map: &map }).collect();
     detail_of_vehicle(&vehicle);
     detail_of_map(&map);
     let bar = progress();
@@ -61,6 +67,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     // Nobody has to read the report to its end.
     write_text(&options.output, found.vehicle.text())?;
     let left_out = write_map(options, &found)?;
+    write_table(options, &found)?;
     if options.json {
         print_json(options, &found)?;
     } else {
@@ -69,6 +76,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     }
     report_file(options, &found);
     report_map(options, &found, &left_out);
+    report_table(options, &found);
     found.page.map_or(Ok(()), |page| write_html(&options.page, &page))
 }
 
@@ -109,11 +117,59 @@ fn report_map(options: &Fit, found: &Fitted, left_out: &[String]) {
     left_out.iter().for_each(|reason| output::note(&format!("warning: {}: {reason}", new.shown())));
 }
 
+/// Checks the adaptation table before the work starts.
+fn check_table<'a>(options: &'a Fit, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+    let Some(table) = &options.adaptation_table else { return Ok(()) };
+    if [Some(&options.output), options.page.page.as_ref(), options.write_map.as_ref()].contains(&Some(table)) {
+        let message = format!(
+            "{}: this is another output of this command\nhint: choose another name after --adaptation-table",
+            table.shown()
+        );
+        return Err(Failure::Input(message));
+    }
+    check_output(Some(table))?;
+    not_an_input(Some(table), inputs)?;
+    replaces_only("adaptation table", table, |path| head(path).starts_with(ADAPTATION_TITLES))
+}
+
+/// Writes the adaptation table.
+fn write_table(options: &Fit, found: &Fitted) -> Result<(), Failure> {
+    let Some(table) = &options.adaptation_table else { return Ok(()) };
+    let text = found.adaptation_table().csv()?;
+    trace::write_whole(table, |writer| writer.write_all(&text)).map_err(|error| Failure::writing(table, &error))
+}
+
+/// Reports what the adaptation table has.
+fn report_table(options: &Fit, found: &Fitted) {
+    let (Some(table), Some(adaptations)) = (&options.adaptation_table, &found.adaptations) else { return };
+    let rows = &adaptations.rows;
+    let open = rows.iter().filter(|row| !row.lacks.is_empty()).count();
+    let mut oil: Vec<[f64; 2]> = rows.iter().filter_map(|row| row.oil_degc).collect();
+    oil.dedup();
+    let oil = match oil.as_slice() {
+        [] => "without oil temperatures".to_owned(),
+        [one] => format!("oil of {}", degrees(*one)),
+        [first, .., last] => format!("oil of {} in {} steps", degrees([first[0], last[1]]), oil.len()),
+    };
+    output::note(&format!(
+        "adaptation table, {oil}: {}; {open} of {} rows lack data, as column `lacks` says",
+        table.shown(),
+        rows.len()
+    ));
+    adaptations.warnings.iter().for_each(|warning| output::note(warning));
+}
+
+/// Temperatures for people.
+fn degrees([low, high]: [f64; 2]) -> String {
+    format!("{low} to {high} degC")
+}
+
 /// The stage of the work, without how far it is.
 fn stage(at: FitProgress<'_>) -> String {
     match at {
         FitProgress::Reading { log, .. } => format!("reading {}", log.shown()),
         FitProgress::Fitting { shifts, .. } => format!("fitting {shifts} shifts"),
+        FitProgress::Adapting { .. } => "fitting the adaptation table".to_owned(),
         FitProgress::Validating => at.to_string(),
     }
 }
@@ -146,6 +202,7 @@ fn print_json(options: &Fit, found: &Fitted) -> Result<(), Failure> {
         "shifts": found.shifts,
         "not_used": found.not_used,
         "given_values_kept_because": found.kept,
+        "adaptation_table": options.adaptation_table.as_ref().map(|table| table.shown().to_string()),
         "parameters": found.parameters.iter().map(parameter).collect::<Vec<_>>(),
         "channel_map": found.map_changes.iter().map(change).collect::<Vec<_>>(),
         "statements": found.statements,

@@ -27,6 +27,7 @@ mod init_from_log;
 mod inspect;
 mod inspect_drive;
 mod inspect_json;
+mod logs_of;
 mod matrix;
 mod page;
 mod reproduce;

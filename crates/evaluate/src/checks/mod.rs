@@ -12,6 +12,7 @@ mod in_gear;
 mod lock_up_check;
 mod open_loop;
 mod other_shifts;
+mod polled_speeds;
 pub mod ratio_histogram;
 mod ratio_scale;
 mod refused_commands;
@@ -34,6 +35,7 @@ use self::in_gear::InGear;
 use self::lock_up_check::LockUpCheck;
 use self::open_loop::OpenLoop;
 use self::other_shifts::OtherShifts;
+use self::polled_speeds::PolledSpeeds;
 use self::refused_commands::RefusedCommands;
 use self::scales::Scales;
 use self::slipping_elements::SlippingElements;
@@ -65,6 +67,7 @@ pub(crate) struct Checks<'c> {
     held: HeldCommands<'c>,
     pub(crate) holes: Holes,
     other: OtherShifts,
+    polled: PolledSpeeds,
     unannounced: UnannouncedShifts,
     pub(crate) slipping: SlippingElements<'c>,
     pub(crate) scales: Scales<'c>,
@@ -86,6 +89,7 @@ impl<'c> Checks<'c> {
             held: HeldCommands::new(car, tables),
             holes: Holes::default(),
             other: OtherShifts::default(),
+            polled: PolledSpeeds::default(),
             unannounced: UnannouncedShifts::new(car),
             slipping: SlippingElements::new(car),
             scales: Scales::new(car),
@@ -93,7 +97,7 @@ impl<'c> Checks<'c> {
     }
 
     /// Each of them, in the order of their warnings.
-    pub(crate) fn each(&mut self) -> [&mut dyn Check; 16] {
+    pub(crate) fn each(&mut self) -> [&mut dyn Check; 17] {
         [
             &mut self.swapped,
             &mut self.commands,
@@ -108,6 +112,7 @@ impl<'c> Checks<'c> {
             &mut self.held,
             &mut self.holes,
             &mut self.other,
+            &mut self.polled,
             &mut self.unannounced,
             &mut self.slipping,
             &mut self.scales,

@@ -24,6 +24,9 @@ const GAIN_STEP: f64 = 0.02;
 const KISS_STEP: f64 = 0.02;
 /// Standard deviations of what is known of a kiss point, and of an unknown zero offset, above which a reading is beyond it.
 const SURELY: f64 = 3.0;
+/// Step of the course of a pressure in a fill, and longest fill that is looked for, s \[chosen\].
+const FILL_STEP_S: f64 = 0.002;
+const LONGEST_FILL_S: f64 = 3.0;
 /// Lags of a cylinder at the end of a fast fill after which the end is forgotten: 5 % are left.
 const LAGS: f64 = 3.0;
 
@@ -43,10 +46,10 @@ pub(super) struct ClutchModel {
 /// The unknowns that make the pressure.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct AtValve {
-    lag: f64,
-    gain: f64,
-    late: f64,
-    kiss: f64,
+    pub(super) lag: f64,
+    pub(super) gain: f64,
+    pub(super) late: f64,
+    pub(super) kiss: f64,
 }
 
 /// Pressures at the points of a grid, Pa, the kiss point, both by the gain of the file, and derivatives of the pressures.
@@ -189,6 +192,23 @@ impl ClutchModel {
         }
         Some(MeasuredPressure { residuals, by_parameter })
     }
+}
+
+/// Time from a step of the command, from no pressure to [`FILL_DROP_PA`] above the kiss point, until the plates of a clutch touch, s, with this factor on
+/// the volume of its stroke; none where they do not.
+pub(super) fn fill_time_s(known: &car::ShiftClutch, at: &AtValve, stroke: f64) -> Option<f64> {
+    let mut of = Hydraulics::of(known).with_valve(at.lag, at.gain);
+    let kiss_pa = (known.clutch.kiss_pressure() + KISS_UNIT_PA * at.kiss) * Real::exp(at.gain);
+    of.set_kiss(kiss_pa);
+    of.scale_stroke(stroke);
+    let mut commands = Series::default();
+    commands.push(-1.0, of.valve.command_for(0.0));
+    commands.push(0.0, of.valve.command_for(kiss_pa + FILL_DROP_PA));
+    let grid = Grid { begin_s: 0.0, step_s: FILL_STEP_S, points: (LONGEST_FILL_S / FILL_STEP_S) as usize };
+    let pressures = pressures(&of, DELAY_UNIT_S * at.late, &commands, grid);
+    let after = pressures.iter().position(|pressure_pa| *pressure_pa >= kiss_pa).filter(|after| *after > 0)?;
+    let [before_pa, after_pa] = [pressures[after - 1], pressures[after]];
+    Some(FILL_STEP_S * (after as f64 - (after_pa - kiss_pa) / (after_pa - before_pa)))
 }
 
 /// The readings at which a piston has surely ended its stroke: above any kiss point that is held possible, and for so long that the pressure is that of

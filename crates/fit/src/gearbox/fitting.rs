@@ -127,7 +127,7 @@ fn commands_late_s(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) ->
 }
 
 /// The fit with some balances, and the scales of their errors.
-fn fit_with(
+pub(super) fn fit_with(
     car: &Car,
     tables: &ShiftTables<f64>,
     shifts: &[ShiftLog],

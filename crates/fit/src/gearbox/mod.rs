@@ -10,6 +10,7 @@
 //! valve's model. The output speed is measured and is no unknown. Driving in a gear between shifts shows the torques on car and engine
 //! ([`Driving`]). [`Recorder`] takes the steps of a log and keeps what belongs to its shifts and between them; [`fit`] finds the parameters that all shifts have in common ([`Quantity`]).
 
+mod adaptation;
 mod balances;
 mod budget;
 mod channels;
@@ -18,6 +19,7 @@ mod command_delay;
 mod contradicted;
 mod file;
 mod fitting;
+mod monotone;
 mod precision;
 mod quantities;
 mod recorder;
@@ -30,6 +32,7 @@ mod validation;
 mod zero_offset;
 
 pub use crate::driving::Driving;
+pub use adaptation::{Adaptation, Adaptations, Adapted, AdaptedShift, AdaptedValue, Fitted, ShiftRole, adaptations};
 pub use channels::ChannelFits;
 pub use file::{GivenFile, kept_text};
 pub use fitting::{GearboxFit, Progress, fit};

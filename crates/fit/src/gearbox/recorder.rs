@@ -78,6 +78,8 @@ pub struct Recorder<'a> {
     driving: DrivingRecorder,
     /// Longest time in which a piston of the car goes back, s; zero where none has a stroke.
     emptied_s: f64,
+    /// Last measured temperature of the oil, degC.
+    oil_degc: Option<f64>,
     /// Of the next step, what the filter of `estimate` is not shown.
     reported: Option<Reading<f64>>,
     open: Option<Open>,
@@ -102,6 +104,7 @@ impl<'a> Recorder<'a> {
             pressures: std::array::from_fn(|_| none()),
             driving: DrivingRecorder::new(DrivenCar::with_gearbox(car, tables, &|_, _| None)),
             emptied_s: emptied_s(car),
+            oil_degc: None,
             reported: None,
             open: None,
             last_output: f64::NAN,
@@ -112,6 +115,11 @@ impl<'a> Recorder<'a> {
     /// Takes of the next step what the filter of `estimate` is not shown beside a converter: the reported engine torque, N m.
     pub fn push_reported(&mut self, reported_n_m: Option<Reading<f64>>) {
         self.reported = reported_n_m;
+    }
+
+    /// Takes the temperature of the oil at the next step, degC, where the log has it.
+    pub fn push_oil_temperature(&mut self, oil_degc: Option<f64>) {
+        self.oil_degc = oil_degc.filter(|degc| degc.is_finite()).or(self.oil_degc);
     }
 
     /// Takes a step.
@@ -301,6 +309,7 @@ impl<'a> Recorder<'a> {
             pressure,
             slip_s: [f64::NAN; 2],
             lock_up: open.lock_up,
+            oil_degc: self.oil_degc,
         })
     }
 }

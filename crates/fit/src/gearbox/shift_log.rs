@@ -45,6 +45,8 @@ pub struct ShiftLog {
     pub slip_s: [f64; 2],
     /// Whether the lock-up clutch of the converter was applied.
     pub lock_up: bool,
+    /// Temperature of the oil, degC, where the log has it.
+    pub oil_degc: Option<f64>,
 }
 
 impl ShiftLog {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use car::Car;
 use config::{CarFile, Source};
-use fit::gearbox::{GivenFile, HeldOut, Recorded, Recorder, ShiftLog};
+use fit::gearbox::{GivenFile, HeldOut, Recorded, Recorder, ShiftLog, adaptations};
 use fit::{Channel, FitError, ReadingAges};
 use observer::ShiftTables;
 use report::sheet::Part;
@@ -47,14 +47,21 @@ pub(super) fn fit(
     let recorded = record((file, &tables), logs, options, progress, say)?;
     say_reasons("not used", &recorded.skipped, say);
     let Recorded { shifts, driving, skipped: not_used, .. } = recorded;
-    let (fitted_shifts, held_out) = divided(shifts);
+    let (fitted_shifts, held_out) = divided(&shifts);
     if fitted_shifts.is_empty() {
         return Err(no_shift(file, logs, &not_used));
     }
+    let go_on = || if options.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let found = fit::gearbox::fit(file, &tables, &fitted_shifts, &driving, &mut |at| {
         progress(FitProgress::Fitting { shifts: at.shifts, iteration: at.iteration + 1 });
-        if options.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        go_on()
     })?;
+    let all = fit::gearbox::Fitted { car: file, tables: &tables, driving: &driving, fit: &found };
+    let mut adapting = |at: fit::gearbox::Progress| {
+        progress(FitProgress::Adapting { shifts: at.shifts, iteration: at.iteration + 1 });
+        go_on()
+    };
+    let adapted = options.oil_step_k.map(|step_k| adaptations(all, &shifts, step_k, &mut adapting)).transpose()?;
     progress(FitProgress::Validating);
     let output = options.output.as_deref().unwrap_or(&file.source.path);
     let given = GivenFile { path: &file.source.path, text: &file.source.text, gearbox: &file.gearbox_source.path };
@@ -83,6 +90,7 @@ pub(super) fn fit(
         shifts: found.shifts,
         not_used,
         kept,
+        adaptations: adapted,
         page: None,
     };
     Ok((fitted, report::fit_page::gearbox_intervals(&found)))
@@ -124,6 +132,7 @@ fn record_one(
             return Err(Error::interrupted());
         }
         recorder.push_reported(step.reported_n_m);
+        recorder.push_oil_temperature(step.oil_degc);
         recorder.push(step.time_s, &step.input);
         recorder.push_pressure(step.time_s, step.shift_pressures(tables));
         recorder.push_element_pressures(step.time_s, &step.pressures);
@@ -137,7 +146,7 @@ fn record_one(
 }
 
 /// Shifts to fit, and shifts that are held out: every fifth, and at least [`HELD_OUT_MIN`]. Of more than a fit can use, some are left out evenly.
-fn divided(shifts: Vec<ShiftLog>) -> (Vec<ShiftLog>, Vec<ShiftLog>) {
+fn divided(shifts: &[ShiftLog]) -> (Vec<ShiftLog>, Vec<ShiftLog>) {
     let count = shifts.len();
     let every = HELD_OUT_EVERY.min(count / HELD_OUT_MIN);
     let is_held_out = |at: usize| count >= MIN_FOR_HELD_OUT && at % every == every - 1;

@@ -4,6 +4,7 @@ mod gearbox;
 mod one_shift;
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,6 +15,7 @@ use fit::{Channel, OneStep};
 use report::sheet::{Part, Sheet};
 use trace::ShownPath as _;
 
+pub use ::fit::gearbox::{Adaptation, Adaptations, Adapted, AdaptedShift, AdaptedValue, ShiftRole};
 pub use ::fit::{ChangedChannel, ChangedMap, MapChange, MapKey, Measure, ReportRow, Verdict};
 
 use crate::{Column, Error, LogInput, Notes, Table, Values, VehicleFile};
@@ -25,6 +27,9 @@ const HELD_OUT_MIN: usize = 3;
 /// Reasons that are reported one by one.
 const REASONS_MAX: usize = 10;
 
+/// Steps of the oil temperature in an adaptation table, K.
+pub const OIL_STEPS_K: RangeInclusive<f64> = 2.0..=200.0;
+
 /// How a car is fitted.
 #[derive(Debug, Clone, Default)]
 pub struct FitOptions {
@@ -34,6 +39,9 @@ pub struct FitOptions {
     pub output: Option<PathBuf>,
     /// Whether to make the page of the fit.
     pub with_page: bool,
+    /// Step of the oil temperature, K, in [`OIL_STEPS_K`], by which fill time, kiss point, lag and friction of each clutch of a gearbox are fitted
+    /// too; none to leave that out.
+    pub oil_step_k: Option<f64>,
     /// Set when the fit is to end with an error.
     pub interrupt: Option<Arc<AtomicBool>>,
 }
@@ -61,6 +69,13 @@ pub enum FitProgress<'a> {
         /// Iteration, from 1.
         iteration: u32,
     },
+    /// A group of shifts by gears and oil temperature is fitted.
+    Adapting {
+        /// Shifts of the group.
+        shifts: usize,
+        /// Iteration, from 1.
+        iteration: u32,
+    },
     /// The fitted car is compared with shifts that were held out.
     Validating,
 }
@@ -71,6 +86,9 @@ impl fmt::Display for FitProgress<'_> {
             Self::Reading { log, time_s: None } => write!(f, "reading {}", log.shown()),
             Self::Reading { log, time_s: Some(time_s) } => write!(f, "reading {}, {time_s:.0} s", log.shown()),
             Self::Fitting { shifts, iteration } => write!(f, "{shifts} shifts, iteration {iteration}"),
+            Self::Adapting { shifts, iteration } => {
+                write!(f, "adaptation table: {shifts} shifts, iteration {iteration}")
+            }
             Self::Validating => f.write_str("checking on shifts that were held out"),
         }
     }
@@ -98,6 +116,8 @@ pub struct Fitted {
     pub not_used: Vec<String>,
     /// Why the given values are kept, if they are.
     pub kept: Option<String>,
+    /// Fill time, kiss point, lag and friction of each clutch by gears and temperature of the oil, if they were asked for.
+    pub adaptations: Option<Adaptations>,
     /// The page of the fit, as HTML, if it was asked for.
     pub page: Option<String>,
 }
@@ -127,6 +147,7 @@ pub fn fit(
     progress: FitProgressTaker<'_>,
     say: Notes<'_>,
 ) -> Result<Fitted, Error> {
+    check_oil_step(vehicle, options)?;
     let (mut fitted, intervals) = match vehicle {
         VehicleFile::Gearbox(file) => gearbox::fit(file, logs, options, progress, say)?,
         VehicleFile::OneShift(file) => one_shift::fit(file, logs, options, progress, say)?,
@@ -135,6 +156,21 @@ pub fn fit(
         fitted.page = Some(fitted.page_with(intervals, vehicle, logs)?);
     }
     Ok(fitted)
+}
+
+fn check_oil_step(vehicle: &VehicleFile, options: &FitOptions) -> Result<(), Error> {
+    match options.oil_step_k {
+        Some(step_k) if !OIL_STEPS_K.contains(&step_k) => Err(Error::Input(format!(
+            "the step of the oil temperature is {step_k} K\nhint: give one from {} to {} K",
+            OIL_STEPS_K.start(),
+            OIL_STEPS_K.end()
+        ))),
+        Some(_) if matches!(vehicle, VehicleFile::OneShift(_)) => Err(Error::Input(format!(
+            "{}: an adaptation table is of a car with a gearbox\nhint: give a vehicle file with a gearbox, or leave the table out",
+            vehicle.source().path.shown()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 impl Fitted {
@@ -150,6 +186,37 @@ impl Fitted {
             ("upper", numbers(|row| row.interval[1])),
             ("deviation_after_over_before", numbers(|row| row.fraction)),
             ("verdict", words(|row| row.verdict.name())),
+        ];
+        Table { columns: columns.map(|(name, values)| Column { name: name.to_owned(), values }).into() }
+    }
+
+    /// Fill time, kiss point, lag and friction by clutch, gears and temperature of the oil, a row for each: value and interval of 95 % in the unit of
+    /// the row. Without rows where [`FitOptions::oil_step_k`] is none. Where no shift can be fitted the numbers are NaN, and `lacks` says what would
+    /// help.
+    pub fn adaptation_table(&self) -> Table {
+        let rows = self.adaptations.as_ref().map_or(&[][..], |adaptations| &adaptations.rows);
+        let words = |word: fn(&Adaptation) -> &str| Values::Words(rows.iter().map(word).collect());
+        let numbers = |number: &dyn Fn(&Adaptation) -> f64| Values::Numbers(rows.iter().map(number).collect());
+        let found = |of: fn(AdaptedValue) -> f64| numbers(&|row| row.found.map_or(f64::NAN, of));
+        let oil = |end: usize| numbers(&|row| row.oil_degc.map_or(f64::NAN, |ends| ends[end]));
+        let verdict = |row: &Adaptation| row.found.map_or(Verdict::NotIdentifiable, |found| found.verdict).name();
+        let columns = [
+            ("element", words(|row| &row.element)),
+            ("from_gear", words(|row| row.shift.as_ref().map_or("all", |shift| &shift.gears[0]))),
+            ("to_gear", words(|row| row.shift.as_ref().map_or("all", |shift| &shift.gears[1]))),
+            ("role", words(|row| row.shift.as_ref().map_or("all", |shift| shift.role.name()))),
+            ("oil_from_degc", oil(0)),
+            ("oil_to_degc", oil(1)),
+            ("shifts", numbers(&|row| row.shifts as f64)),
+            ("quantity", words(|row| row.quantity.name())),
+            ("unit", words(|row| row.quantity.unit())),
+            ("value", found(|found| found.value)),
+            ("lower", found(|found| found.interval[0])),
+            ("upper", found(|found| found.interval[1])),
+            ("value_alone", found(|found| found.alone)),
+            ("deviation_after_over_before", found(|found| found.fraction)),
+            ("verdict", words(verdict)),
+            ("lacks", words(|row| &row.lacks)),
         ];
         Table { columns: columns.map(|(name, values)| Column { name: name.to_owned(), values }).into() }
     }

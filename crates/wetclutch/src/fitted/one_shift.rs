@@ -57,6 +57,7 @@ pub(super) fn fit(
         shifts: found.shifts,
         not_used: [collected.skipped, found.unusable.clone()].concat(),
         kept,
+        adaptations: None,
         page: None,
     };
     Ok((fitted, report::fit_page::intervals(&found)))
