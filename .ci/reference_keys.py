@@ -84,7 +84,7 @@ OF_VEHICLE = [
     (r"(.*\.)?fill\.preload_n", "0.75 of the return spring"),
     (r"clutch\.[^.]+\.(return_spring_n|static_friction|friction)", "of the gearbox file and `friction`"),
     (r"clutch\.[^.]+\.drag_n_m", "that of all elements"),
-    (r"clutch\.[^.]+\.steel_mass_kg", "none: no temperature of the plates"),
+    (r"clutch\.[^.]+\.steel_mass_kg", "half its faces times plates of 1.8 mm with the area of the piston"),
     (r"(.*\.)?valve\.hysteresis_pa", "0"),
     (r"(.*\.)?valve\.kind", "`proportional`"),
     (r"(.*\.)?valve\.zero_pressure_a", "for `normally-high` alone"),

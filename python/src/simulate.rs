@@ -35,8 +35,8 @@ pub(crate) fn check_sensors(py: Python<'_>, sensors: GivenFile) -> PyResult<Stri
     checked().map_err(|error| exception(py, &error))
 }
 
-/// Drives a car through a drive file, with these sensors in place of those of the file if they are given: every signal, what the car measures,
-/// and distance in m, shifts and maximum speed in m/s.
+/// Drives a car through a drive file, with these sensors in place of those of the file if they are given: every signal, what the car measures, its
+/// shifts, and distance in m, shifts and maximum speed in m/s.
 #[pyfunction]
 #[pyo3(signature = (car, drive, sensors, seed, progress))]
 pub(crate) fn simulate(
@@ -46,13 +46,13 @@ pub(crate) fn simulate(
     sensors: Option<GivenFile>,
     seed: Option<u64>,
     progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<(Table, Table, (f64, usize, f64))> {
+) -> PyResult<(Table, Table, Table, (f64, usize, f64))> {
     let (name, text, gearbox) = car;
     let VehicleFile::Gearbox(file) = parsed(py, &name, &text, gearbox.as_deref())? else {
         let message = "car: a drive needs a car with a gearbox, and this is one of a single shift".to_owned();
         return Err(exception(py, &Error::Input(message)));
     };
-    let run = work::done(py, progress.as_ref(), move |work| {
+    let (run, shifts) = work::done(py, progress.as_ref(), move |work| {
         let mut drive = wetclutch::drive_of(drive.source()?)?;
         if let Some(sensors) = sensors {
             drive.sensors = Some(wetclutch::simulated_sensors_of(&sensors.source()?)?);
@@ -70,8 +70,8 @@ pub(crate) fn simulate(
             }
             work.is_stopped()
         };
-        wetclutch::simulate::simulate_until(&file.car, &drive, &is_stopped)
+        wetclutch::simulate::simulate_scored(&file.car, &drive, &is_stopped)
     })?;
     let summary = (run.summary.distance_m, run.summary.shifts, run.summary.fastest_m_s);
-    Ok((run.truth.into(), run.measured.into(), summary))
+    Ok((run.truth.into(), run.measured.into(), shifts.into(), summary))
 }

@@ -24,6 +24,7 @@ class Simulation:
         measured: What a car measures or commands, through the sensors of the drive: a log for :func:`estimate`.
         distance_m: Distance driven, m.
         shifts: How many shifts there were.
+        scores: A row for each shift: how it went, what the occupants feel of it, friction work and temperature of the plates.
         speed_max_m_s: Maximum speed, m/s.
     """
 
@@ -32,6 +33,7 @@ class Simulation:
     distance_m: float
     shifts: int
     speed_max_m_s: float
+    scores: Table
 
     def __iter__(self) -> Iterator[Table]:
         """Both tables: ``truth, measured = simulate(...)``."""
@@ -64,6 +66,6 @@ def simulate(
     check_range("seed", seed, 0, 2**64 - 1)
     path = drive if isinstance(drive, Drive) else os.fspath(drive)
     with of_files(path, sensors), reported(progress) as report:
-        truth, measured, summary = native.simulate(car._native, path, file_or_sensors(sensors), seed, report)
+        truth, measured, scores, summary = native.simulate(car._native, path, file_or_sensors(sensors), seed, report)
     distance_m, shifts, speed_max_m_s = summary
-    return Simulation(Table(truth), Table(measured), distance_m, shifts, speed_max_m_s)
+    return Simulation(Table(truth), Table(measured), distance_m, shifts, speed_max_m_s, Table(scores))

@@ -23,11 +23,21 @@ pub struct ShiftClutch {
     pub steel_mass_kg: Option<f64>,
 }
 
+/// Density of steel, kg/m^3, and thickness of a steel plate, m \[chosen: 1.6 to 2 mm are usual\].
+const STEEL_KG_M3: f64 = 7850.0;
+const STEEL_PLATE_M: f64 = 1.8e-3;
+
 impl ShiftClutch {
     /// Limits of the piston's stroke within the tolerances of an error budget that says nothing of it, with oil of this
     /// temperature; none without a stroke.
     pub fn standard_fill_budget(&self, oil_degc: f64) -> Option<FillBudget<f64>> {
         self.has_stroke.then(|| stroke::standard(&self.cylinder, oil_degc))
+    }
+
+    /// Mass of all steel plates, kg: where it is not given, one plate of 1.8 mm with the area of the piston for two friction faces.
+    pub fn steel_kg(&self) -> f64 {
+        let Clutch { friction_faces, piston_area_m2, .. } = self.clutch;
+        self.steel_mass_kg.unwrap_or(0.5 * friction_faces * piston_area_m2 * STEEL_PLATE_M * STEEL_KG_M3)
     }
 
     /// Pressure on the plates, Pa, with this pressure at the valve's outlet and this oil in the cylinder.

@@ -8,17 +8,17 @@ use observer::gearbox::{GearboxFilter, GearboxState, ShiftInput};
 use observer::{ShiftTables, gearbox_filter};
 use plant::car::{CarModel, CarSample, CarShiftQuality, CarShiftRating};
 
-use crate::EvaluateError;
 use crate::checks::is_of_its_gears;
 use crate::felt_shift::{FeltShift, Motion};
 use crate::plate_temperature::PlateTemperatures;
 use crate::recording::Recording;
-use crate::score::row;
+use crate::score::{row, true_row};
 pub use crate::scored_shift::{DriveState, ScoredShift};
 use crate::shift_comfort::{AccelerationSource, ShiftComfort};
 use crate::shift_summary::ShiftSummary;
 use crate::thinned::thinned;
 use crate::worth_a_look::chosen;
+use crate::{EvaluateError, ShiftScoreRow};
 
 /// States that a drive keeps, unless more than half of them lie around its shifts: more than an hour every [`crate::SAMPLE_S`].
 pub const MAX_STATES: u32 = 400_000;
@@ -209,15 +209,10 @@ pub fn score_drive(
 
 /// Scores the estimates of a drive row by row.
 pub struct DriveScorer<'a> {
-    known: &'a Car,
-    model: &'a CarModel,
     tables: &'a ShiftTables<f64>,
     filter: &'a GearboxFilter<'a, f64>,
     state: GearboxState<f64>,
-    passing: PassingShifts,
-    rating: Option<CarShiftRating>,
-    felt: FeltShift,
-    last: Option<CarSample>,
+    shifts: SimulatedShifts<'a>,
 }
 
 impl<'a> DriveScorer<'a> {
@@ -228,21 +223,59 @@ impl<'a> DriveScorer<'a> {
         tables: &'a ShiftTables<f64>,
         filter: &'a GearboxFilter<'a, f64>,
     ) -> Self {
-        let (state, passing) = (filter.start(), PassingShifts::default());
-        let felt = FeltShift::of(AccelerationSource::Vehicle);
-        Self { known, model, tables, filter, state, passing, rating: None, felt, last: None }
+        Self { tables, filter, state: filter.start(), shifts: SimulatedShifts::new(known, model) }
     }
 
     /// Takes the next sample and what the filter is shown of it.
     pub fn push(&mut self, sample: &CarSample, input: &ShiftInput<f64>) {
-        let Self { known, passing, rating, felt, .. } = self;
         let estimate = self.filter.step(&mut self.state, input);
-        passing.state(state_of(sample, estimate.health));
+        self.shifts.passing.state(state_of(sample, estimate.health));
+        self.shifts.push_with(sample, || row(self.tables, sample, &estimate));
+    }
+
+    /// The drive.
+    pub fn finish(self) -> ScoredDrive {
+        self.shifts.finished().drive
+    }
+}
+
+/// The shifts of a simulated drive as they pass: how each went and what the occupants feel of it.
+pub struct SimulatedShifts<'a> {
+    car: &'a Car,
+    model: &'a CarModel,
+    passing: PassingShifts,
+    rating: Option<CarShiftRating>,
+    felt: FeltShift,
+    last: Option<CarSample>,
+}
+
+impl<'a> SimulatedShifts<'a> {
+    /// Of a drive of the car `model`, with gears and plates of `car`.
+    pub fn new(car: &'a Car, model: &'a CarModel) -> Self {
+        let felt = FeltShift::of(AccelerationSource::Vehicle);
+        Self { car, model, passing: PassingShifts::default(), rating: None, felt, last: None }
+    }
+
+    /// Takes the next sample. Friction work is that of the true torques; there are no estimates.
+    pub fn push(&mut self, sample: &CarSample) {
+        self.push_with(sample, || true_row(sample));
+        self.passing.draw_at_most(0, |_| false);
+    }
+
+    /// The shifts.
+    pub fn finish(self) -> Vec<ScoredShift> {
+        let mut passing = self.finished();
+        passing.draw_at_most(0, |_| false);
+        passing.drive.shifts
+    }
+
+    fn push_with(&mut self, sample: &CarSample, row: impl FnOnce() -> Option<ShiftScoreRow>) {
+        let Self { car, passing, rating, felt, .. } = self;
         self.last = Some(*sample);
         let shown = sample.gears();
         let gears = Some(shown).filter(|shown| !shown.is_steady());
         if passing.ends(gears) {
-            end(known, passing, rating, sample);
+            end(car, passing, rating, sample);
             let complete = passing.drive.shifts.last().filter(|shift| shift.quality.complete_s.is_some());
             felt.end(complete.map(|_| sample.time_s));
         }
@@ -252,7 +285,7 @@ impl<'a> DriveScorer<'a> {
         felt.push(Motion {
             time_s: sample.time_s,
             value: sample.vehicle_m_s2,
-            slips_rad_s: slips_rad_s(known, shown, [sample.torques.turbine_rad_s, sample.torques.output_rad_s]),
+            slips_rad_s: slips_rad_s(car, shown, [sample.torques.turbine_rad_s, sample.torques.output_rad_s]),
         });
         passing.take_comfort(felt.ended(sample.time_s));
         if gears.is_none() {
@@ -263,24 +296,24 @@ impl<'a> DriveScorer<'a> {
                 let offgoing = (!under_way.is_from_neutral).then_some(under_way.offgoing.element);
                 [offgoing, Some(under_way.oncoming.element)]
             });
-            passing.begin(known, shown, elements, (sample.time_s, sample.turbine_n_m));
+            passing.begin(car, shown, elements, (sample.time_s, sample.turbine_n_m));
             *rating = Some(CarShiftRating::new(self.model, shown, sample.time_s));
         }
         if let (Some(shift), Some(rating)) = (&mut passing.open, rating) {
             rating.push(sample);
             shift.time_s[1] = sample.time_s;
-            shift.rows.extend(row(self.tables, sample, &estimate));
+            shift.rows.extend(row());
         }
     }
 
-    /// The drive.
-    pub fn finish(mut self) -> ScoredDrive {
+    /// The drive with its last shift.
+    fn finished(mut self) -> PassingShifts {
         let comfort = self.felt.finish();
         self.passing.take_comfort(comfort);
         if let Some(last) = &self.last {
-            end(self.known, &mut self.passing, &mut self.rating, last);
+            end(self.car, &mut self.passing, &mut self.rating, last);
         }
-        self.passing.drive
+        self.passing
     }
 }
 

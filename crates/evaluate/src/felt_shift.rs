@@ -116,6 +116,55 @@ impl FeltShift {
     }
 }
 
+/// The motion around one shift by the speeds of a log: that of the wheels, and where it says nothing that of the output.
+#[derive(Debug)]
+pub(crate) struct FeltBySpeeds {
+    wheel: FeltShift,
+    output: FeltShift,
+}
+
+impl FeltBySpeeds {
+    pub(crate) fn new() -> Self {
+        let [wheel, output] = [AccelerationSource::WheelSpeed, AccelerationSource::OutputSpeed].map(FeltShift::of);
+        Self { wheel, output }
+    }
+
+    /// Takes the speed of the car by the wheels, or by the output.
+    pub(crate) fn push(&mut self, source: AccelerationSource, motion: Motion) {
+        match source {
+            AccelerationSource::WheelSpeed => self.wheel.push(motion),
+            _ => self.output.push(motion),
+        }
+    }
+
+    /// See [`FeltShift::begin`].
+    pub(crate) fn begin(&mut self, request_s: f64) -> Option<ShiftComfort> {
+        let [wheel, output] = self.both(|felt| felt.begin(request_s));
+        wheel.or(output)
+    }
+
+    /// See [`FeltShift::end`].
+    pub(crate) fn end(&mut self, end_s: Option<f64>) {
+        self.both(|felt| felt.end(end_s));
+    }
+
+    /// See [`FeltShift::ended`].
+    pub(crate) fn ended(&mut self, time_s: f64) -> Option<ShiftComfort> {
+        let [wheel, output] = self.both(|felt| felt.ended(time_s));
+        wheel.or(output)
+    }
+
+    /// See [`FeltShift::finish`].
+    pub(crate) fn finish(&mut self) -> Option<ShiftComfort> {
+        let [wheel, output] = self.both(FeltShift::finish);
+        wheel.or(output)
+    }
+
+    fn both<T>(&mut self, mut of: impl FnMut(&mut FeltShift) -> T) -> [T; 2] {
+        [of(&mut self.wheel), of(&mut self.output)]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -135,7 +184,7 @@ mod tests {
             }
             let value = match source {
                 AccelerationSource::Vehicle => 1.0 + 0.5 * (TAU * time_s).sin(),
-                AccelerationSource::OutputSpeed => 10.0 + time_s - 0.5 / TAU * (TAU * time_s).cos(),
+                _ => 10.0 + time_s - 0.5 / TAU * (TAU * time_s).cos(),
             };
             if !hole(time_s) {
                 felt.push(Motion { time_s, value, slips_rad_s: [0.0; 2] });

@@ -2,8 +2,10 @@
 
 use car::{Car, Sensors};
 use car::{ErrorBudget, Gear, LOST_S, ShiftCommand};
-use observer::gearbox::{ClutchEstimate, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftPhase};
-use observer::{Health, Reading};
+use observer::gearbox::{
+    ClutchEstimate, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftInput, ShiftPhase,
+};
+use observer::{ChannelHealth, Health, Reading};
 use observer::{ShiftTables, gearbox_filter};
 use plant::car::{BeyondGears, CarShiftQuality};
 
@@ -12,7 +14,7 @@ use crate::car_beyond_bounds::CarBeyondBounds;
 use crate::carried_pressures::CarriedPressures;
 use crate::checks::{CameSpeed, CheckedRow, Checks, EndedShift, GearSpeeds, RefusedCommand, Unusable, WrongScale};
 use crate::drive::{DriveState, PassingShifts, ScoredDrive, ScoredShift, slips_rad_s};
-use crate::felt_shift::{FeltShift, Motion};
+use crate::felt_shift::{FeltBySpeeds, Motion};
 use crate::learning_count::LearningCount;
 use crate::score::within;
 use crate::shift_comfort::AccelerationSource;
@@ -53,7 +55,7 @@ pub struct LoggedDrive<'c> {
     beyond_bounds: CarBeyondBounds,
     carried: CarriedPressures,
     jerk: ShiftJerk,
-    felt: FeltShift,
+    felt: FeltBySpeeds,
     /// Newest temperature of the oil, degC; that of the vehicle file where the log has none.
     oil_degc: f64,
 }
@@ -93,7 +95,7 @@ impl<'c> LoggedDrive<'c> {
             beyond_bounds: CarBeyondBounds::default(),
             carried: CarriedPressures::default(),
             jerk: ShiftJerk::default(),
-            felt: FeltShift::of(AccelerationSource::OutputSpeed),
+            felt: FeltBySpeeds::new(),
             oil_degc: car.oil_temperature_degc,
         }
     }
@@ -140,7 +142,9 @@ impl<'c> LoggedDrive<'c> {
             }
         }
         self.carried.push(step.time_s, &estimate.valve_pa);
-        self.jerk.push(step);
+        let speeds_m_s = self.speeds_of_car(input, &estimate);
+        let [(_, by_wheels), (_, by_output)] = speeds_m_s;
+        self.jerk.push(step, [step.speed_m_s, by_wheels, by_output]);
         let from = input.gear.from;
         self.passing.state(DriveState {
             time_s: step.time_s,
@@ -180,16 +184,33 @@ impl<'c> LoggedDrive<'c> {
         let jerk_m_s3 = self.jerk.ended(step.time_s);
         self.passing.take_jerk(jerk_m_s3);
         let [_, turbine, output] = self.speeds_rad_s;
-        if let Some(reading) = input.output_rad_s.filter(|_| !estimate.channels.output.is_refused()) {
-            self.felt.push(Motion {
-                time_s: step.time_s - reading.age_s,
-                value: reading.value / self.car.driveline.final_ratio * self.car.road.wheel_radius_m,
-                slips_rad_s: slips_rad_s(self.car, input.gear, [turbine, output]),
-            });
+        for (source, speed) in speeds_m_s {
+            let Some(Reading { value, age_s }) = speed else { continue };
+            let slips_rad_s = slips_rad_s(self.car, input.gear, [turbine, output]);
+            self.felt.push(source, Motion { time_s: step.time_s - age_s, value, slips_rad_s });
         }
         let comfort = self.felt.ended(step.time_s);
         self.passing.take_comfort(comfort);
         estimate
+    }
+
+    /// The speed of the car by the readings of the wheels and of the output that the filter did not refuse, m/s.
+    fn speeds_of_car(
+        &self,
+        input: &ShiftInput<f64>,
+        estimate: &ShiftEstimate<f64>,
+    ) -> [(AccelerationSource, Option<Reading<f64>>); 2] {
+        let channels = &estimate.channels;
+        let of = |reading: Option<Reading<f64>>, health: ChannelHealth, radius_m: f64| {
+            let Reading { value, age_s } = reading.filter(|of| of.value.is_finite() && !health.is_refused())?;
+            Some(Reading { value: radius_m * value, age_s })
+        };
+        let radius_m = self.car.road.wheel_radius_m;
+        let output_radius_m = radius_m / self.car.driveline.final_ratio;
+        [
+            (AccelerationSource::WheelSpeed, of(input.wheel_rad_s, channels.wheel, radius_m)),
+            (AccelerationSource::OutputSpeed, of(input.output_rad_s, channels.output, output_radius_m)),
+        ]
     }
 
     /// Guaranteed range of the pressure of each element after the last row, Pa, by its place in the filter's tables.

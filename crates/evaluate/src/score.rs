@@ -4,7 +4,7 @@ use car::{Car, ErrorBudget, Sensors};
 use drivetrain::Real;
 use observer::gearbox::{GearboxFilter, GearboxState, ShiftEstimate, ShiftInput};
 use observer::{Health, ShiftTables, gearbox_filter};
-use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_shift};
+use plant::car::{CarCalibration, CarModel, CarSample, CarShift, ElementSample, simulate_car_shift};
 
 use crate::recording::{Recording, records_in_a_sample};
 use crate::{CARRIES_N_M, EvaluateError, RECORD_S, ROUNDING_N_M, ROUNDING_PA};
@@ -266,6 +266,41 @@ pub fn score_from(
 /// Whether a value lies in a range up to a tolerance; what is not known lies in it.
 pub fn within(range: Option<[f64; 2]>, value: f64, tolerance: f64) -> bool {
     value.is_nan() || range.is_none_or(|[low, high]| low - tolerance <= value && value <= high + tolerance)
+}
+
+/// The truth of a shift in the place of its estimate; `None` outside of shifts.
+pub(crate) fn true_row(sample: &CarSample) -> Option<ShiftScoreRow> {
+    let under_way = sample.shift.as_ref()?;
+    let of = |truth: &ElementSample| ClutchRow {
+        torque_n_m: [truth.torque_n_m; 3],
+        torque_std_dev_n_m: f64::NAN,
+        pressure_std_dev_pa: f64::NAN,
+        pressure_pa: [truth.pressure_pa; 3],
+        slip_rad_s: truth.slip_rad_s,
+        slip_range_rad_s: None,
+        alpha: f64::NAN,
+        sticks: truth.sticks,
+        torque_range_n_m: None,
+        pressure_range_pa: None,
+        hidden: false,
+        has_pressure: true,
+        in_range: true,
+    };
+    Some(ShiftScoreRow {
+        time_s: sample.time_s,
+        clutches: [of(&under_way.offgoing), of(&under_way.oncoming)],
+        turbine_n_m: [sample.turbine_n_m; 2],
+        at_turbine_n_m: None,
+        speeds_rad_s: [
+            sample.torques.engine_rad_s,
+            sample.torques.turbine_rad_s,
+            sample.torques.output_rad_s,
+            sample.wheel_rad_s,
+        ],
+        flare_rad_s: f64::NAN,
+        phase: "-",
+        health: Health::Good,
+    })
 }
 
 /// The row of a shift at a sample, with its estimate; `None` where no shift is under way or the filter has none.

@@ -39,6 +39,8 @@ const ACCEPTED_LOSS: f64 = 3.0;
 pub enum AccelerationSource {
     /// The acceleration of the vehicle, as a simulation has it.
     Vehicle,
+    /// The slope of the speed of the driven wheels: the tyres swing in it.
+    WheelSpeed,
     /// The slope of the output speed of the gearbox: the drive shafts swing in it.
     OutputSpeed,
 }
@@ -48,6 +50,7 @@ impl AccelerationSource {
     pub fn name(self) -> &'static str {
         match self {
             Self::Vehicle => "vehicle",
+            Self::WheelSpeed => "wheel_speed",
             Self::OutputSpeed => "output_speed",
         }
     }

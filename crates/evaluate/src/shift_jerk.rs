@@ -1,6 +1,8 @@
-//! The jerk of the shifts of a log, by the speed of the car.
+//! The jerk of the shifts of a log, by the speed of the car: that of its channel, or by the wheels, or by the output of the gearbox.
 
 use std::collections::VecDeque;
+
+use observer::Reading;
 
 use crate::LogStep;
 
@@ -16,12 +18,21 @@ pub(crate) struct ShiftJerk {
     speeds: VecDeque<(f64, f64)>,
     /// Whether a shift is under way or has just ended, and until when its speeds count, s.
     until_s: Option<f64>,
+    /// Place of the source of the speeds, the best first; none before the first speed.
+    source: Option<usize>,
 }
 
 impl ShiftJerk {
-    /// Takes a row.
-    pub(crate) fn push(&mut self, step: &LogStep) {
-        if let Some(speed) = step.speed_m_s.filter(|speed| speed.value.is_finite()) {
+    /// Takes a row with the speeds of the car in it, m/s: by its own channel, the wheels and the output. Of a log the best source that has come is used.
+    pub(crate) fn push(&mut self, step: &LogStep, speeds_m_s: [Option<Reading<f64>>; 3]) {
+        let came = speeds_m_s.into_iter().enumerate().filter_map(|(source, speed)| Some((source, speed?)));
+        let mut usable =
+            came.filter(|(source, speed)| speed.value.is_finite() && self.source.is_none_or(|best| *source <= best));
+        if let Some((source, speed)) = usable.next() {
+            if self.source != Some(source) {
+                self.speeds.clear();
+                self.source = Some(source);
+            }
             let time_s = step.time_s - speed.age_s;
             match self.speeds.back() {
                 Some((last_s, _)) if *last_s > time_s + 1.0 => self.speeds.clear(),

@@ -3,11 +3,13 @@
 use car::columns::{command_age, element_commands};
 use car::{Car, Drive, Sensors};
 use drivetrain::CommandKind;
+pub use evaluate::drive::SimulatedShifts;
 use evaluate::measured::{MeasuredRow, SensedDrive, has_ages};
 use evaluate::recording::{input_clutch_n_m, lock_up_is_applied, reported_engine_n_m};
 use plant::car::{
     CarCalibration, CarDriveSummary, CarModel, CarSample, ElementSample, ShiftStage, simulate_car_drive_while,
 };
+use report::drive_page::simulated_shift_cells;
 use trace::{Cell, ColumnKind, signal};
 
 use crate::memory_writer::MemoryWriter;
@@ -37,11 +39,38 @@ pub fn simulate(car: &Car, drive: &Drive) -> Result<Simulation, Error> {
 /// # Errors
 /// It was, or as [`simulate()`].
 pub fn simulate_until(car: &Car, drive: &Drive, is_interrupted: &dyn Fn(f64) -> bool) -> Result<Simulation, Error> {
+    simulate_taking(car, drive, is_interrupted, |_| ())
+}
+
+/// As [`simulate_until`], with a table that has a row for each shift: how it went, what the occupants feel of it, friction work and temperature of the
+/// plates, as `wetclutch simulate` writes them.
+///
+/// # Errors
+/// See [`simulate_until`].
+pub fn simulate_scored(
+    car: &Car,
+    drive: &Drive,
+    is_interrupted: &dyn Fn(f64) -> bool,
+) -> Result<(Simulation, Table), Error> {
+    let model = CarModel::new(car.clone()).map_err(|error| Error::Input(error.to_string()))?;
+    let mut shifts = SimulatedShifts::new(car, &model);
+    let simulation = simulate_taking(car, drive, is_interrupted, |sample| shifts.push(sample))?;
+    let shifts = shifts.finish();
+    Ok((simulation, Table::of_rows(shifts.iter().map(|shift| simulated_shift_cells(shift, car)))))
+}
+
+fn simulate_taking(
+    car: &Car,
+    drive: &Drive,
+    is_interrupted: &dyn Fn(f64) -> bool,
+    mut take: impl FnMut(&CarSample),
+) -> Result<Simulation, Error> {
     let (all, measured) = (drive_columns(car), measured_columns(car, sensors_of(drive)));
     let (mut truth, mut readings) = (Rows::new(all), Rows::new(measured));
     let summary = simulate_rows(car, drive, |row| {
         truth.push(car, &MeasuredRow::exact(&row.sample));
         readings.push(car, row);
+        take(&row.sample);
         if is_interrupted(row.sample.time_s) { Err(Error::interrupted()) } else { Ok(()) }
     })?;
     Ok(Simulation { truth: truth.writer.finish(), measured: readings.writer.finish(), summary })

@@ -112,7 +112,8 @@ pub(crate) enum Command {
     ///
     /// A drive file (with segments) gives throttle, brake and grade over time, a shift schedule or a list of shifts, and a
     /// vehicle file with a gearbox. All its shifts are simulated. The columns of the offgoing and oncoming clutch are empty
-    /// between shifts.
+    /// between shifts. NAME_shifts.csv has a row for each shift: its score, friction work and temperature of the plates;
+    /// `wetclutch compare A B` compares those of two calibrations.
     ///
     ///   wetclutch simulate drives/city.toml -o out
     ///   wetclutch simulate drives/city.toml --vehicle vehicles/ten_speed.toml -o out

@@ -119,10 +119,10 @@ fn say_left_out(left_out: &[LeftOut], car: &Car) {
 }
 
 /// The signals of the drive, as `simulate` writes them.
-fn write_signals(folder: &Path, car: &Car, recording: &Recording) -> Result<[PathBuf; 2], Failure> {
+fn write_signals(folder: &Path, car: &Car, recording: &Recording) -> Result<Vec<PathBuf>, Failure> {
     let mut tables = DriveTables::create(folder, NAME, car, None)?;
     recording.samples.iter().try_for_each(|sample| tables.write(car, &MeasuredRow::exact(sample)))?;
-    tables.finish(folder)
+    tables.finish(folder, Vec::new())
 }
 
 fn print(drive: &ScoredDrive, car: &Car, page: &Path) -> Result<(), Failure> {

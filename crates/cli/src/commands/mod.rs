@@ -105,13 +105,18 @@ fn warn_of_sensors() {
 
 /// Writes rows of named cells as a comma-separated file, whole or not at all.
 fn write_cells(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<(), Failure> {
-    let write = || -> std::io::Result<()> {
+    cells_file(path, rows)?.finish().map_err(|error| Failure::writing(path, &error))
+}
+
+/// A comma-separated file of rows of named cells, which has not got its name yet.
+fn cells_file(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<WholeFile, Failure> {
+    let write = || -> std::io::Result<WholeFile> {
         let names = rows.first().into_iter().flatten().map(|(name, _)| name.as_str());
         let mut table = CsvWriter::without_time(WholeFile::create(path)?, names)?;
         for row in rows {
             table.cells(row.iter().map(|(_, cell)| *cell))?;
         }
-        table.finish()?.finish()
+        table.finish()
     };
     write().map_err(|error| Failure::writing(path, &error))
 }

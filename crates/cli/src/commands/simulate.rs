@@ -69,10 +69,10 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
 }
 
 /// Refuses to replace tables that no simulation wrote: the one with all signals has the true phase or stage, and the measured one stands beside it.
-pub(super) fn replaces_only_simulated(paths: &[PathBuf; 2]) -> Result<(), Failure> {
+pub(super) fn replaces_only_simulated(paths: &[PathBuf]) -> Result<(), Failure> {
     const TRUTH: [&str; 2] = ["true_phase", "shift_stage"];
-    let is_simulated =
-        head(&paths[0]).lines().next().is_some_and(|names| names.split(',').any(|name| TRUTH.contains(&name)));
+    let has_truth = |titles: &str| titles.split(',').any(|name| TRUTH.contains(&name));
+    let is_simulated = paths.first().is_some_and(|path| head(path).lines().next().is_some_and(has_truth));
     paths.iter().try_for_each(|path| replaces_only("table of this simulation", path, |_| is_simulated))
 }
 

@@ -5,16 +5,17 @@ use std::path::{Path, PathBuf};
 use car::{Car, Sensors};
 use config::DriveFile;
 use evaluate::measured::MeasuredRow;
-use plant::car::OverSpeed;
+use plant::car::{CarModel, OverSpeed};
+use report::drive_page::simulated_shift_cells;
 use serde_json::json;
 use trace::quantity;
 use trace::units::{km_h, rpm};
 use trace::{CsvWriter, ShownPath as _, WholeFile};
-use wetclutch::simulate::{DriveColumn, drive_columns, measured_columns, sensors_of, simulate_rows};
+use wetclutch::simulate::{DriveColumn, SimulatedShifts, drive_columns, measured_columns, sensors_of, simulate_rows};
 
 use super::car::{describe_car, read_car, warn_of_slipping};
-use super::not_an_input;
 use super::simulate::{print, replaces_only_simulated, size_note};
+use super::{cells_file, not_an_input};
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::output;
@@ -42,11 +43,22 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     }
     let name = drive.name.to_lowercase();
     let inputs = std::iter::once(&options.experiment).chain(&options.vehicle);
-    keeps_inputs(&options.output, &name, inputs.chain(&file.speeds))?;
-    replaces_only_simulated(&paths(&options.output, &name))?;
+    let inputs = inputs.chain(&file.speeds);
+    keeps_inputs(&options.output, &name, inputs.clone())?;
+    let [whole, measured] = paths(&options.output, &name);
+    let of_shifts = options.output.join(format!("{name}_shifts.csv"));
+    not_an_input(Some(&of_shifts), inputs)?;
+    replaces_only_simulated(&[whole, measured, of_shifts.clone()])?;
     let mut tables = DriveTables::create(&options.output, &name, &car, sensors_of(drive))?;
-    let summary = simulate_rows(&car, drive, |row| tables.write(&car, row))?;
-    let paths = tables.finish(&options.output)?;
+    let model = CarModel::new(car.car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
+    let mut shifts = SimulatedShifts::new(&car, &model);
+    let summary = simulate_rows(&car, drive, |row| {
+        shifts.push(&row.sample);
+        tables.write(&car, row)
+    })?;
+    let shifts = shifts.finish();
+    let cells: Vec<_> = shifts.iter().map(|shift| simulated_shift_cells(shift, &car)).collect();
+    let paths = tables.finish(&options.output, vec![(cells_file(&of_shifts, &cells)?, of_shifts)])?;
     output::note(&format!(
         "drive: {:.0} s, {:.2} km{}, {} shifts, at most {}",
         summary.duration_s,
@@ -137,11 +149,12 @@ impl DriveTables {
         self.measured.write(car, row)
     }
 
-    /// Gives both files their names.
-    pub(super) fn finish(self, folder: &Path) -> Result<[PathBuf; 2], Failure> {
-        let ((whole_file, whole), (measured_file, measured)) = (self.whole.complete()?, self.measured.complete()?);
-        WholeFile::finish_all([whole_file, measured_file]).map_err(|error| Failure::writing(folder, &error))?;
-        Ok([whole, measured])
+    /// Gives both files their names, and these others with them.
+    pub(super) fn finish(self, folder: &Path, others: Vec<(WholeFile, PathBuf)>) -> Result<Vec<PathBuf>, Failure> {
+        let both = [self.whole.complete()?, self.measured.complete()?];
+        let (files, paths): (Vec<_>, Vec<_>) = both.into_iter().chain(others).unzip();
+        WholeFile::finish_all(files).map_err(|error| Failure::writing(folder, &error))?;
+        Ok(paths)
     }
 }
 

@@ -25,7 +25,7 @@ use crate::words::found;
 pub use drawn::{Drawn, DrawnShift, drawn};
 use figures::{overview_figure, shift_figure};
 use shifts::{Column, filled_columns, rows_of};
-pub use shifts::{shift_cells, shift_rows, shift_words};
+pub use shifts::{shift_cells, shift_rows, shift_words, simulated_shift_cells};
 
 /// Shifts that are drawn; of a drive with more, the worst, or those worth a look.
 pub const MAX_DRAWN: usize = 400;

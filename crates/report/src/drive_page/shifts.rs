@@ -44,7 +44,7 @@ const COLUMNS: &[Column] = &[
     column("time s", "from the request until the shift is complete", |s, _| {
         number(s.quality.complete_s.unwrap_or(f64::NAN), 2)
     }),
-    felt(
+    column(
         "rating",
         "10 is the best and 1 the lowest; 7 is a shift that is just accepted in vibration dose, jerk, step, torque hole, time and flare",
         |s, _| {
@@ -82,7 +82,7 @@ const COLUMNS: &[Column] = &[
         "vibration dose value of the acceleration from the request to 0.5 s after the end, weighted by ISO 2631-1",
         |s, _| comfort(s, |felt| number(felt.vibration_dose_m_s1_75, 2)),
     ),
-    column("jerk m/s^3", "maximum jerk of the car, from parabolas over 0.3 s of its speed", |s, _| {
+    felt("jerk m/s^3", "maximum jerk of the car, from parabolas over 0.3 s of its speed", |s, _| {
         if s.quality.jerk_m_s3.is_nan() { String::new() } else { number(s.quality.jerk_m_s3, 1) }
     }),
     column(
@@ -198,7 +198,8 @@ pub(super) fn rows_of(columns: &[&Column], drive: &ScoredDrive, car: &Car) -> (V
 
 /// What the words of the table of shifts say that a reader may not have met, and the healths in it: word and meaning.
 pub fn shift_words(drive: &ScoredDrive, car: &Car) -> Vec<(String, &'static str)> {
-    const EXPLAINED: [&str; 8] = [
+    const EXPLAINED: [&str; 9] = [
+        "rating",
         "flare rad/s",
         "overshoot rad/s",
         "tie-up N m",
@@ -268,14 +269,21 @@ fn health((worst, fraction): (Health, f64)) -> String {
     }
 }
 
-/// The shifts as named cells in SI units, for files. RMS errors of the torque of the controlling clutch and of the
-/// other, N m; means of the inertia phase.
-pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'a>)> {
+/// A number of a file: with the digits that mean something.
+fn number_cell<'a>(name: &str, value: f64) -> (String, Cell<'a>) {
+    (name.to_owned(), Cell::Number(trace::rounded(value)))
+}
+
+/// A duration of a file: a clock since 1970 has a fraction of a microsecond.
+fn duration_cell<'a>(name: &str, value_s: f64) -> (String, Cell<'a>) {
+    number_cell(name, (1e6 * value_s).round() / 1e6)
+}
+
+/// How a shift went and what was felt of it, as named cells in SI units.
+fn quality_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'a>)> {
     let [offgoing, oncoming] = clutch_names(shift, car);
     let quality = &shift.quality;
-    let number = |name: &str, value: f64| (name.to_owned(), Cell::Number(trace::rounded(value)));
-    // A clock since 1970 has a fraction of a microsecond.
-    let duration = |name: &str, value_s: f64| number(name, (1e6 * value_s).round() / 1e6);
+    let (number, duration) = (number_cell, duration_cell);
     let word = |name: &str, word: &'a str| (name.to_owned(), Cell::Word(word));
     let mut cells = vec![
         ("number".to_owned(), Cell::Whole(shift.number as u64)),
@@ -310,6 +318,24 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         number("oncoming_plates_degc", shift.plates_degc.unwrap_or(f64::NAN)),
         word("acceleration_source", shift.comfort.map_or("", |comfort| comfort.source.name())),
     ]);
+    cells
+}
+
+/// The shifts of a simulation as named cells in SI units, for files: friction work by the true torques, and no estimates.
+pub fn simulated_shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'a>)> {
+    let mut cells = quality_cells(shift, car);
+    cells.retain(|(name, _)| name != "tie_up_estimate_n_m");
+    for (clutch, work_j) in ["offgoing", "oncoming"].iter().zip(shift.summary.friction_work_j) {
+        cells.push(number_cell(&format!("{clutch}_friction_work_j"), work_j.map_or(f64::NAN, |[work_j, ..]| work_j)));
+    }
+    cells
+}
+
+/// The shifts as named cells in SI units, for files. RMS errors of the torque of the controlling clutch and of the
+/// other, N m; means of the inertia phase.
+pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'a>)> {
+    let mut cells = quality_cells(shift, car);
+    let number = number_cell;
     let errors: ErrorsByPhase = shift.errors().unwrap_or_default();
     for (phase, clutches) in ["torque_phase", "inertia_phase"].iter().zip(errors) {
         for (clutch, errors) in ["controlling", "other"].iter().zip(clutches) {
@@ -350,6 +376,7 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
     cells.push(number("hidden_share", shift.hidden().unwrap_or(f64::NAN)));
     let inside = shift.inside().filter(|_| shift.has_truth());
     cells.push(number("inside_range", inside.unwrap_or(f64::NAN)));
-    cells.push(word("worst_health", shift.worst_health().map_or("", |(health, _)| health.name())));
+    let health = shift.worst_health().map_or("", |(health, _)| health.name());
+    cells.push(("worst_health".to_owned(), Cell::Word(health)));
     cells
 }

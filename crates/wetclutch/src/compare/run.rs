@@ -181,7 +181,13 @@ fn of_folder(folder: &Path) -> Result<PathBuf, Error> {
     let entries = std::fs::read_dir(folder).map_err(|error| Error::Input(format!("{}: {error}", folder.shown())))?;
     let mut names: Vec<String> = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
     names.sort();
-    let tables: Vec<&String> = names.iter().filter(|name| name.ends_with(TABLE) || *name == OF_DEMO[0]).collect();
+    let mut tables: Vec<&String> = names.iter().filter(|name| name.ends_with(TABLE) || *name == OF_DEMO[0]).collect();
+    // Estimates go before the simulated drive that they are of.
+    let is_simulated =
+        |name: &String| name.strip_suffix(TABLE).is_some_and(|stem| names.contains(&format!("{stem}_measured.csv")));
+    if !tables.iter().all(|name| is_simulated(name)) {
+        tables.retain(|name| !is_simulated(name));
+    }
     let drives = names.iter().filter(|name| {
         let measured = name.strip_suffix(".csv").map(|stem| format!("{stem}_measured.csv"));
         *name == "trace.csv" || measured.is_some_and(|measured| names.contains(&measured))
