@@ -83,7 +83,7 @@ fn every_command_prints_one_object_with_the_version_of_its_keys() {
     let suggested = json(&["inspect", &folder.path("sim/e1_measured.csv"), "--suggest"]);
     assert!(suggested["channel_map"].as_str().unwrap().contains("[channel.engine_speed]"), "{suggested}");
     let driven = json(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("drive")]);
-    assert!(driven["drive"]["duration_s"] == 3.0 && driven["files"].as_array().unwrap().len() == 2, "{driven}");
+    assert!(driven["drive"]["duration_s"] == 3.0 && driven["files"].as_array().unwrap().len() == 3, "{driven}");
     let demo = json(&["demo", "--vehicle", &car, "--drive", &drive, "-o", &folder.path("demo_drive")]);
     assert!(demo["shifts"].is_array() && demo["files"].as_array().unwrap().len() == 4, "{demo}");
     let run = json(&["study", &folder.path("study.toml"), "--run", "1", "-o", &folder.path("run")]);

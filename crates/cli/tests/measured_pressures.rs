@@ -152,7 +152,7 @@ fn friction_work_and_jerk_of_a_measured_drive_are_those_of_the_simulation() {
         powers.fold([0.0; 2], |[work, one], (torque, slip)| [work + 0.01 * torque * slip, one + 0.01 * slip.abs()])
     };
     let (shifts, words) = shifts_of(&folder, "sim/city_measured.csv", &[]);
-    assert!(!words.contains("jerk") && words.contains("friction"), "{words}");
+    assert!(words.contains("rating") && words.contains("friction"), "{words}");
     let (mut all, mut off) = (0.0, 0.0);
     for shift in &shifts {
         let from_s = number(shift, "time_s");
@@ -167,12 +167,33 @@ fn friction_work_and_jerk_of_a_measured_drive_are_those_of_the_simulation() {
     }
     assert!(all > 5e3 && off < 0.15 * all, "{off} of {all} J");
 
-    // The jerk needs the speed of the car: that of the wheels swings. Of the exact speed and of one as a bus has it.
-    assert!(shifts.iter().all(|shift| shift["jerk_m_s3"].is_empty()));
+    // Without the speed of the car and of the wheels there is none: the output swings.
+    let text = folder.read("sim/city_measured.csv");
+    let wheel = text.lines().next().unwrap().split(',').position(|name| name == "wheel_speed_rad_s").unwrap();
+    let without = |line: &str| {
+        let cells = line.split(',').enumerate().filter(|(at, _)| *at != wheel).map(|(_, cell)| cell);
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    };
+    folder.write("output.csv", text.lines().map(without).collect::<String>());
+    let (by_output, _) = shifts_of(&folder, "output.csv", &[]);
+    assert!(
+        by_output.iter().all(|shift| shift["jerk_m_s3"].is_empty() && shift["acceleration_source"] == "output_speed")
+    );
+    // Jerk and score by the wheels, of the exact speed, and of one as a bus has it.
+    let simulated = rows(&folder.read("sim/city_shifts.csv"));
+    let mut ratings = Vec::new();
+    for (shift, simulated) in shifts.iter().zip(&simulated) {
+        assert_eq!(shift["acceleration_source"], "wheel_speed");
+        let [measured, truth] = [shift, simulated].map(|shift| number(shift, "rating"));
+        ratings.push((measured - truth).abs());
+        let [measured, truth] = [shift, simulated].map(|shift| number(shift, "oncoming_plates_degc"));
+        assert!(truth > 80.0 && (measured - truth).abs() < 3.0 + 0.2 * (truth - 80.0), "{measured} {truth} degC");
+    }
+    assert!(ratings.iter().sum::<f64>() < 0.4 * ratings.len() as f64, "{ratings:?}");
     let speed = |row: &BTreeMap<String, String>| number(row, "vehicle_speed_m_s");
     with_columns(&folder, "speed.csv", "vehicle_speed_m_s", |_, row| format!("{}", speed(row)));
     let (exact, words) = shifts_of(&folder, "speed.csv", &[]);
-    assert!(words.contains("jerk"), "{words}");
+    assert!(words.contains("rating"), "{words}");
     with_columns(&folder, "bus.csv", "vehicle_speed_km_h", |at, row| match at % 2 {
         0 => format!("{:.2}", (72.0 * speed(row)).round() / 20.0),
         _ => String::new(),

@@ -41,6 +41,17 @@ impl<T: Real> Tyre<T> {
         let decay = (-doubled.abs()).exp();
         self.max_force_n * ((T::one() - decay) / (T::one() + decay)).copysign(doubled)
     }
+
+    /// Speed of the vehicle, m/s, at which a rim of this speed has this force; up to 95 % of the largest one.
+    pub fn vehicle_speed(&self, rim_m_s: T, force_n: T) -> T {
+        let most = T::of(0.95);
+        let part = (force_n / self.max_force_n).max(-most).min(most);
+        let slip = T::of(0.25) * self.slip_scale * ((T::one() + part) / (T::one() - part)).ln();
+        let driven = rim_m_s - slip * rim_m_s.abs().at_least(self.floor_m_s);
+        // Against a slower rim the slip is counted in the speed of the vehicle.
+        let is_slower = rim_m_s * force_n < T::zero() && driven.abs() > self.floor_m_s;
+        if is_slower { rim_m_s / (T::one() - slip.abs()) } else { driven }
+    }
 }
 
 #[cfg(test)]
@@ -54,6 +65,17 @@ mod tests {
         assert!(TYRE.force(20.0, 10.0) > 0.999 * TYRE.max_force_n);
         assert_eq!(TYRE.force(9.9, 10.0), -TYRE.force(10.0, 9.9));
         assert_eq!(TYRE.force(0.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn the_vehicle_speed_is_that_of_the_force() {
+        for (rim, vehicle) in
+            [(10.1, 10.0), (9.9, 10.0), (-10.1, -10.0), (-9.9, -10.0), (1.0, 0.95), (0.5, 0.55), (20.0, 20.0)]
+        {
+            let found = TYRE.vehicle_speed(rim, TYRE.force(rim, vehicle));
+            assert!((found - vehicle).abs() < 1e-9, "{rim} {vehicle} {found}");
+        }
+        assert!(TYRE.vehicle_speed(10.0, 1e9).is_finite());
     }
 
     #[test]

@@ -143,8 +143,8 @@ impl<'c> LoggedDrive<'c> {
         }
         self.carried.push(step.time_s, &estimate.valve_pa);
         let speeds_m_s = self.speeds_of_car(input, &estimate);
-        let [(_, by_wheels), (_, by_output)] = speeds_m_s;
-        self.jerk.push(step, [step.speed_m_s, by_wheels, by_output]);
+        let [(_, by_wheels), _] = speeds_m_s;
+        self.jerk.push(step, [step.speed_m_s, by_wheels]);
         let from = input.gear.from;
         self.passing.state(DriveState {
             time_s: step.time_s,
@@ -194,7 +194,8 @@ impl<'c> LoggedDrive<'c> {
         estimate
     }
 
-    /// The speed of the car by the readings of the wheels and of the output that the filter did not refuse, m/s.
+    /// The speed of the car by the readings of the wheels and of the output that the filter did not refuse, m/s. Of the wheels the slip of the tyres under
+    /// the estimated torque of the shafts is taken off: where that torque steps, the wheels do.
     fn speeds_of_car(
         &self,
         input: &ShiftInput<f64>,
@@ -206,9 +207,13 @@ impl<'c> LoggedDrive<'c> {
             Some(Reading { value: radius_m * value, age_s })
         };
         let radius_m = self.car.road.wheel_radius_m;
+        let without_slip = |rim: Reading<f64>| {
+            let force_n = estimate.shaft_n_m.filter(|n_m| n_m.is_finite()).unwrap_or(0.0) / radius_m;
+            Reading { value: self.car.tyre.vehicle_speed(rim.value, force_n), ..rim }
+        };
         let output_radius_m = radius_m / self.car.driveline.final_ratio;
         [
-            (AccelerationSource::WheelSpeed, of(input.wheel_rad_s, channels.wheel, radius_m)),
+            (AccelerationSource::WheelSpeed, of(input.wheel_rad_s, channels.wheel, radius_m).map(without_slip)),
             (AccelerationSource::OutputSpeed, of(input.output_rad_s, channels.output, output_radius_m)),
         ]
     }

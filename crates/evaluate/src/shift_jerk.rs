@@ -1,4 +1,5 @@
-//! The jerk of the shifts of a log, by the speed of the car: that of its channel, or by the wheels, or by the output of the gearbox.
+//! The jerk of the shifts of a log, by the speed of the car: that of its channel, or by the wheels. The output of the gearbox swings against the car by
+//! more than the jerk of a shift.
 
 use std::collections::VecDeque;
 
@@ -23,8 +24,8 @@ pub(crate) struct ShiftJerk {
 }
 
 impl ShiftJerk {
-    /// Takes a row with the speeds of the car in it, m/s: by its own channel, the wheels and the output. Of a log the best source that has come is used.
-    pub(crate) fn push(&mut self, step: &LogStep, speeds_m_s: [Option<Reading<f64>>; 3]) {
+    /// Takes a row with the speeds of the car in it, m/s: by its own channel, and by the wheels. Of a log the best source that has come is used.
+    pub(crate) fn push(&mut self, step: &LogStep, speeds_m_s: [Option<Reading<f64>>; 2]) {
         let came = speeds_m_s.into_iter().enumerate().filter_map(|(source, speed)| Some((source, speed?)));
         let mut usable =
             came.filter(|(source, speed)| speed.value.is_finite() && self.source.is_none_or(|best| *source <= best));
