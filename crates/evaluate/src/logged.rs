@@ -384,7 +384,12 @@ impl<'c> LoggedDrive<'c> {
         self.passing.take_comfort(comfort);
         // A shift that the log cuts off is not complete.
         self.end(None);
-        let of_car = self.beyond_bounds.warning(self.car, self.tables);
+        // What slips in its gears, or holds without a command, changes the torques of the others in shifts.
+        if self.checks.slipping.is_found() {
+            self.checks.torques.leave_out();
+        }
+        // The quantities of the filter say the same later, and may take an element for another.
+        let of_car = self.beyond_bounds.warning(self.car, self.tables).filter(|_| !self.checks.torques.is_found());
         let late = late_speeds::warnings(self.state.speeds_late_s(), self.filter.longest_found_s());
         let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings());
         let warnings = warnings.chain(late).chain(of_car).collect();

@@ -2,6 +2,7 @@
 
 mod came_speed;
 mod check;
+mod clutch_torques;
 mod command_delay;
 mod contradictions;
 mod converter_check;
@@ -25,6 +26,7 @@ mod unannounced;
 use car::{Car, ErrorBudget};
 use observer::ShiftTables;
 
+use self::clutch_torques::ClutchTorques;
 use self::command_delay::CommandDelay;
 use self::contradictions::CommandCheck;
 use self::converter_check::ConverterCheck;
@@ -70,6 +72,7 @@ pub(crate) struct Checks<'c> {
     polled: PolledSpeeds,
     unannounced: UnannouncedShifts,
     pub(crate) slipping: SlippingElements<'c>,
+    pub(crate) torques: ClutchTorques<'c>,
     pub(crate) scales: Scales<'c>,
 }
 
@@ -92,12 +95,13 @@ impl<'c> Checks<'c> {
             polled: PolledSpeeds::default(),
             unannounced: UnannouncedShifts::new(car),
             slipping: SlippingElements::new(car),
+            torques: ClutchTorques::new(car),
             scales: Scales::new(car),
         }
     }
 
     /// Each of them, in the order of their warnings.
-    pub(crate) fn each(&mut self) -> [&mut dyn Check; 17] {
+    pub(crate) fn each(&mut self) -> [&mut dyn Check; 18] {
         [
             &mut self.swapped,
             &mut self.commands,
@@ -115,6 +119,7 @@ impl<'c> Checks<'c> {
             &mut self.polled,
             &mut self.unannounced,
             &mut self.slipping,
+            &mut self.torques,
             &mut self.scales,
         ]
     }

@@ -1,0 +1,210 @@
+//! Clutches whose torque in shifts, by the speeds, changes against that of their valve models: worn plates, a leak, another oil.
+//!
+//! While both clutches of a shift slip, the speeds show the torque of the one that drives the change of speed. Its mean over that of the valve model of the
+//! file differs from 1 by friction, gain and kiss point of this car, and stays what it is. From one shift on it does not where something in the gearbox has changed. The
+//! quantities of the filter pass the bounds of the error budget later, or not at all: it has learnt the car as it was before.
+
+use std::collections::BTreeMap;
+
+use car::Car;
+use drivetrain::Real;
+
+use super::check::{Check, EndedShift};
+use crate::ShiftScoreRow;
+
+/// Rows of a shift that are needed \[chosen\].
+const ENOUGH_ROWS: u32 = 8;
+/// Torque of a valve model that is compared at least, N m, and largest standard deviation of the estimate over it \[chosen\].
+const MIN_N_M: f64 = 4.0;
+const MAX_STD_DEV: f64 = 0.3;
+/// Shifts before and after a change that are needed \[chosen\].
+const BEFORE: usize = 2;
+const AFTER: usize = 3;
+/// Change of the logarithm of the ratio that is reported: 0.7 times, or 1.43 times \[chosen: a warm-up changes friction by a tenth\].
+const CHANGE: f64 = 0.357;
+/// Fraction of the shifts on both sides that lie on their side of the middle \[chosen\].
+const FRACTION: f64 = 0.8;
+/// Shifts of an element that are kept: the last ones.
+const KEPT: usize = 200;
+/// Elements from which on a change is taken to be one of the oil.
+const MANY: usize = 3;
+
+/// Sums over the rows of a shift, of a clutch, N m.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    rows: u32,
+    estimate: f64,
+    std_dev: f64,
+    valve: f64,
+}
+
+/// A shift of an element: its begin, s, and the logarithm of its torque by the speeds over that of the valve model.
+type Compared = (f64, f64);
+
+/// A change of an element.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Change {
+    /// Begin of the first shift after it, s.
+    since_s: f64,
+    /// Logarithms of the ratio before and after: medians.
+    ratios: [f64; 2],
+    /// Shifts before and after.
+    shifts: [usize; 2],
+    /// Fraction of them that lie on their side of the middle.
+    clear: f64,
+}
+
+/// What the shifts of a log show of each element.
+pub(crate) struct ClutchTorques<'c> {
+    car: &'c Car,
+    sums: BTreeMap<usize, Sums>,
+    shifts: BTreeMap<usize, Vec<Compared>>,
+}
+
+impl<'c> ClutchTorques<'c> {
+    pub(super) fn new(car: &'c Car) -> Self {
+        Self { car, sums: BTreeMap::new(), shifts: BTreeMap::new() }
+    }
+
+    /// The elements that have changed.
+    fn found(&self) -> Vec<(usize, Change)> {
+        self.shifts.iter().filter_map(|(element, shifts)| Some((*element, change(shifts)?))).collect()
+    }
+
+    /// Whether an element has changed.
+    pub(crate) fn is_found(&self) -> bool {
+        !self.found().is_empty()
+    }
+
+    /// Leaves out what the shifts show: another check explains it.
+    pub(crate) fn leave_out(&mut self) {
+        self.shifts.clear();
+    }
+
+    /// The changes in one direction, in a sentence.
+    fn sentence(&self, found: &[(usize, Change)], falls: bool) -> Option<String> {
+        let some: Vec<_> = found.iter().filter(|(_, change)| (change.ratios[1] < change.ratios[0]) == falls).collect();
+        let since_s = some.iter().map(|(_, change)| change.since_s).reduce(f64::min)?;
+        let each = some.iter().map(|(element, change)| {
+            let [before, after] = change.ratios.map(|ratio| 100.0 * Real::exp(ratio));
+            let [shifts_before, shifts] = change.shifts;
+            let name = &self.car.gearbox.elements[*element].name;
+            format!("{name} {after:.0} % in {shifts} shifts, before {before:.0} % in {shifts_before}")
+        });
+        let each = each.collect::<Vec<_>>().join("; ");
+        let hint = match (falls, some.len() >= MANY) {
+            (_, true) => {
+                "check the oil (another fluid, its temperature), the line pressure and the scale of the commands"
+            }
+            (true, false) => {
+                "check the plates of this clutch (worn, glazed), its piston (leak), its valve and its oil; another one that holds without its command has the same effect"
+            }
+            (false, false) => "check the valve of this clutch, its plates and its oil",
+        };
+        Some(format!(
+            "warning: from {since_s:.1} s on clutches transmit {} torque in shifts than before, by the speeds over the valve model: {each}\nhint: {hint}",
+            if falls { "less" } else { "more" }
+        ))
+    }
+}
+
+/// Where the ratio of an element changes most clearly, if it does.
+fn change(shifts: &[Compared]) -> Option<Change> {
+    let split = |at: usize| {
+        let (before, after) = shifts.split_at(at);
+        let ratios = [before, after].map(median);
+        let [low, high] = if ratios[0] < ratios[1] { [before, after] } else { [after, before] };
+        let middle = 0.5 * (ratios[0] + ratios[1]);
+        let below = low.iter().filter(|(_, ratio)| *ratio < middle).count();
+        let above = high.iter().filter(|(_, ratio)| *ratio > middle).count();
+        let is_clear = below as f64 >= FRACTION * low.len() as f64 && above as f64 >= FRACTION * high.len() as f64;
+        ((ratios[1] - ratios[0]).abs() >= CHANGE && is_clear).then(|| Change {
+            since_s: after[0].0,
+            ratios,
+            shifts: [before.len(), after.len()],
+            clear: (below + above) as f64 / shifts.len() as f64,
+        })
+    };
+    let size = |change: &Change| (change.ratios[1] - change.ratios[0]).abs();
+    let all = (BEFORE..(shifts.len() + 1).saturating_sub(AFTER)).filter_map(split);
+    all.max_by(|one, other| one.clear.total_cmp(&other.clear).then(size(one).total_cmp(&size(other))))
+}
+
+fn median(shifts: &[Compared]) -> f64 {
+    let mut ratios: Vec<f64> = shifts.iter().map(|(_, ratio)| *ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    let middle = ratios.len() / 2;
+    if ratios.len().is_multiple_of(2) { 0.5 * (ratios[middle - 1] + ratios[middle]) } else { ratios[middle] }
+}
+
+impl Check for ClutchTorques<'_> {
+    fn begin(&mut self) {
+        self.sums.clear();
+    }
+
+    fn shift_row(&mut self, elements: [Option<usize>; 2], row: &ShiftScoreRow) {
+        if row.clutches.iter().any(|clutch| clutch.sticks) {
+            return;
+        }
+        for (element, clutch) in elements.into_iter().zip(&row.clutches) {
+            let Some(element) = element.filter(|_| clutch.has_pressure && !clutch.hidden) else { continue };
+            let [_, estimate, valve] = clutch.torque_n_m.map(f64::abs);
+            let values = [estimate, valve, clutch.torque_std_dev_n_m];
+            if values.iter().all(|value| value.is_finite()) {
+                let sums = self.sums.entry(element).or_default();
+                sums.rows += 1;
+                sums.estimate += estimate;
+                sums.valve += valve;
+                sums.std_dev += clutch.torque_std_dev_n_m;
+            }
+        }
+    }
+
+    fn end(&mut self, shift: &EndedShift<'_>) {
+        let sums = std::mem::take(&mut self.sums);
+        for (element, Sums { rows, estimate, std_dev, valve }) in sums {
+            let is_shown = rows >= ENOUGH_ROWS && valve >= MIN_N_M * f64::from(rows) && std_dev <= MAX_STD_DEV * valve;
+            if !is_shown || shift.completed.is_none() || estimate <= 0.0 {
+                continue;
+            }
+            let shifts = self.shifts.entry(element).or_default();
+            if shifts.len() >= KEPT {
+                shifts.remove(0);
+            }
+            shifts.push((shift.shift.time_s[0], Real::ln(estimate / valve)));
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let found = self.found();
+        [true, false].into_iter().filter_map(|falls| self.sentence(&found, falls)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shifts(ratios: &[f64]) -> Vec<Compared> {
+        ratios.iter().enumerate().map(|(at, ratio)| (10.0 * at as f64, Real::ln(*ratio))).collect()
+    }
+
+    #[test]
+    fn a_change_that_stays_is_found_where_it_begins() {
+        let found = change(&shifts(&[1.0, 1.1, 0.9, 0.5, 0.55, 0.45])).unwrap();
+        assert_eq!((found.since_s, found.shifts), (30.0, [3, 3]));
+        assert!((Real::exp(found.ratios[1]) - 0.5).abs() < 1e-9 && found.clear == 1.0);
+        let rises = change(&shifts(&[1.0, 0.9, 1.6, 1.5, 1.7, 1.6])).unwrap();
+        assert!(rises.ratios[1] > rises.ratios[0] && rises.since_s == 20.0);
+    }
+
+    #[test]
+    fn a_car_that_differs_from_its_file_and_single_shifts_are_no_change() {
+        assert_eq!(change(&shifts(&[0.5; 30])), None);
+        assert_eq!(change(&shifts(&[1.0, 1.0, 1.0, 0.5, 1.0, 1.0, 1.0, 0.4, 1.0])), None);
+        // Too few, and too small a change.
+        assert_eq!(change(&shifts(&[1.0, 1.0, 0.5, 0.5])), None);
+        assert_eq!(change(&shifts(&[1.0, 1.0, 1.0, 0.75, 0.75, 0.75])), None);
+        assert_eq!(change(&[]), None);
+    }
+}
