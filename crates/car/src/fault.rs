@@ -36,6 +36,52 @@ pub enum FaultKind {
         /// The factor.
         lag_factor: f64,
     },
+    /// Glazed plates of an element: its friction falls with the slip, so that the clutch judders before it holds.
+    GlazedPlates {
+        /// The element.
+        element: String,
+        /// Factor on the friction of the file at [`GLAZED_RAD_S`] and above; without slip the friction is that of the file.
+        friction_factor: f64,
+    },
+    /// A speed sensor has failed.
+    SpeedSensor {
+        /// The sensor.
+        sensor: FailedSensor,
+        /// What it reads.
+        reading: FailedReading,
+    },
+}
+
+/// Slip from which on the friction of glazed plates is lowest, rad/s \[chosen\].
+pub const GLAZED_RAD_S: f64 = 40.0;
+
+/// A speed sensor of a car.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FailedSensor {
+    /// Of the engine.
+    Engine,
+    /// Of the turbine.
+    Turbine,
+    /// Of the gearbox output.
+    Output,
+    /// Of the driven wheels.
+    Wheel,
+}
+
+impl FailedSensor {
+    /// All of them, in the order of a row.
+    pub const ALL: [Self; 4] = [Self::Engine, Self::Turbine, Self::Output, Self::Wheel];
+}
+
+/// What a speed sensor reads that has failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FailedReading {
+    /// Zero.
+    Zero,
+    /// The last speed before it failed.
+    Frozen,
+    /// Nothing.
+    None,
 }
 
 /// Something that breaks on a drive, and stays so.

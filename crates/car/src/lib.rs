@@ -70,7 +70,7 @@ pub use self::{
     error_bounds::{CarErrorBounds, ElementErrorBounds, ErrorBounds},
     error_budget::{ElementErrors, ErrorBudget},
     experiment::{Experiment, FastFill, Profile, Scenario, ShiftCalibration},
-    fault::{Fault, FaultKind},
+    fault::{FailedReading, FailedSensor, Fault, FaultKind, GLAZED_RAD_S},
     observers::{GainMethod, GivenGains, ObserverEntry, ObserverKind, SAMPLE_TIMES_S},
     off_nominal::OffNominal,
     one_shift::OneShiftError,

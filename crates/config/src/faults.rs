@@ -1,6 +1,6 @@
 //! `[[fault]]` of a drive file.
 
-use car::{Fault, FaultKind};
+use car::{FailedReading, FailedSensor, Fault, FaultKind};
 use geartrain::Gearbox;
 use serde::Deserialize;
 use toml::Spanned;
@@ -21,6 +21,8 @@ pub(crate) struct RawFault {
     command: Option<Number>,
     pressure_fraction: Option<Number>,
     pressure_pa: Option<Number>,
+    sensor: Option<Spanned<RawSensor>>,
+    reading: Option<Spanned<RawReading>>,
 }
 
 #[derive(Deserialize, Clone, Copy, PartialEq, Eq)]
@@ -33,6 +35,25 @@ enum RawKind {
     LeakingPiston,
     LinePressure,
     Aeration,
+    GlazedPlates,
+    SpeedSensor,
+}
+
+#[derive(Deserialize, Clone, Copy, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+enum RawSensor {
+    Engine,
+    Turbine,
+    Output,
+    Wheel,
+}
+
+#[derive(Deserialize, Clone, Copy, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+enum RawReading {
+    Zero,
+    Frozen,
+    None,
 }
 
 impl RawKind {
@@ -46,6 +67,8 @@ impl RawKind {
             Self::LeakingPiston => (&["element", "pressure_fraction"], &[]),
             Self::LinePressure => (&["pressure_pa"], &[]),
             Self::Aeration => (&["lag_factor"], &[]),
+            Self::GlazedPlates => (&["element", "friction_factor"], &[]),
+            Self::SpeedSensor => (&["sensor", "reading"], &[]),
         }
     }
 }
@@ -84,6 +107,27 @@ impl RawFault {
             RawKind::Aeration => {
                 FaultKind::Aeration { lag_factor: number("lag_factor", &self.lag_factor, 0.1..=100.0)? }
             }
+            RawKind::GlazedPlates => FaultKind::GlazedPlates {
+                element: element()?,
+                friction_factor: number("friction_factor", &self.friction_factor, 0.05..=1.0)?,
+            },
+            RawKind::SpeedSensor => {
+                let sensor = self.sensor.as_ref().ok_or_else(|| self.missing(check, "sensor"))?;
+                let reading = self.reading.as_ref().ok_or_else(|| self.missing(check, "reading"))?;
+                FaultKind::SpeedSensor {
+                    sensor: match sensor.get_ref() {
+                        RawSensor::Engine => FailedSensor::Engine,
+                        RawSensor::Turbine => FailedSensor::Turbine,
+                        RawSensor::Output => FailedSensor::Output,
+                        RawSensor::Wheel => FailedSensor::Wheel,
+                    },
+                    reading: match reading.get_ref() {
+                        RawReading::Zero => FailedReading::Zero,
+                        RawReading::Frozen => FailedReading::Frozen,
+                        RawReading::None => FailedReading::None,
+                    },
+                }
+            }
         };
         Ok(Fault { kind, from_s: check.number("fault.from_s", &self.from_s, 0.0..=1e9)? })
     }
@@ -120,6 +164,8 @@ impl RawFault {
             ("command", self.command.is_some()),
             ("pressure_fraction", self.pressure_fraction.is_some()),
             ("pressure_pa", self.pressure_pa.is_some()),
+            ("sensor", self.sensor.is_some()),
+            ("reading", self.reading.is_some()),
         ];
         for (key, is_given) in given {
             if is_given && !needed.contains(&key) && !optional.contains(&key) {
@@ -155,7 +201,7 @@ impl RawFault {
 
 #[cfg(test)]
 mod tests {
-    use car::{Fault, FaultKind};
+    use car::{FailedReading, FailedSensor, Fault, FaultKind};
 
     use crate::{DriveFile, Source};
 
@@ -192,6 +238,14 @@ mod tests {
             ),
             ("kind = \"line-pressure\"\npressure_pa = 4e5", FaultKind::LinePressure { pressure_pa: 4e5 }),
             ("kind = \"aeration\"\nlag_factor = 3", FaultKind::Aeration { lag_factor: 3.0 }),
+            (
+                "kind = \"glazed-plates\"\nelement = \"C\"\nfriction_factor = 0.5",
+                FaultKind::GlazedPlates { element: element(), friction_factor: 0.5 },
+            ),
+            (
+                "kind = \"speed-sensor\"\nsensor = \"turbine\"\nreading = \"frozen\"",
+                FaultKind::SpeedSensor { sensor: FailedSensor::Turbine, reading: FailedReading::Frozen },
+            ),
         ] {
             assert_eq!(
                 faults(&format!("[[fault]]\nfrom_s = 7\n{keys}\n")),
@@ -209,6 +263,9 @@ mod tests {
             ("kind = \"aeration\"\nlag_factor = 3\nelement = \"C\"", "`element` has no effect with this kind"),
             ("kind = \"swapped-solenoids\"\nelements = [\"C\"]", "`elements` has to name two elements"),
             ("kind = \"swapped-solenoids\"\nelements = [\"C\", \"C\"]", "`elements` has to name two elements"),
+            ("kind = \"speed-sensor\"\nsensor = \"turbine\"", "`reading` is missing"),
+            ("kind = \"speed-sensor\"\nsensor = \"car\"\nreading = \"zero\"", "unknown variant `car`"),
+            ("kind = \"glazed-plates\"\nelement = \"C\"\nfriction_factor = 2", "is 2, expected 0.05 to 1"),
             ("kind = \"line-pressure\"\npressure_pa = -1", "is -1, expected 0 to"),
             ("kind = \"line-pressure\"\npressure_pa = nan", "fault.pressure_pa"),
             ("kind = \"broken\"", "unknown variant `broken`"),

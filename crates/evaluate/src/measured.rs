@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::convert::Infallible;
 
 use car::columns::element_commands;
-use car::{Car, Sensors};
+use car::{Car, FailedReading, FailedSensor, Fault, FaultKind, Sensors};
 use drivetrain::CommandKind;
 use observer::Reading;
 use observer::ShiftTables;
@@ -52,6 +52,47 @@ impl MeasuredRow {
         let reading = |[value, age_s]: [f64; 2]| (!value.is_nan()).then_some(Reading { value, age_s });
         let command = |element: usize| reading(self.commands[element]);
         input(car, tables, &self.sample, self.speeds.map(reading), command)
+    }
+}
+
+/// Speed sensors that fail on a drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FailedSensors {
+    /// Place of the speed in a row, what it reads, since when, s, and the reading before.
+    failed: Vec<(usize, FailedReading, f64, [f64; 2])>,
+}
+
+impl FailedSensors {
+    /// Those among the faults of a drive.
+    pub fn of(faults: &[Fault]) -> Self {
+        let failed = faults.iter().filter_map(|fault| match fault.kind {
+            FaultKind::SpeedSensor { sensor, reading } => {
+                let place = FailedSensor::ALL.iter().position(|other| *other == sensor)?;
+                Some((place, reading, fault.from_s, [f64::NAN, 0.0]))
+            }
+            _ => None,
+        });
+        Self { failed: failed.collect() }
+    }
+
+    /// What is read of a row.
+    pub fn read(&mut self, row: &MeasuredRow) -> MeasuredRow {
+        let mut read = *row;
+        for (place, reading, from_s, before) in &mut self.failed {
+            let speed = &mut read.speeds[*place];
+            if row.sample.time_s < *from_s {
+                *before = if speed[0].is_nan() { *before } else { *speed };
+                continue;
+            }
+            // A sensor that reads nothing at a time reads nothing.
+            let value = match reading {
+                FailedReading::Zero => 0.0,
+                FailedReading::Frozen => before[0],
+                FailedReading::None => f64::NAN,
+            };
+            speed[0] = if speed[0].is_nan() { speed[0] } else { value };
+        }
+        read
     }
 }
 

@@ -4,7 +4,7 @@ use car::columns::{command_age, element_commands};
 use car::{Car, Drive, Sensors};
 use drivetrain::CommandKind;
 pub use evaluate::drive::SimulatedShifts;
-use evaluate::measured::{MeasuredRow, SensedDrive, has_ages};
+use evaluate::measured::{FailedSensors, MeasuredRow, SensedDrive, has_ages};
 use evaluate::recording::{input_clutch_n_m, lock_up_is_applied, reported_engine_n_m};
 use plant::car::{
     CarCalibration, CarDriveSummary, CarModel, CarSample, ElementSample, ShiftStage, simulate_car_drive_while,
@@ -90,6 +90,8 @@ pub fn simulate_rows(
     drive: &Drive,
     mut take: impl FnMut(&MeasuredRow) -> Result<(), Error>,
 ) -> Result<CarDriveSummary, Error> {
+    let mut failed = FailedSensors::of(&drive.faults);
+    let mut take = |row: &MeasuredRow| take(&failed.read(row));
     let model = CarModel::new(car.clone()).map_err(|error| Error::Input(error.to_string()))?;
     let mut sensed = drive.sensors.as_ref().map(|sensors| SensedDrive::new(car, sensors, drive.sample_time_s));
     let recorded_s = sensed.as_ref().map_or(drive.sample_time_s, SensedDrive::record_s);

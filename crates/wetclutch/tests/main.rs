@@ -3,5 +3,6 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod adaptation;
+mod failed_sensors;
 mod memory;
 mod polled;

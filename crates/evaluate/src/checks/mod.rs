@@ -7,6 +7,7 @@ mod command_delay;
 mod contradictions;
 mod converter_check;
 mod doubted_pressures;
+mod failed_speeds;
 pub mod held_commands;
 mod holes;
 mod in_gear;
@@ -31,6 +32,7 @@ use self::command_delay::CommandDelay;
 use self::contradictions::CommandCheck;
 use self::converter_check::ConverterCheck;
 use self::doubted_pressures::DoubtedPressures;
+use self::failed_speeds::FailedSpeeds;
 use self::held_commands::HeldCommands;
 use self::holes::Holes;
 use self::in_gear::InGear;
@@ -70,6 +72,7 @@ pub(crate) struct Checks<'c> {
     pub(crate) holes: Holes,
     other: OtherShifts,
     polled: PolledSpeeds,
+    failed: FailedSpeeds,
     unannounced: UnannouncedShifts,
     pub(crate) slipping: SlippingElements<'c>,
     pub(crate) torques: ClutchTorques<'c>,
@@ -93,6 +96,7 @@ impl<'c> Checks<'c> {
             holes: Holes::default(),
             other: OtherShifts::default(),
             polled: PolledSpeeds::default(),
+            failed: FailedSpeeds::default(),
             unannounced: UnannouncedShifts::new(car),
             slipping: SlippingElements::new(car),
             torques: ClutchTorques::new(car),
@@ -101,7 +105,7 @@ impl<'c> Checks<'c> {
     }
 
     /// Each of them, in the order of their warnings.
-    pub(crate) fn each(&mut self) -> [&mut dyn Check; 18] {
+    pub(crate) fn each(&mut self) -> [&mut dyn Check; 19] {
         [
             &mut self.swapped,
             &mut self.commands,
@@ -117,6 +121,7 @@ impl<'c> Checks<'c> {
             &mut self.holes,
             &mut self.other,
             &mut self.polled,
+            &mut self.failed,
             &mut self.unannounced,
             &mut self.slipping,
             &mut self.torques,

@@ -2,7 +2,8 @@
 //!
 //! The controller does not know of them: it commands as in the nominal car, and its commands are those that a log has.
 
-use car::{Car, Fault, FaultKind};
+use car::{Car, Fault, FaultKind, GLAZED_RAD_S};
+use drivetrain::Table1;
 
 use super::integrate::CarError;
 use super::model::{CarModel, MAX_PACKS};
@@ -41,7 +42,10 @@ impl Faults {
                     Broken::Leaks(place(car, element)?, *pressure_fraction)
                 }
                 FaultKind::LinePressure { pressure_pa } => Broken::Line(*pressure_pa),
-                FaultKind::Friction { .. } | FaultKind::Aeration { .. } => continue,
+                FaultKind::Friction { .. }
+                | FaultKind::Aeration { .. }
+                | FaultKind::GlazedPlates { .. }
+                | FaultKind::SpeedSensor { .. } => continue,
             };
             broken.push((*from_s, kind));
         }
@@ -88,7 +92,9 @@ impl Faults {
 /// # Errors
 /// The gearbox has no clutch or brake of such a name.
 pub(super) fn changed(model: &CarModel, faults: &[Fault]) -> Result<Vec<(f64, CarModel)>, CarError> {
-    let changes = |fault: &&Fault| matches!(fault.kind, FaultKind::Friction { .. } | FaultKind::Aeration { .. });
+    let changes = |fault: &&Fault| {
+        matches!(fault.kind, FaultKind::Friction { .. } | FaultKind::Aeration { .. } | FaultKind::GlazedPlates { .. })
+    };
     let mut ordered: Vec<&Fault> = faults.iter().filter(changes).collect();
     ordered.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     let mut car = model.car.clone();
@@ -103,6 +109,12 @@ pub(super) fn changed(model: &CarModel, faults: &[Fault]) -> Result<Vec<(f64, Ca
                 }
             }
             FaultKind::Friction { element: None, factor } => car = car.with_friction(*factor),
+            FaultKind::GlazedPlates { element, friction_factor } => {
+                let element = place(&car, element)?;
+                if let Some(clutch) = &mut car.clutches[element] {
+                    clutch.clutch.friction = glazed(&clutch.clutch.friction, *friction_factor)?;
+                }
+            }
             FaultKind::Aeration { lag_factor } => {
                 for clutch in car.clutches.iter_mut().flatten() {
                     clutch.valve = clutch.valve.changed(*lag_factor, 1.0, None);
@@ -113,6 +125,15 @@ pub(super) fn changed(model: &CarModel, faults: &[Fault]) -> Result<Vec<(f64, Ca
         models.push((*from_s, CarModel::new(car.clone())?));
     }
     Ok(models)
+}
+
+/// Friction over slip that falls to a part of what it was, along a line up to [`GLAZED_RAD_S`].
+fn glazed(friction: &Table1<f64>, factor: f64) -> Result<Table1<f64>, CarError> {
+    const POINTS: usize = 9;
+    let slips: Vec<f64> = (0..POINTS).map(|at| GLAZED_RAD_S * at as f64 / (POINTS - 1) as f64).collect();
+    let part = |slip: f64| 1.0 + (factor - 1.0) * (slip / GLAZED_RAD_S).min(1.0);
+    let values: Vec<f64> = slips.iter().map(|slip| part(*slip) * friction.at(*slip)).collect();
+    Table1::new(&slips, &values).map_err(|error| CarError::Request(error.to_string()))
 }
 
 /// The place of a clutch or brake.

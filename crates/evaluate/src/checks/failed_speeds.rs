@@ -1,0 +1,71 @@
+//! Whether a speed has no usable reading from some time on: a sensor that has failed, or a channel that ends.
+
+use observer::Reading;
+
+use super::check::{Check, CheckedRow};
+
+/// The speeds, in the order of a row.
+const NAMES: [&str; 4] = ["engine_speed", "turbine_speed", "output_speed", "wheel_speed"];
+/// Readings that are needed before \[chosen\].
+const ENOUGH: u64 = 100;
+/// Speed of another shaft from which on the car runs, rad/s, and time in which it does after the last reading, s \[chosen\].
+const RUNS_RAD_S: f64 = 20.0;
+const STANDS_RAD_S: f64 = 1.0;
+const LASTS_S: f64 = 5.0;
+
+/// The usable readings of each speed so far.
+#[derive(Default)]
+pub(super) struct FailedSpeeds {
+    speeds: [Usable; 4],
+}
+
+/// The usable readings of a speed.
+#[derive(Debug, Clone, Copy, Default)]
+struct Usable {
+    count: u64,
+    last_s: f64,
+    /// Time in which another shaft has run since, s.
+    without_s: f64,
+}
+
+impl Check for FailedSpeeds {
+    fn row(&mut self, row: &CheckedRow<'_>) {
+        let (input, channels) = (&row.step.input, &row.estimate.channels);
+        let readings = [
+            (input.engine_rad_s, channels.engine),
+            (input.turbine_rad_s, channels.turbine),
+            (input.output_rad_s, channels.output),
+            (input.wheel_rad_s, channels.wheel),
+        ];
+        let usable = readings.map(|(reading, health)| {
+            let Reading { value, .. } = reading.filter(|of| of.value.is_finite() && !health.is_refused())?;
+            Some(value)
+        });
+        for (at, speed) in self.speeds.iter_mut().enumerate() {
+            let others = usable.iter().enumerate().filter(|(other, _)| *other != at);
+            // A zero may be a shaft that stands, or a sensor that is dead.
+            if usable[at].is_some_and(|rad_s| rad_s.abs() < STANDS_RAD_S) {
+                continue;
+            }
+            if usable[at].is_some() {
+                *speed = Usable { count: speed.count + 1, last_s: row.step.time_s, without_s: 0.0 };
+            } else if others.into_iter().any(|(_, other)| other.is_some_and(|rad_s| rad_s.abs() > RUNS_RAD_S)) {
+                speed.without_s += input.dt_s.clamp(0.0, 1.0);
+            }
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let failed =
+            NAMES.iter().zip(&self.speeds).filter(|(_, speed)| speed.count >= ENOUGH && speed.without_s >= LASTS_S);
+        failed
+            .map(|(name, speed)| {
+                format!(
+                    "warning: {name} has no usable reading from {:.1} s to the end of the log, and the car goes on\nhint: check this sensor and its \
+                     channel; the estimate goes on without it",
+                    speed.last_s
+                )
+            })
+            .collect()
+    }
+}
