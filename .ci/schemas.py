@@ -294,6 +294,8 @@ def write_parts():
         {"kind": "aeration", "lag_factor": 3.0},
         {"kind": "line-pressure", "pressure_pa": 8e5},
         {"kind": "wrong-fluid", "friction_factor": 0.7},
+        {"kind": "glazed-plates", "element": "A", "friction_factor": 0.5},
+        {"kind": "speed-sensor", "sensor": "turbine", "reading": "zero"},
     ]
     for at, fault in enumerate(faults):
         city = tomllib.loads((WORK / "drives" / "city.toml").read_text())
