@@ -35,6 +35,9 @@ pub(crate) fn check_sensors(py: Python<'_>, sensors: GivenFile) -> PyResult<Stri
     checked().map_err(|error| exception(py, &error))
 }
 
+/// Every signal, what the car measures, its shifts, and distance in m, number of shifts and maximum speed in m/s.
+type Driven = (Table, Table, Table, (f64, usize, f64));
+
 /// Drives a car through a drive file, with these sensors in place of those of the file if they are given: every signal, what the car measures, its
 /// shifts, and distance in m, shifts and maximum speed in m/s.
 #[pyfunction]
@@ -46,7 +49,7 @@ pub(crate) fn simulate(
     sensors: Option<GivenFile>,
     seed: Option<u64>,
     progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<(Table, Table, Table, (f64, usize, f64))> {
+) -> PyResult<Driven> {
     let (name, text, gearbox) = car;
     let VehicleFile::Gearbox(file) = parsed(py, &name, &text, gearbox.as_deref())? else {
         let message = "car: a drive needs a car with a gearbox, and this is one of a single shift".to_owned();

@@ -16,7 +16,7 @@ fn a_folder_of_logs_gives_a_table_by_clutch_gears_and_oil_temperature() {
         rows.collect()
     };
     folder.write("logs/a.csv", with_oil(&warm, "85"));
-    folder.write("logs/notes.md", "# my drives\n".to_owned());
+    folder.write("logs/notes.md", "# my drives\n");
     let (fitted, table) = (folder.path("fitted.toml"), folder.path("adaptations.csv"));
     let fit = |logs: &str, more: &[&str]| {
         wetclutch(&[&["fit", logs, "--vehicle", CAR, "-o", &fitted, "--adaptation-table", &table], more].concat())
@@ -42,7 +42,7 @@ fn a_folder_of_logs_gives_a_table_by_clutch_gears_and_oil_temperature() {
     // It is written again, and over nothing else.
     said(&fit(&log, &["--json"]));
     assert!(folder.read("adaptations.csv").contains("E,all,all,all,,,"));
-    folder.write("adaptations.csv", "time_s,a\n0,1\n".to_owned());
+    folder.write("adaptations.csv", "time_s,a\n0,1\n");
     let error = refused(&fit(&log, &[]));
     assert!(error.contains("exists and is no adaptation table\nhint: "), "{error}");
     let error = refused(&wetclutch(&["fit", &log, "--vehicle", CAR, "-o", &fitted, "--adaptation-table", &fitted]));
