@@ -109,3 +109,15 @@ fn without_a_temperature_all_shifts_are_one_group() {
     let found = found.unwrap();
     assert!(found.adaptations.is_none() && found.adaptation_table().is_empty());
 }
+
+#[test]
+fn a_step_that_is_none_is_refused() {
+    for step_k in [1.0, 500.0, f64::NAN] {
+        let options = FitOptions { oil_step_k: Some(step_k), ..FitOptions::default() };
+        let error = fit(&vehicle(), &[], &options, &mut |_| (), &mut |_| ()).unwrap_err().to_string();
+        assert!(
+            error
+                .starts_with(&format!("the step of the oil temperature is {step_k} K\nhint: give one from 2 to 200 K"))
+        );
+    }
+}

@@ -4,8 +4,6 @@
 //! file differs from 1 by friction, gain and kiss point of this car, and stays what it is. From one shift on it does not where something in the gearbox has changed. The
 //! quantities of the filter pass the bounds of the error budget later, or not at all: it has learnt the car as it was before.
 
-use std::collections::BTreeMap;
-
 use car::Car;
 use drivetrain::Real;
 
@@ -57,18 +55,20 @@ struct Change {
 /// What the shifts of a log show of each element.
 pub(crate) struct ClutchTorques<'c> {
     car: &'c Car,
-    sums: BTreeMap<usize, Sums>,
-    shifts: BTreeMap<usize, Vec<Compared>>,
+    /// By element: the shift that is under way, and those before.
+    sums: Vec<Sums>,
+    shifts: Vec<Vec<Compared>>,
 }
 
 impl<'c> ClutchTorques<'c> {
     pub(super) fn new(car: &'c Car) -> Self {
-        Self { car, sums: BTreeMap::new(), shifts: BTreeMap::new() }
+        let elements = car.gearbox.elements.len();
+        Self { car, sums: vec![Sums::default(); elements], shifts: vec![Vec::new(); elements] }
     }
 
     /// The elements that have changed.
     fn found(&self) -> Vec<(usize, Change)> {
-        self.shifts.iter().filter_map(|(element, shifts)| Some((*element, change(shifts)?))).collect()
+        self.shifts.iter().enumerate().filter_map(|(element, shifts)| Some((element, change(shifts)?))).collect()
     }
 
     /// Whether an element has changed.
@@ -78,7 +78,7 @@ impl<'c> ClutchTorques<'c> {
 
     /// Leaves out what the shifts show: another check explains it.
     pub(crate) fn leave_out(&mut self) {
-        self.shifts.clear();
+        self.shifts.iter_mut().for_each(Vec::clear);
     }
 
     /// The changes in one direction, in a sentence.
@@ -139,7 +139,7 @@ fn median(shifts: &[Compared]) -> f64 {
 
 impl Check for ClutchTorques<'_> {
     fn begin(&mut self) {
-        self.sums.clear();
+        self.sums.fill(Sums::default());
     }
 
     fn shift_row(&mut self, elements: [Option<usize>; 2], row: &ShiftScoreRow) {
@@ -147,11 +147,13 @@ impl Check for ClutchTorques<'_> {
             return;
         }
         for (element, clutch) in elements.into_iter().zip(&row.clutches) {
-            let Some(element) = element.filter(|_| clutch.has_pressure && !clutch.hidden) else { continue };
+            let Some(sums) = element.and_then(|element| self.sums.get_mut(element)) else { continue };
+            if clutch.hidden || !clutch.has_pressure {
+                continue;
+            }
             let [_, estimate, valve] = clutch.torque_n_m.map(f64::abs);
             let values = [estimate, valve, clutch.torque_std_dev_n_m];
             if values.iter().all(|value| value.is_finite()) {
-                let sums = self.sums.entry(element).or_default();
                 sums.rows += 1;
                 sums.estimate += estimate;
                 sums.valve += valve;
@@ -161,13 +163,11 @@ impl Check for ClutchTorques<'_> {
     }
 
     fn end(&mut self, shift: &EndedShift<'_>) {
-        let sums = std::mem::take(&mut self.sums);
-        for (element, Sums { rows, estimate, std_dev, valve }) in sums {
+        for (Sums { rows, estimate, std_dev, valve }, shifts) in self.sums.iter().copied().zip(&mut self.shifts) {
             let is_shown = rows >= ENOUGH_ROWS && valve >= MIN_N_M * f64::from(rows) && std_dev <= MAX_STD_DEV * valve;
             if !is_shown || shift.completed.is_none() || estimate <= 0.0 {
                 continue;
             }
-            let shifts = self.shifts.entry(element).or_default();
             if shifts.len() >= KEPT {
                 shifts.remove(0);
             }
