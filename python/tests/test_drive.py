@@ -28,6 +28,7 @@ def test_a_drive_that_is_read_gives_the_tables_of_its_file(car: wc.Car, run: wc.
     drive = wc.Drive.read(drive_file)
     truth, measured = wc.simulate(car, drive)
     assert truth == run.truth and measured == run.measured
+    assert run.scores.rows > 3 and min(run.scores["oncoming_plates_degc"]) > 60 and max(run.scores["rating"]) <= 10
     assert drive.name == "city" and drive.duration_s == pytest.approx(run.truth["time_s"][-1], abs=1.0)
     assert drive.to_toml() == Path(drive_file).read_text(encoding="utf-8") and "city" in repr(drive)
 

@@ -47,6 +47,16 @@ def test_the_command_gives_the_same_fit(measured: wc.Table, fitted: wc.Fit, tmp_
     assert values == [line for line in fitted.car.to_toml().splitlines() if not line.startswith(("#", "gearbox"))]
 
 
+def test_valves_and_friction_are_fitted_by_oil_temperature(car: wc.Car, measured: wc.Table, fitted: wc.Fit) -> None:
+    assert fitted.adaptations is None
+    log = {name: measured[name] for name in measured} | {"oil_temperature_degc": np.full(measured.rows, 64.0)}
+    table = wc.fit(car, log, oil_step=20).adaptations
+    assert table is not None and table.rows > 20 and set(table["oil_from_degc"]) == {60.0}
+    assert set(table["quantity"]) == {"fill time", "kiss point", "valve lag", "valve delay", "friction x valve gain"}
+    with pytest.raises(wc.InputError, match="the step of the oil temperature is 1 K"):
+        wc.fit(car, log, oil_step=1)
+
+
 def test_several_logs_are_fitted_together(car: wc.Car, measured: wc.Table, fitted: wc.Fit) -> None:
     half = measured.rows // 2
     parts = [{name: measured[name][part] for name in measured} for part in (slice(0, half), slice(half, None))]
