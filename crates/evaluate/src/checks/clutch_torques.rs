@@ -1,10 +1,10 @@
 //! Clutches whose torque in shifts, by the speeds, changes against that of their valve models: worn plates, a leak, another oil.
 //!
 //! While both clutches of a shift slip, the speeds show the torque of the one that drives the change of speed. Its mean over that of the valve model of the
-//! file differs from 1 by friction, gain and kiss point of this car, and stays what it is. From one shift on it does not where something in the gearbox has changed. The
+//! file differs from 1 by friction, gain and kiss point of this car, and stays what it is in shifts between the same gears. From one shift on it does not where something in the gearbox has changed. The
 //! quantities of the filter pass the bounds of the error budget later, or not at all: it has learnt the car as it was before.
 
-use car::Car;
+use car::{Car, ShiftCommand};
 use drivetrain::Real;
 
 use super::check::{Check, EndedShift};
@@ -36,17 +36,23 @@ struct Sums {
     valve: f64,
 }
 
-/// A shift of an element: its begin, s, and the logarithm of its torque by the speeds over that of the valve model.
-type Compared = (f64, f64);
+/// A shift of an element.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Compared {
+    gears: ShiftCommand,
+    begin_s: f64,
+    /// Logarithm of its torque by the speeds over that of the valve model.
+    ratio: f64,
+}
 
 /// A change of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Change {
     /// Begin of the first shift after it, s.
     since_s: f64,
-    /// Logarithms of the ratio before and after: medians.
-    ratios: [f64; 2],
-    /// Shifts before and after.
+    /// Change of the logarithm of the ratio: the median of the shifts after it against those before between the same gears.
+    size: f64,
+    /// Shifts before and after, between gears that have both.
     shifts: [usize; 2],
     /// Fraction of them that lie on their side of the middle.
     clear: f64,
@@ -83,15 +89,14 @@ impl<'c> ClutchTorques<'c> {
 
     /// The changes in one direction, in a sentence.
     fn sentence(&self, found: &[(usize, Change)], falls: bool) -> Option<String> {
-        let some: Vec<_> = found.iter().filter(|(_, change)| (change.ratios[1] < change.ratios[0]) == falls).collect();
+        let some: Vec<_> = found.iter().filter(|(_, change)| (change.size < 0.0) == falls).collect();
         let since_s = some.iter().map(|(_, change)| change.since_s).reduce(f64::min)?;
         let each = some.iter().map(|(element, change)| {
-            let [before, after] = change.ratios.map(|ratio| 100.0 * Real::exp(ratio));
-            let [shifts_before, shifts] = change.shifts;
             let name = &self.car.gearbox.elements[*element].name;
-            format!("{name} {after:.0} % in {shifts} shifts, before {before:.0} % in {shifts_before}")
+            let [before, after] = change.shifts;
+            format!("{name} {:.0} % of before in {after} shifts (before: {before})", 100.0 * Real::exp(change.size))
         });
-        let each = each.collect::<Vec<_>>().join("; ");
+        let each = each.collect::<Vec<_>>().join(", ");
         let hint = match (falls, some.len() >= MANY) {
             (_, true) => {
                 "check the oil (another fluid, its temperature), the line pressure and the scale of the commands"
@@ -110,31 +115,55 @@ impl<'c> ClutchTorques<'c> {
 
 /// Where the ratio of an element changes most clearly, if it does.
 fn change(shifts: &[Compared]) -> Option<Change> {
-    let split = |at: usize| {
-        let (before, after) = shifts.split_at(at);
-        let ratios = [before, after].map(median);
-        let [low, high] = if ratios[0] < ratios[1] { [before, after] } else { [after, before] };
-        let middle = 0.5 * (ratios[0] + ratios[1]);
-        let below = low.iter().filter(|(_, ratio)| *ratio < middle).count();
-        let above = high.iter().filter(|(_, ratio)| *ratio > middle).count();
-        let is_clear = below as f64 >= FRACTION * low.len() as f64 && above as f64 >= FRACTION * high.len() as f64;
-        ((ratios[1] - ratios[0]).abs() >= CHANGE && is_clear).then(|| Change {
-            since_s: after[0].0,
-            ratios,
-            shifts: [before.len(), after.len()],
-            clear: (below + above) as f64 / shifts.len() as f64,
-        })
-    };
-    let size = |change: &Change| (change.ratios[1] - change.ratios[0]).abs();
-    let all = (BEFORE..(shifts.len() + 1).saturating_sub(AFTER)).filter_map(split);
-    all.max_by(|one, other| one.clear.total_cmp(&other.clear).then(size(one).total_cmp(&size(other))))
+    let all = (BEFORE..(shifts.len() + 1).saturating_sub(AFTER)).filter_map(|at| change_at(shifts, at));
+    all.max_by(|one, other| one.clear.total_cmp(&other.clear).then(one.size.abs().total_cmp(&other.size.abs())))
 }
 
-fn median(shifts: &[Compared]) -> f64 {
-    let mut ratios: Vec<f64> = shifts.iter().map(|(_, ratio)| *ratio).collect();
-    ratios.sort_by(f64::total_cmp);
-    let middle = ratios.len() / 2;
-    if ratios.len().is_multiple_of(2) { 0.5 * (ratios[middle - 1] + ratios[middle]) } else { ratios[middle] }
+/// The change of the ratio between the shifts up to this place and those from it on.
+fn change_at(shifts: &[Compared], at: usize) -> Option<Change> {
+    let (before, after) = shifts.split_at(at);
+    // What the shifts before say of each pair of gears that comes after too.
+    let mut of_gears: Vec<(ShiftCommand, f64)> = Vec::new();
+    for Compared { gears, .. } in after {
+        if of_gears.iter().all(|(known, _)| known != gears) {
+            let ratios: Vec<f64> =
+                before.iter().filter(|shift| shift.gears == *gears).map(|shift| shift.ratio).collect();
+            if !ratios.is_empty() {
+                of_gears.push((*gears, median(ratios)));
+            }
+        }
+    }
+    // By how much each shift is off that.
+    let off = |some: &[Compared]| -> Vec<f64> {
+        let of = |shift: &Compared| {
+            let (_, before) = of_gears.iter().find(|(gears, _)| *gears == shift.gears)?;
+            Some(shift.ratio - before)
+        };
+        some.iter().filter_map(of).collect()
+    };
+    let (off_before, off_after) = (off(before), off(after));
+    if off_before.len() < BEFORE || off_after.len() < AFTER {
+        return None;
+    }
+    let size = median(off_after.clone());
+    let is_beyond = |off: &&f64| **off * size.signum() > 0.5 * size.abs();
+    let beyond = [&off_before, &off_after].map(|off| off.iter().filter(is_beyond).count());
+    let kept = off_before.len() - beyond[0];
+    let is_clear = kept as f64 >= FRACTION * off_before.len() as f64
+        && beyond[1] as f64 >= FRACTION * off_after.len() as f64
+        && size.abs() >= CHANGE;
+    is_clear.then(|| Change {
+        since_s: after[0].begin_s,
+        size,
+        shifts: [off_before.len(), off_after.len()],
+        clear: (kept + beyond[1]) as f64 / (off_before.len() + off_after.len()) as f64,
+    })
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len().is_multiple_of(2) { 0.5 * (values[middle - 1] + values[middle]) } else { values[middle] }
 }
 
 impl Check for ClutchTorques<'_> {
@@ -171,7 +200,8 @@ impl Check for ClutchTorques<'_> {
             if shifts.len() >= KEPT {
                 shifts.remove(0);
             }
-            shifts.push((shift.shift.time_s[0], Real::ln(estimate / valve)));
+            let EndedShift { shift, .. } = shift;
+            shifts.push(Compared { gears: shift.gears, begin_s: shift.time_s[0], ratio: Real::ln(estimate / valve) });
         }
     }
 
@@ -185,17 +215,31 @@ impl Check for ClutchTorques<'_> {
 mod tests {
     use super::*;
 
+    /// Shifts between the same gears, every ten seconds.
     fn shifts(ratios: &[f64]) -> Vec<Compared> {
-        ratios.iter().enumerate().map(|(at, ratio)| (10.0 * at as f64, Real::ln(*ratio))).collect()
+        of_gears(&ratios.iter().map(|ratio| (1, *ratio)).collect::<Vec<_>>())
+    }
+
+    /// Shifts from these gears to the next, every ten seconds.
+    fn of_gears(shifts: &[(usize, f64)]) -> Vec<Compared> {
+        let shift = |(at, (gear, ratio)): (usize, &(usize, f64))| Compared {
+            gears: ShiftCommand::between(*gear, gear + 1),
+            begin_s: 10.0 * at as f64,
+            ratio: Real::ln(*ratio),
+        };
+        shifts.iter().enumerate().map(shift).collect()
     }
 
     #[test]
     fn a_change_that_stays_is_found_where_it_begins() {
         let found = change(&shifts(&[1.0, 1.1, 0.9, 0.5, 0.55, 0.45])).unwrap();
         assert_eq!((found.since_s, found.shifts), (30.0, [3, 3]));
-        assert!((Real::exp(found.ratios[1]) - 0.5).abs() < 1e-9 && found.clear == 1.0);
+        assert!((Real::exp(found.size) - 0.5).abs() < 1e-9 && found.clear == 1.0);
         let rises = change(&shifts(&[1.0, 0.9, 1.6, 1.5, 1.7, 1.6])).unwrap();
-        assert!(rises.ratios[1] > rises.ratios[0] && rises.since_s == 20.0);
+        assert!(rises.size > 0.0 && rises.since_s == 20.0);
+        // Each pair of gears against itself.
+        let found = change(&of_gears(&[(1, 1.0), (2, 2.0), (1, 0.5), (2, 1.0), (1, 0.5)])).unwrap();
+        assert!((Real::exp(found.size) - 0.5).abs() < 1e-9 && found.since_s == 20.0);
     }
 
     #[test]
@@ -206,5 +250,8 @@ mod tests {
         assert_eq!(change(&shifts(&[1.0, 1.0, 0.5, 0.5])), None);
         assert_eq!(change(&shifts(&[1.0, 1.0, 1.0, 0.75, 0.75, 0.75])), None);
         assert_eq!(change(&[]), None);
+        // An offset of the commands weighs more where little torque is transmitted: upshifts first, then others.
+        let others = [(1, 0.9), (2, 0.9), (3, 0.9), (4, 0.9), (5, 0.3), (6, 0.3), (7, 0.3), (8, 0.3)];
+        assert_eq!(change(&of_gears(&others)), None);
     }
 }

@@ -20,7 +20,7 @@ fn said(known: &Car, truth: &Car, kind: Option<FaultKind>) -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let drive = DriveFile::read(&root.join("drives/city.toml")).unwrap().drive;
     let faults = kind.into_iter().map(|kind| Fault { kind, from_s: FROM_S }).collect();
-    let drive = Drive { repetitions: 2, sample_time_s: RECORD_S, faults, ..drive };
+    let drive = Drive { repetitions: 3, sample_time_s: RECORD_S, faults, ..drive };
     let model = CarModel::new(truth.clone()).unwrap();
     let mut recording = Recording::default();
     simulate_car_drive(&model, known, CarCalibration::STANDARD, &drive, |sample| recording.push(sample)).unwrap();
