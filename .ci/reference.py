@@ -338,7 +338,7 @@ def columns():
         sys.exit("columns without a meaning in .ci/reference_columns.py: " + ", ".join(dict.fromkeys(unknown)))
     # Titles of two tables are alike: each heading is one of its own.
     text = "\n".join(page) + "\n"
-    return text.replace("## Its shifts (`OUT_shifts.csv`)", "## Shifts of a car with a gearbox (`OUT_shifts.csv`)", 1).replace(
+    return text.replace("## Its shifts (`OUT_shifts.csv`)", "## Shifts of a car with a gearbox (`OUT_shifts.csv`; without estimates `NAME_shifts.csv` of `simulate`)", 1).replace(
         "## Its shifts (`OUT_shifts.csv`)", "## Shifts of one shift's vehicle file (`OUT_shifts.csv`)", 1
     )
 

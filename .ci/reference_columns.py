@@ -27,7 +27,7 @@ MEANINGS = [
     (r"^held_slip_rad_s$", "slip of an element that has to hold; simulations only"),
     (r"^tie_up_n_m$", "largest torque of the clutches against each other at the turbine; simulations only"),
     (r"^tie_up_estimate_n_m$", "the same by the estimate"),
-    (r"^jerk_m_s3$", "largest [jerk](conventions.md#jerk) of the car"),
+    (r"^jerk_m_s3$", "largest [jerk](conventions.md#jerk) of the car; of a log also 0.45 s before and after the shift"),
     (r"^response_s$", "from the request to the first slip of the old gear"),
     (r"^acceleration_step_m_s2$", "largest excursion of the [acceleration](equations.md#score-of-a-shift) beyond those before and after the shift"),
     (r"^torque_hole_fraction$", "depth of the torque hole over the acceleration before"),

@@ -23,6 +23,8 @@ fn a_folder_of_logs_gives_a_table_by_clutch_gears_and_oil_temperature() {
     };
     let notes = said(&fit(&folder.path("logs"), &["--oil-step", "10"]));
     assert!(notes.contains("adaptation table, oil of 80 to 90 degC: "), "{notes}");
+    let is_kept = notes.contains("warning: the given values are kept");
+    assert_eq!(notes.contains("the fit of all shifts is not accepted"), is_kept, "{notes}");
     let text = folder.read("adaptations.csv");
     let columns = text.lines().next().unwrap().split(',').count();
     assert!(text.starts_with(
@@ -39,13 +41,28 @@ fn a_folder_of_logs_gives_a_table_by_clutch_gears_and_oil_temperature() {
     }
     // An offgoing clutch is not filled.
     assert!(!text.lines().any(|line| line.contains(",offgoing,") && line.contains(",fill time,")), "{text}");
+    // What the program itself wrote is no log: tables of shifts, the truth of a simulation, this table.
+    for name in ["city.csv", "city_measured.csv", "city_shifts.csv"] {
+        std::fs::copy(folder.path(name), folder.path(&format!("logs/{name}"))).unwrap();
+    }
+    // Of the half of the drive that has no temperature in this log it has one in no other.
+    let half: String = warm.lines().take(9000).map(|line| format!("{line}\n")).collect();
+    folder.write("logs/a.csv", with_oil(&half, "85"));
+    folder.write("logs/other_shifts.csv", "number,time_s,from_gear,to_gear,kind\n1,2,1,2,\n");
+    let (in_folder, fitted_there) = (folder.path("logs/adaptations.csv"), folder.path("logs/fitted.toml"));
+    for _ in 0..2 {
+        let options = ["--vehicle", CAR, "-o", &fitted_there, "--adaptation-table", &in_folder];
+        let notes = said(&wetclutch(&[&["fit", &folder.path("logs")], &options[..]].concat()));
+        assert!(notes.contains("some shifts have no oil temperature between -60 and 200 degC"), "{notes}");
+    }
     // It is written again, and over nothing else.
     said(&fit(&log, &["--json"]));
     assert!(folder.read("adaptations.csv").contains("E,all,all,all,,,"));
     folder.write("adaptations.csv", "time_s,a\n0,1\n");
     let error = refused(&fit(&log, &[]));
     assert!(error.contains("exists and is no adaptation table\nhint: "), "{error}");
-    let error = refused(&wetclutch(&["fit", &log, "--vehicle", CAR, "-o", &fitted, "--adaptation-table", &fitted]));
+    let same = folder.path("./fitted.toml");
+    let error = refused(&wetclutch(&["fit", &log, "--vehicle", CAR, "-o", &fitted, "--adaptation-table", &same]));
     assert!(
         error.contains("this is another output of this command\nhint: choose another name after --adaptation-table"),
         "{error}"

@@ -107,7 +107,10 @@ impl RawFault {
             RawKind::Aeration => {
                 FaultKind::Aeration { lag_factor: number("lag_factor", &self.lag_factor, 0.1..=100.0)? }
             }
-            RawKind::GlazedPlates => FaultKind::GlazedPlates { element: element()?, friction_factor: friction()? },
+            RawKind::GlazedPlates => FaultKind::GlazedPlates {
+                element: element()?,
+                friction_factor: number("friction_factor", &self.friction_factor, 0.0..=1.0)?,
+            },
             RawKind::SpeedSensor => {
                 let sensor = self.sensor.as_ref().ok_or_else(|| self.missing(check, "sensor"))?;
                 let reading = self.reading.as_ref().ok_or_else(|| self.missing(check, "reading"))?;
@@ -262,7 +265,7 @@ mod tests {
             ("kind = \"swapped-solenoids\"\nelements = [\"C\", \"C\"]", "`elements` has to name two elements"),
             ("kind = \"speed-sensor\"\nsensor = \"turbine\"", "`reading` is missing"),
             ("kind = \"speed-sensor\"\nsensor = \"car\"\nreading = \"zero\"", "unknown variant `car`"),
-            ("kind = \"glazed-plates\"\nelement = \"C\"\nfriction_factor = -1", "is -1, expected 0 to 10"),
+            ("kind = \"glazed-plates\"\nelement = \"C\"\nfriction_factor = 2", "is 2, expected 0 to 1"),
             ("kind = \"line-pressure\"\npressure_pa = -1", "is -1, expected 0 to"),
             ("kind = \"line-pressure\"\npressure_pa = nan", "fault.pressure_pa"),
             ("kind = \"broken\"", "unknown variant `broken`"),

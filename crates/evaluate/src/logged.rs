@@ -388,8 +388,7 @@ impl<'c> LoggedDrive<'c> {
         if self.checks.slipping.is_found() {
             self.checks.torques.leave_out();
         }
-        // The quantities of the filter say the same later, and may take an element for another.
-        let of_car = self.beyond_bounds.warning(self.car, self.tables).filter(|_| !self.checks.torques.is_found());
+        let of_car = self.beyond_bounds.warning(self.car, self.tables);
         let late = late_speeds::warnings(self.state.speeds_late_s(), self.filter.longest_found_s());
         let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings());
         let warnings = warnings.chain(late).chain(of_car).collect();

@@ -55,11 +55,13 @@ impl MeasuredRow {
     }
 }
 
-/// Speed sensors that fail on a drive.
+/// Speed sensors that fail on a drive, in the order of the times, s, from which on they do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FailedSensors {
-    /// Place of the speed in a row, what it reads, since when, s, and the reading before.
-    failed: Vec<(usize, FailedReading, f64, [f64; 2])>,
+    /// Place of the speed in a row, what it reads, and since when.
+    failed: Vec<(usize, FailedReading, f64)>,
+    /// The last readings before a sensor has failed, or the first ones.
+    frozen: [f64; 4],
 }
 
 impl FailedSensors {
@@ -68,29 +70,32 @@ impl FailedSensors {
         let failed = faults.iter().filter_map(|fault| match fault.kind {
             FaultKind::SpeedSensor { sensor, reading } => {
                 let place = FailedSensor::ALL.iter().position(|other| *other == sensor)?;
-                Some((place, reading, fault.from_s, [f64::NAN, 0.0]))
+                Some((place, reading, fault.from_s))
             }
             _ => None,
         });
-        Self { failed: failed.collect() }
+        let mut failed: Vec<_> = failed.collect();
+        failed.sort_by(|one, other| one.2.total_cmp(&other.2));
+        Self { failed, frozen: [f64::NAN; 4] }
     }
 
-    /// What is read of a row.
+    /// What is read of a row; the last fault of a sensor holds.
     pub fn read(&mut self, row: &MeasuredRow) -> MeasuredRow {
         let mut read = *row;
-        for (place, reading, from_s, before) in &mut self.failed {
-            let speed = &mut read.speeds[*place];
-            if row.sample.time_s < *from_s {
-                *before = if speed[0].is_nan() { *before } else { *speed };
-                continue;
+        for (place, [sound, _]) in row.speeds.iter().enumerate() {
+            let of_sensor = self.failed.iter().rfind(|(of, _, from_s)| *of == place && row.sample.time_s >= *from_s);
+            let frozen = &mut self.frozen[place];
+            if !sound.is_nan() && (of_sensor.is_none() || frozen.is_nan()) {
+                *frozen = *sound;
             }
             // A sensor that reads nothing at a time reads nothing.
-            let value = match reading {
-                FailedReading::Zero => 0.0,
-                FailedReading::Frozen => before[0],
-                FailedReading::None => f64::NAN,
-            };
-            speed[0] = if speed[0].is_nan() { speed[0] } else { value };
+            if let Some((_, reading, _)) = of_sensor.filter(|_| !sound.is_nan()) {
+                read.speeds[place][0] = match reading {
+                    FailedReading::Zero => 0.0,
+                    FailedReading::Frozen => *frozen,
+                    FailedReading::None => f64::NAN,
+                };
+            }
         }
         read
     }

@@ -57,6 +57,24 @@ pub struct ScoredShift {
 }
 
 impl ScoredShift {
+    /// One that is none: its cells have the titles of a table without shifts.
+    pub fn none() -> Self {
+        Self {
+            number: 0,
+            gears: ShiftCommand::NEUTRAL,
+            kind: None,
+            is_garage: false,
+            elements: [None; 2],
+            time_s: [0.0; 2],
+            quality: CarShiftQuality::default(),
+            comfort: None,
+            plates_degc: None,
+            rows: Vec::new(),
+            summary: ShiftSummary::default(),
+            is_drawn: false,
+        }
+    }
+
     /// Leaves out what only its figure needs.
     pub(crate) fn leave_undrawn(&mut self) {
         (self.rows, self.is_drawn) = (Vec::new(), false);

@@ -53,6 +53,10 @@ impl ShiftJerk {
     pub(crate) fn begin(&mut self, time_s: f64) -> Option<f64> {
         let before = self.until_s.filter(|until_s| until_s.is_finite()).and_then(|_| self.jerk_m_s3());
         self.speeds.retain(|(speed_s, _)| *speed_s >= time_s - AROUND_S);
+        if self.speeds.is_empty() {
+            // A channel that has ended leaves its place to the next one.
+            self.source = None;
+        }
         self.until_s = Some(f64::INFINITY);
         before
     }

@@ -15,7 +15,7 @@ use crate::commands::assumed::{detail_of_map, detail_of_vehicle};
 use crate::commands::logs_of::logs_of;
 use crate::commands::page::{check_page, write_html};
 use crate::commands::written::{head, replaces_only};
-use crate::commands::{channel_map_of_car, check_output, not_an_input, write_text};
+use crate::commands::{channel_map_of_car, check_output, is_same_file, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -26,7 +26,8 @@ const MAP_MARK: &str = "# Written by `wetclutch fit`, with the delays, scales an
 
 pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
-    let log_files = logs_of(&options.logs)?;
+    let outputs = [Some(&options.output), options.adaptation_table.as_ref(), options.write_map.as_ref()];
+    let log_files = logs_of(&options.logs, &outputs.into_iter().flatten().collect::<Vec<_>>())?;
     let inputs = || {
         let files = log_files.iter().chain(&options.sensors).chain([&options.vehicle]);
         files.chain(options.mapping.files())
@@ -83,7 +84,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
 /// Checks the new channel map before the work starts.
 fn check_map<'a>(options: &'a Fit, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<(), Failure> {
     let Some(new) = &options.write_map else { return Ok(()) };
-    if [Some(&options.output), options.page.page.as_ref()].contains(&Some(new)) {
+    if [Some(&options.output), options.page.page.as_ref()].into_iter().flatten().any(|other| is_same_file(other, new)) {
         let message = format!(
             "{}: this is another output of this command\nhint: choose another name after --write-map",
             new.shown()
@@ -120,7 +121,8 @@ fn report_map(options: &Fit, found: &Fitted, left_out: &[String]) {
 /// Checks the adaptation table before the work starts.
 fn check_table<'a>(options: &'a Fit, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<(), Failure> {
     let Some(table) = &options.adaptation_table else { return Ok(()) };
-    if [Some(&options.output), options.page.page.as_ref(), options.write_map.as_ref()].contains(&Some(table)) {
+    let others = [Some(&options.output), options.page.page.as_ref(), options.write_map.as_ref()];
+    if others.into_iter().flatten().any(|other| is_same_file(other, table)) {
         let message = format!(
             "{}: this is another output of this command\nhint: choose another name after --adaptation-table",
             table.shown()
@@ -146,6 +148,7 @@ fn report_table(options: &Fit, found: &Fitted) {
     let open = rows.iter().filter(|row| !row.lacks.is_empty()).count();
     let mut oil: Vec<[f64; 2]> = rows.iter().filter_map(|row| row.oil_degc).collect();
     oil.dedup();
+    let is_without_oil = oil.is_empty();
     let oil = match oil.as_slice() {
         [] => "without oil temperatures".to_owned(),
         [one] => format!("oil of {}", degrees(*one)),
@@ -156,7 +159,19 @@ fn report_table(options: &Fit, found: &Fitted) {
         table.shown(),
         rows.len()
     ));
-    adaptations.warnings.iter().for_each(|warning| output::note(warning));
+    let without = rows.iter().filter(|row| row.oil_degc.is_none() && row.shift.is_some()).map(|row| row.shifts).max();
+    if let (Some(1..), false) = (without, is_without_oil) {
+        output::note(&format!(
+            "warning: {}: some shifts have no oil temperature between -60 and 200 degC, and rows of their own\nhint: check the channel `oil_temperature` and its unit",
+            table.shown()
+        ));
+    }
+    if found.kept.is_some() {
+        output::note(&format!(
+            "warning: {}: the fit of all shifts is not accepted, and its corrections of the channels are in this table\nhint: use it after the reason is known",
+            table.shown()
+        ));
+    }
 }
 
 /// Temperatures for people.

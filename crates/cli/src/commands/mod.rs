@@ -105,13 +105,17 @@ fn warn_of_sensors() {
 
 /// Writes rows of named cells as a comma-separated file, whole or not at all.
 fn write_cells(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<(), Failure> {
-    cells_file(path, rows)?.finish().map_err(|error| Failure::writing(path, &error))
+    let names = rows.first().into_iter().flatten().map(|(name, _)| name.as_str());
+    cells_file(path, names, rows)?.finish().map_err(|error| Failure::writing(path, &error))
 }
 
 /// A comma-separated file of rows of named cells, which has not got its name yet.
-fn cells_file(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<WholeFile, Failure> {
+fn cells_file<'n>(
+    path: &Path,
+    names: impl Iterator<Item = &'n str>,
+    rows: &[Vec<(String, Cell<'_>)>],
+) -> Result<WholeFile, Failure> {
     let write = || -> std::io::Result<WholeFile> {
-        let names = rows.first().into_iter().flatten().map(|(name, _)| name.as_str());
         let mut table = CsvWriter::without_time(WholeFile::create(path)?, names)?;
         for row in rows {
             table.cells(row.iter().map(|(_, cell)| *cell))?;
@@ -193,6 +197,15 @@ fn not_an_input<'a>(output: Option<&PathBuf>, inputs: impl IntoIterator<Item = &
             input.shown()
         ))),
     }
+}
+
+/// Whether two paths, of files that may not be there yet, are of one file.
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        (folder.canonicalize().unwrap_or_else(|_| folder.to_owned()), path.file_name().map(ToOwned::to_owned))
+    };
+    place(one) == place(other)
 }
 
 /// The channel map of the options for a log of a car; a map without the radius of the wheels takes that of the car.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use car::{Car, Sensors};
 use config::DriveFile;
+use evaluate::drive::ScoredShift;
 use evaluate::measured::MeasuredRow;
 use plant::car::{CarModel, OverSpeed};
 use report::drive_page::simulated_shift_cells;
@@ -15,6 +16,7 @@ use wetclutch::simulate::{DriveColumn, SimulatedShifts, drive_columns, measured_
 
 use super::car::{describe_car, read_car, warn_of_slipping};
 use super::simulate::{print, replaces_only_simulated, size_note};
+use super::written::{head, replaces_only};
 use super::{cells_file, not_an_input};
 use crate::args::Simulate;
 use crate::failure::Failure;
@@ -48,7 +50,8 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     let [whole, measured] = paths(&options.output, &name);
     let of_shifts = options.output.join(format!("{name}_shifts.csv"));
     not_an_input(Some(&of_shifts), inputs)?;
-    replaces_only_simulated(&[whole, measured, of_shifts.clone()])?;
+    replaces_only_simulated(&[whole, measured])?;
+    replaces_only("table of shifts of a simulation", &of_shifts, is_of_simulation)?;
     let mut tables = DriveTables::create(&options.output, &name, &car, sensors_of(drive))?;
     let model = CarModel::new(car.car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
     let mut shifts = SimulatedShifts::new(&car, &model);
@@ -58,7 +61,9 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     })?;
     let shifts = shifts.finish();
     let cells: Vec<_> = shifts.iter().map(|shift| simulated_shift_cells(shift, &car)).collect();
-    let paths = tables.finish(&options.output, vec![(cells_file(&of_shifts, &cells)?, of_shifts)])?;
+    let titles = simulated_shift_cells(&ScoredShift::none(), &car);
+    let titles = titles.iter().map(|(name, _)| name.as_str());
+    let paths = tables.finish(&options.output, vec![(cells_file(&of_shifts, titles, &cells)?, of_shifts)])?;
     output::note(&format!(
         "drive: {:.0} s, {:.2} km{}, {} shifts, at most {}",
         summary.duration_s,
@@ -91,6 +96,13 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
         "speed_error": speed_error,
     });
     print(options, &paths, &about)
+}
+
+/// Whether a table of shifts is of a simulation: it has no estimates.
+fn is_of_simulation(path: &Path) -> bool {
+    head(path).lines().next().is_some_and(|titles| {
+        titles.is_empty() || titles.contains(",acceleration_source,offgoing_friction_work_j,oncoming_friction_work_j")
+    })
 }
 
 /// What of a distance was driven backwards, in words; nothing where it is too short to be shown.

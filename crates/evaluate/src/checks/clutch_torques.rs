@@ -12,8 +12,8 @@ use crate::ShiftScoreRow;
 
 /// Rows of a shift that are needed \[chosen\].
 const ENOUGH_ROWS: u32 = 8;
-/// Torque of a valve model that is compared at least, N m, and largest standard deviation of the estimate over it \[chosen\].
-const MIN_N_M: f64 = 4.0;
+/// Torque by the valve model and torque by the speeds from which on they are compared, N m, and largest standard deviation of the estimate over it \[chosen\].
+const MIN_N_M: [f64; 2] = [15.0, 8.0];
 const MAX_STD_DEV: f64 = 0.3;
 /// Shifts before and after a change that are needed \[chosen\].
 const BEFORE: usize = 2;
@@ -22,8 +22,11 @@ const AFTER: usize = 3;
 const CHANGE: f64 = 0.357;
 /// Fraction of the shifts on both sides that lie on their side of the middle \[chosen\].
 const FRACTION: f64 = 0.8;
-/// Shifts of an element that are kept: the last ones.
+/// Shifts of an element that are kept: as many of the first as of the last ones.
 const KEPT: usize = 200;
+/// Shifts are compared in which the torque by the valve model, or that by the speeds, differs by this factor at most \[chosen\]: an error of the kiss point
+/// is one of the pressure, and weighs more in a shift with little torque. A controller may command more where a clutch is weak.
+const SIMILAR: f64 = 1.6;
 /// Elements from which on a change is taken to be one of the oil.
 const MANY: usize = 3;
 
@@ -41,8 +44,17 @@ struct Sums {
 struct Compared {
     gears: ShiftCommand,
     begin_s: f64,
-    /// Logarithm of its torque by the speeds over that of the valve model.
+    /// Logarithms of its torque by the valve model, N m, and of that by the speeds over it.
+    valve: f64,
     ratio: f64,
+}
+
+impl Compared {
+    /// Whether it can be compared with another one.
+    fn is_like(&self, other: &Self) -> bool {
+        let [valve, speeds] = [self.valve - other.valve, self.valve + self.ratio - other.valve - other.ratio];
+        self.gears == other.gears && valve.abs().min(speeds.abs()) <= Real::ln(SIMILAR)
+    }
 }
 
 /// A change of an element.
@@ -75,11 +87,6 @@ impl<'c> ClutchTorques<'c> {
     /// The elements that have changed.
     fn found(&self) -> Vec<(usize, Change)> {
         self.shifts.iter().enumerate().filter_map(|(element, shifts)| Some((element, change(shifts)?))).collect()
-    }
-
-    /// Whether an element has changed.
-    pub(crate) fn is_found(&self) -> bool {
-        !self.found().is_empty()
     }
 
     /// Leaves out what the shifts show: another check explains it.
@@ -122,26 +129,16 @@ fn change(shifts: &[Compared]) -> Option<Change> {
 /// The change of the ratio between the shifts up to this place and those from it on.
 fn change_at(shifts: &[Compared], at: usize) -> Option<Change> {
     let (before, after) = shifts.split_at(at);
-    // What the shifts before say of each pair of gears that comes after too.
-    let mut of_gears: Vec<(ShiftCommand, f64)> = Vec::new();
-    for Compared { gears, .. } in after {
-        if of_gears.iter().all(|(known, _)| known != gears) {
-            let ratios: Vec<f64> =
-                before.iter().filter(|shift| shift.gears == *gears).map(|shift| shift.ratio).collect();
-            if !ratios.is_empty() {
-                of_gears.push((*gears, median(ratios)));
-            }
-        }
-    }
-    // By how much each shift is off that.
-    let off = |some: &[Compared]| -> Vec<f64> {
+    // By how much each shift is off those before that are like it.
+    let off = |some: &[Compared], is_used: &dyn Fn(&Compared) -> bool| -> Vec<f64> {
         let of = |shift: &Compared| {
-            let (_, before) = of_gears.iter().find(|(gears, _)| *gears == shift.gears)?;
-            Some(shift.ratio - before)
+            let alike: Vec<f64> = before.iter().filter(|other| other.is_like(shift)).map(|other| other.ratio).collect();
+            (!alike.is_empty()).then(|| shift.ratio - median(alike))
         };
-        some.iter().filter_map(of).collect()
+        some.iter().filter(|shift| is_used(shift)).filter_map(of).collect()
     };
-    let (off_before, off_after) = (off(before), off(after));
+    let comes_after = |shift: &Compared| after.iter().any(|other| other.is_like(shift));
+    let (off_before, off_after) = (off(before, &comes_after), off(after, &|_| true));
     if off_before.len() < BEFORE || off_after.len() < AFTER {
         return None;
     }
@@ -193,15 +190,23 @@ impl Check for ClutchTorques<'_> {
 
     fn end(&mut self, shift: &EndedShift<'_>) {
         for (Sums { rows, estimate, std_dev, valve }, shifts) in self.sums.iter().copied().zip(&mut self.shifts) {
-            let is_shown = rows >= ENOUGH_ROWS && valve >= MIN_N_M * f64::from(rows) && std_dev <= MAX_STD_DEV * valve;
-            if !is_shown || shift.completed.is_none() || estimate <= 0.0 {
+            let is_shown = rows >= ENOUGH_ROWS
+                && valve >= MIN_N_M[0] * f64::from(rows)
+                && estimate >= MIN_N_M[1] * f64::from(rows)
+                && std_dev <= MAX_STD_DEV * valve;
+            if !is_shown || shift.completed.is_none() {
                 continue;
             }
             if shifts.len() >= KEPT {
-                shifts.remove(0);
+                shifts.remove(KEPT / 2);
             }
             let EndedShift { shift, .. } = shift;
-            shifts.push(Compared { gears: shift.gears, begin_s: shift.time_s[0], ratio: Real::ln(estimate / valve) });
+            shifts.push(Compared {
+                gears: shift.gears,
+                begin_s: shift.time_s[0],
+                valve: Real::ln(valve / f64::from(rows)),
+                ratio: Real::ln(estimate / valve),
+            });
         }
     }
 
@@ -225,6 +230,7 @@ mod tests {
         let shift = |(at, (gear, ratio)): (usize, &(usize, f64))| Compared {
             gears: ShiftCommand::between(*gear, gear + 1),
             begin_s: 10.0 * at as f64,
+            valve: 3.0,
             ratio: Real::ln(*ratio),
         };
         shifts.iter().enumerate().map(shift).collect()
@@ -253,5 +259,9 @@ mod tests {
         // An offset of the commands weighs more where little torque is transmitted: upshifts first, then others.
         let others = [(1, 0.9), (2, 0.9), (3, 0.9), (4, 0.9), (5, 0.3), (6, 0.3), (7, 0.3), (8, 0.3)];
         assert_eq!(change(&of_gears(&others)), None);
+        // Nor are shifts with another throttle.
+        let mut shifts = shifts(&[0.9, 0.9, 0.9, 0.5, 0.5, 0.5]);
+        shifts[3..].iter_mut().for_each(|shift| shift.valve = 2.0);
+        assert_eq!(change(&shifts), None);
     }
 }

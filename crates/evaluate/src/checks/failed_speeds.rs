@@ -26,6 +26,8 @@ struct Usable {
     last_s: f64,
     /// Time in which another shaft has run since, s.
     without_s: f64,
+    /// Whether the newest usable reading is zero: a shaft that stands, or a dead sensor.
+    stands: bool,
 }
 
 impl Check for FailedSpeeds {
@@ -41,16 +43,18 @@ impl Check for FailedSpeeds {
             let Reading { value, .. } = reading.filter(|of| of.value.is_finite() && !health.is_refused())?;
             Some(value)
         });
+        let turns = |at: usize| usable[at].is_some_and(|rad_s: f64| rad_s.abs() > RUNS_RAD_S);
         for (at, speed) in self.speeds.iter_mut().enumerate() {
-            let others = usable.iter().enumerate().filter(|(other, _)| *other != at);
-            // A zero may be a shaft that stands, or a sensor that is dead.
-            if usable[at].is_some_and(|rad_s| rad_s.abs() < STANDS_RAD_S) {
-                continue;
-            }
-            if usable[at].is_some() {
-                *speed = Usable { count: speed.count + 1, last_s: row.step.time_s, without_s: 0.0 };
-            } else if others.into_iter().any(|(_, other)| other.is_some_and(|rad_s| rad_s.abs() > RUNS_RAD_S)) {
-                speed.without_s += input.dt_s.clamp(0.0, 1.0);
+            match usable[at] {
+                Some(rad_s) if rad_s.abs() < STANDS_RAD_S => speed.stands = true,
+                Some(_) => *speed = Usable { count: speed.count + 1, last_s: row.step.time_s, ..Usable::default() },
+                // Of a shaft that stands the next reading may come late; it does not stand while the car moves.
+                None => {
+                    let others = if speed.stands { 2..4 } else { 0..4 };
+                    if others.into_iter().any(|other| other != at && turns(other)) {
+                        speed.without_s += input.dt_s.clamp(0.0, 1.0);
+                    }
+                }
             }
         }
     }

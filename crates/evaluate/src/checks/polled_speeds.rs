@@ -41,10 +41,8 @@ pub(super) struct PolledSpeeds {
 struct PolledSpeed {
     /// Times, s, and values, rad/s, of the window.
     window: VecDeque<(f64, f64)>,
-    /// By period: windows that tell something, and how far their times lie on its grid.
-    windows: [(u32, f64); PERIODS_S.len()],
-    /// Sum of the steps between readings, s, and their number, in these windows.
-    steps: (f64, u32),
+    /// By period: windows that tell something, how far their times lie on its grid, and the sum of the steps between their readings, s.
+    windows: [(u32, f64, f64); PERIODS_S.len()],
 }
 
 impl PolledSpeed {
@@ -81,7 +79,7 @@ impl PolledSpeed {
             let length = on_grid(&|i| self.window[i].0 - ages_s.age_s[i]);
             self.windows[at].0 += 1;
             self.windows[at].1 += WINDOW as f64 * length * length;
-            self.steps = (self.steps.0 + step_s, self.steps.1 + 1);
+            self.windows[at].2 += step_s;
         }
     }
 
@@ -113,9 +111,10 @@ impl PolledSpeed {
     /// The period with which the speed is measured, and the step with which it is read, s, where they differ.
     fn period_s(&self) -> Option<(f64, f64)> {
         let is_sure =
-            |(windows, sum): &(u32, f64)| *windows >= ENOUGH && *sum >= SURE[0] + SURE[1] * f64::from(*windows);
+            |(windows, sum, _): &(u32, f64, f64)| *windows >= ENOUGH && *sum >= SURE[0] + SURE[1] * f64::from(*windows);
         let at = self.windows.iter().position(is_sure)?;
-        Some((PERIODS_S[at], self.steps.0 / f64::from(self.steps.1)))
+        let (windows, _, steps_s) = self.windows[at];
+        Some((PERIODS_S[at], steps_s / f64::from(windows)))
     }
 }
 
@@ -139,18 +138,22 @@ impl Check for PolledSpeeds {
     fn warnings(&self) -> Vec<String> {
         let found: Vec<(&str, (f64, f64))> =
             NAMES.into_iter().zip(&self.speeds).filter_map(|(name, speed)| Some((name, speed.period_s()?))).collect();
-        let Some((_, (period_s, step_s))) = found.first() else { return Vec::new() };
-        let names: Vec<&str> = found.iter().map(|(name, _)| *name).collect();
-        let [period_ms, step_ms, mean_s] = [1e3 * period_s, 1e3 * step_s, 0.5 * period_s];
-        vec![format!(
-            "warning: {} measured every {period_ms:.0} ms and read every {step_ms:.0} ms: a reading is 0 to {period_ms:.0} ms old, and its time does not \
-             say how much\nhint: record at {period_ms:.0} ms or faster; for this log `delay_s = {mean_s}` of these channels in the map is the mean age",
-            match names.as_slice() {
-                [one] => format!("{one} is"),
-                [others @ .., last] => format!("{} and {last} are", others.join(", ")),
-                [] => String::new(),
-            }
-        )]
+        let sentence = |period_s: f64| {
+            let of_period: Vec<_> = found.iter().filter(|(_, (of, _))| *of == period_s).collect();
+            let (_, (_, step_s)) = of_period.first()?;
+            let names: Vec<&str> = of_period.iter().map(|(name, _)| *name).collect();
+            let [period_ms, step_ms, mean_s] = [1e3 * period_s, 1e3 * step_s, 0.5 * period_s];
+            Some(format!(
+                "warning: {} measured every {period_ms:.0} ms and read every {step_ms:.0} ms: a reading is 0 to {period_ms:.0} ms old, and its time does not \
+                 say how much\nhint: record at {period_ms:.0} ms or faster; for this log `delay_s = {mean_s}` of these channels in the map is the mean age",
+                match names.as_slice() {
+                    [one] => format!("{one} is"),
+                    [others @ .., last] => format!("{} and {last} are", others.join(", ")),
+                    [] => String::new(),
+                }
+            ))
+        };
+        PERIODS_S.into_iter().filter_map(sentence).collect()
     }
 }
 

@@ -27,8 +27,9 @@ use crate::{FitError, Verdict};
 
 /// Shifts of a group with which its values are checked by each other \[chosen\].
 const SHIFTS_WANTED: usize = 5;
-/// Shifts of a group that are fitted; more are thinned evenly.
-const SHIFTS_MAX: usize = 200;
+/// Shifts between two gears, and of all gears together, that are fitted; more are thinned evenly.
+const SHIFTS_MAX: usize = 80;
+const ALL_SHIFTS_MAX: usize = 200;
 /// Step for the derivatives of a fill time by the unknowns.
 const STEP: f64 = 0.02;
 
@@ -152,6 +153,19 @@ pub struct AdaptedValue {
     pub verdict: Verdict,
 }
 
+impl AdaptedValue {
+    /// The same with an interval that is as wide as another one at least.
+    fn no_better_than(self, other: &Self) -> Self {
+        let [low, high] = other.interval;
+        if other.fraction <= self.fraction || high - low <= self.interval[1] - self.interval[0] {
+            return self;
+        }
+        let half = 0.5 * (high - low);
+        let interval = [(self.value - half).max(self.interval[0].min(0.0)), self.value + half];
+        Self { interval, fraction: other.fraction, verdict: other.verdict, ..self }
+    }
+}
+
 /// Adaptations of all clutches.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Adaptations {
@@ -187,9 +201,8 @@ pub fn adaptations(
     step_k: f64,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Adaptations, FitError> {
-    let shifts = of.fit.corrected(shifts, of.tables);
     let mut groups: BTreeMap<Group, Vec<&ShiftLog>> = BTreeMap::new();
-    for log in &shifts {
+    for log in shifts {
         let step = log.oil_degc.map(|degc| (degc / step_k).floor() as i64);
         groups.entry((step, None)).or_default().push(log);
         groups.entry((step, Some(log.gears))).or_default().push(log);
@@ -256,11 +269,12 @@ impl Fitted<'_> {
         logs: &[&ShiftLog],
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Vec<Adaptation>, FitError> {
-        // Of each pair of gears as many as of the others.
+        // Every so many of each pair of gears.
         let mut logs = logs.to_vec();
         logs.sort_by_key(|log| log.gears);
-        let some = SHIFTS_MAX.min(logs.len());
+        let some = (if gears.is_some() { SHIFTS_MAX } else { ALL_SHIFTS_MAX }).min(logs.len());
         let logs: Vec<ShiftLog> = (0..some).map(|i| logs[i * logs.len() / some].clone()).collect();
+        let logs = self.fit.corrected(&logs, self.tables);
         let fit = match fit_with(self.car, self.tables, &logs, (self.driving, &self.fit.balances), progress) {
             Ok((fit, _)) => Some(fit.known_no_better_than(self.fit)),
             Err(FitError::Stopped) => return Err(FitError::Stopped),
@@ -279,7 +293,9 @@ impl Fitted<'_> {
                 continue;
             }
             let clutch = self.tables.element_at(place).and_then(|element| self.car.clutches[element].as_ref());
-            let found = fit.as_ref().zip(clutch).map(|(fit, clutch)| GroupFit { car: self.car, clutch, fit, place });
+            let of = |fit, clutch| GroupFit { car: self.car, clutch, fit, place };
+            let found = fit.as_ref().zip(clutch).map(|(fit, clutch)| of(fit, clutch));
+            let of_all = clutch.map(|clutch| of(self.fit, clutch));
             let quantities = Adapted::ALL.into_iter().filter(|quantity| match quantity {
                 // A fill is over before an offgoing clutch slips.
                 Adapted::FillTime => role != Some(ShiftRole::Offgoing),
@@ -289,6 +305,9 @@ impl Fitted<'_> {
             });
             for quantity in quantities {
                 let found = found.as_ref().and_then(|found| found.value(quantity));
+                // A fill time is one of several quantities, each known no better than by all shifts.
+                let all = of_all.as_ref().and_then(|of| of.value(quantity));
+                let found = found.map(|found| all.map_or(found, |all| found.no_better_than(&all)));
                 rows.push(Adaptation {
                     element: self.fit.quantities.elements[place].clone(),
                     shift: shift.clone(),

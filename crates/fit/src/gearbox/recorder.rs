@@ -1,5 +1,7 @@
 //! From the steps of a log to its shifts.
 
+use std::ops::RangeInclusive;
+
 use car::{Car, Gear, ShiftCommand};
 use observer::Reading;
 use observer::ShiftTables;
@@ -15,6 +17,8 @@ const BEFORE_S: f64 = 2.0;
 const AFTER_S: f64 = 0.5;
 /// Longest shift, s.
 const LONGEST_S: f64 = 5.0;
+/// Temperatures that an oil can have, degC: kelvin are none.
+const OIL_DEGC: RangeInclusive<f64> = -60.0..=200.0;
 /// Readings of a channel above which old ones are dropped.
 const READINGS_KEPT: usize = 4000;
 /// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and fraction by which they may differ.
@@ -119,7 +123,7 @@ impl<'a> Recorder<'a> {
 
     /// Takes the temperature of the oil at the next step, degC, where the log has it.
     pub fn push_oil_temperature(&mut self, oil_degc: Option<f64>) {
-        self.oil_degc = oil_degc.filter(|degc| degc.is_finite()).or(self.oil_degc);
+        self.oil_degc = oil_degc.filter(|degc| OIL_DEGC.contains(degc)).or(self.oil_degc);
     }
 
     /// Takes a step.

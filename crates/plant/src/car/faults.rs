@@ -129,11 +129,12 @@ pub(super) fn changed(model: &CarModel, faults: &[Fault]) -> Result<Vec<(f64, Ca
 
 /// Friction over slip that falls to a part of what it was, along a line up to [`GLAZED_RAD_S`].
 fn glazed(friction: &Table1<f64>, factor: f64) -> Result<Table1<f64>, CarError> {
-    const POINTS: usize = 9;
-    let slips: Vec<f64> = (0..POINTS).map(|at| GLAZED_RAD_S * at as f64 / (POINTS - 1) as f64).collect();
+    /// Slips at which the new table has points, rad/s.
+    const SLIPS_RAD_S: [f64; 16] =
+        [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 50.0, 75.0, 100.0, 150.0, 250.0, 450.0, 700.0];
     let part = |slip: f64| 1.0 + (factor - 1.0) * (slip / GLAZED_RAD_S).min(1.0);
-    let values: Vec<f64> = slips.iter().map(|slip| part(*slip) * friction.at(*slip)).collect();
-    Table1::new(&slips, &values).map_err(|error| CarError::Request(error.to_string()))
+    let values = SLIPS_RAD_S.map(|slip| part(slip) * friction.at(slip));
+    Table1::new(&SLIPS_RAD_S, &values).map_err(|error| CarError::Request(error.to_string()))
 }
 
 /// The place of a clutch or brake.

@@ -62,6 +62,7 @@ pub(super) fn fit(
         go_on()
     };
     let adapted = options.oil_step_k.map(|step_k| adaptations(all, &shifts, step_k, &mut adapting)).transpose()?;
+    adapted.iter().flat_map(|adapted| &adapted.warnings).for_each(|warning| say(warning));
     progress(FitProgress::Validating);
     let output = options.output.as_deref().unwrap_or(&file.source.path);
     let given = GivenFile { path: &file.source.path, text: &file.source.text, gearbox: &file.gearbox_source.path };

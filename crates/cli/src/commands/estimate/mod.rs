@@ -24,6 +24,7 @@ use self::outputs::{beside, remove_old};
 use crate::args::{Estimate, FormatChoice};
 use crate::browser;
 use crate::commands::assumed::{detail_of_map, detail_of_vehicle};
+use crate::commands::is_same_file;
 use crate::commands::{
     JsonObject, channel_map_of_car, check_output, not_an_input, warn_without_effect, without_effect, write_text,
 };
@@ -398,13 +399,9 @@ fn several<S: Sync>(
 
 /// Refuses a file of `--learnt` that an estimate would go into. It need not be there yet.
 fn not_the_learnt(options: &Estimate, outputs: &[PathBuf]) -> Result<(), Failure> {
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        (folder.canonicalize().unwrap_or_else(|_| folder.to_owned()), path.file_name().map(ToOwned::to_owned))
-    };
     let Some(learnt) = &options.learnt else { return Ok(()) };
     let written = |output: &PathBuf| outputs::beside(output).into_iter().flatten().chain([output.clone()]);
-    match outputs.iter().flat_map(written).any(|written| place(&written) == place(learnt)) {
+    match outputs.iter().flat_map(written).any(|written| is_same_file(&written, learnt)) {
         false => Ok(()),
         true => Err(Failure::Input(format!(
             "{}: an estimate goes into this file\nhint: choose another name after --learnt",
