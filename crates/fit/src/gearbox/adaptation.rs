@@ -305,8 +305,8 @@ impl Fitted<'_> {
             });
             for quantity in quantities {
                 let found = found.as_ref().and_then(|found| found.value(quantity));
-                // A fill time is one of several quantities, each known no better than by all shifts.
-                let all = of_all.as_ref().and_then(|of| of.value(quantity));
+                // A fill time follows from several unknowns, each of which is known no better than by all shifts.
+                let all = of_all.as_ref().filter(|_| quantity == Adapted::FillTime).and_then(|of| of.value(quantity));
                 let found = found.map(|found| all.map_or(found, |all| found.no_better_than(&all)));
                 rows.push(Adaptation {
                     element: self.fit.quantities.elements[place].clone(),
