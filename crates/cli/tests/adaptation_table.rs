@@ -69,6 +69,20 @@ fn a_folder_of_logs_gives_a_table_by_clutch_gears_and_oil_temperature() {
     );
 }
 
+/// A table of shifts of a simulation replaces one of a simulation, and no table of estimates.
+#[test]
+fn a_simulation_keeps_tables_of_shifts_of_others() {
+    let (folder, _) = town();
+    let simulate = || wetclutch(&["simulate", &folder.path("city.toml"), "--vehicle", CAR, "-o", &folder.path("")]);
+    said(&simulate());
+    for other in ["number,time_s,from_gear,to_gear,worst_health\n1,2,1,2,good\n", "\nmy notes\n"] {
+        folder.write("city_shifts.csv", other);
+        let error = refused(&simulate());
+        assert!(error.contains("city_shifts.csv: exists and is no table of shifts of a simulation\nhint: "), "{error}");
+        assert_eq!(folder.read("city_shifts.csv"), other);
+    }
+}
+
 #[test]
 fn what_has_no_adaptation_table_is_refused() {
     let (folder, log) = town();

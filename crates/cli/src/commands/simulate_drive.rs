@@ -100,9 +100,8 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
 
 /// Whether a table of shifts is of a simulation: it has no estimates.
 fn is_of_simulation(path: &Path) -> bool {
-    head(path).lines().next().is_some_and(|titles| {
-        titles.is_empty() || titles.contains(",acceleration_source,offgoing_friction_work_j,oncoming_friction_work_j")
-    })
+    const TITLES: &str = ",acceleration_source,offgoing_friction_work_j,oncoming_friction_work_j";
+    head(path).lines().next().is_some_and(|titles| titles.ends_with(TITLES))
 }
 
 /// What of a distance was driven backwards, in words; nothing where it is too short to be shown.

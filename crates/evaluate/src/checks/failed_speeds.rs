@@ -8,7 +8,8 @@ use super::check::{Check, CheckedRow};
 const NAMES: [&str; 4] = ["engine_speed", "turbine_speed", "output_speed", "wheel_speed"];
 /// Readings that are needed before \[chosen\].
 const ENOUGH: u64 = 100;
-/// Speed of another shaft from which on the car runs, rad/s, and time in which it does after the last reading, s \[chosen\].
+/// Speed of another shaft from which on the car runs, speed below which a shaft may stand, rad/s, and time in which the car runs after the last
+/// reading, s \[chosen\].
 const RUNS_RAD_S: f64 = 20.0;
 const STANDS_RAD_S: f64 = 1.0;
 const LASTS_S: f64 = 5.0;
