@@ -234,30 +234,33 @@ fn pipes_and_links_serve_on_both_sides() {
 fn what_a_killed_command_leaves_goes_with_the_next_and_a_running_one_keeps_its_own() {
     use std::io::Write as _;
     let folder = Folder::new("killed");
-    let (pipe, out) = (folder.pipe("pipe"), folder.path("out.csv"));
+    let out = folder.path("out.csv");
     let partials = || folder.names().into_iter().filter(|name| name.ends_with(".partial")).collect::<Vec<_>>();
-    // A command that waits for the rest of its log.
-    let begin = || {
-        let child = Command::new(env!("CARGO_BIN_EXE_wetclutch"))
+    // A command that waits for the rest of its log. Each has a pipe of its own: a process that another test starts may keep the writing end
+    // of an earlier pipe for a moment, and its end would look like the end of the log.
+    let begin = |pipe: &str| {
+        let pipe = folder.pipe(pipe);
+        let mut child = Command::new(env!("CARGO_BIN_EXE_wetclutch"))
             .args(["estimate", &pipe, "--vehicle", VEHICLE, "--observer", "open-loop", "-o", &out])
             .stderr(std::fs::File::create(folder.path("said")).unwrap())
             .spawn()
             .unwrap();
         let mut feed = std::fs::OpenOptions::new().write(true).open(&pipe).unwrap();
-        let fed = feed.write_all(log(20_000).as_bytes());
-        assert!(fed.is_ok(), "{fed:?}: {}", folder.read("said"));
+        if let Err(error) = feed.write_all(log(20_000).as_bytes()) {
+            panic!("{error}: {:?}: {}", child.wait(), folder.read("said"));
+        }
         let own = format!("out.csv.{}.partial", child.id());
         while !partials().contains(&own) {
             std::thread::yield_now();
         }
         (child, feed, own)
     };
-    let (mut killed, feed, dead) = begin();
+    let (mut killed, feed, dead) = begin("first");
     killed.kill().unwrap();
     killed.wait().unwrap();
     drop(feed);
     assert_eq!(partials(), [dead]);
-    let (mut running, feed, own) = begin();
+    let (mut running, feed, own) = begin("second");
     assert_eq!(partials(), [own.as_str()], "the dead one went");
     assert!(estimate(&folder.write("log.csv", log(3)), &["-o", &out]).status.success());
     assert_eq!(partials(), [own], "the running one stays");
