@@ -50,7 +50,10 @@ fn left() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 /// The partial files that killed programs left in the folders of the files that this program wrote, under names that it did not
 /// write. They are not removed: nothing replaces them.
 pub fn left_by_killed() -> Vec<PathBuf> {
-    left().iter().filter(|path| path.exists()).cloned().collect()
+    // A file that was noted between its creation and its lock is locked now, or gone.
+    let is_left =
+        |path: &Path| File::open(path).is_ok_and(|file| !matches!(file.try_lock(), Err(TryLockError::WouldBlock)));
+    left().iter().filter(|path| is_left(path)).cloned().collect()
 }
 
 /// Removes the partial files of this program, which is about to end on a signal. The files at their paths stay as they were.
@@ -189,6 +192,9 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     let there = target.ancestors().skip(1).find(|folder| folder.as_os_str().is_empty() || folder.exists());
     let folder = there.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     check_folder(folder)?;
+    // The name is that of the process: one of its threads after the other.
+    static PROBING: Mutex<()> = Mutex::new(());
+    let _one = PROBING.lock().unwrap_or_else(PoisonError::into_inner);
     remove_dead(folder, OsStr::new(PROBE));
     let probe = folder.join(format!("{PROBE}.{}.partial", std::process::id()));
     drop(locked(&probe)?);
@@ -246,15 +252,17 @@ fn remove_dead(folder: &Path, name: &OsStr) {
         if !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
-        match File::open(&path).map(|file| file.try_lock()) {
-            Ok(Ok(())) if of == name.as_encoded_bytes() => {
+        let Ok(partial) = File::open(&path) else { continue };
+        // The lock is held until the file is removed: no other program takes it for its own in between.
+        match partial.try_lock() {
+            Ok(()) if of == name.as_encoded_bytes() => {
                 let _ = fs::remove_file(path);
             }
             // Without locks nothing tells whether its program still runs.
-            Ok(Ok(()) | Err(TryLockError::Error(_))) => {
+            Ok(()) | Err(TryLockError::Error(_)) => {
                 left().insert(path);
             }
-            Ok(Err(TryLockError::WouldBlock)) | Err(_) => {}
+            Err(TryLockError::WouldBlock) => {}
         }
     }
 }
@@ -277,12 +285,12 @@ fn locked(path: &Path) -> io::Result<File> {
             ),
             _ => error,
         })?;
-        match file.try_lock() {
-            // Another program that looks for dead files can have come between.
+        // Who looks for files of killed programs can hold the lock for a moment, and remove the file then.
+        match file.lock() {
             Ok(()) if path.exists() => return Ok(file),
-            Ok(()) | Err(TryLockError::WouldBlock) => {}
+            Ok(()) => {}
             // A file system without locks: nobody can take the file for dead there.
-            Err(TryLockError::Error(_)) => return Ok(file),
+            Err(_) => return Ok(file),
         }
     }
 }
@@ -466,6 +474,25 @@ mod tests {
         assert!(error.to_string().starts_with("the file is write-protected\nhint: "), "{error}");
         assert_eq!(fs::read_to_string(&path).unwrap(), "measured");
         assert_eq!(folder.names(), ["log.csv"]);
+    }
+
+    #[test]
+    fn threads_that_write_beside_each_other_do_not_take_files_for_those_of_killed_programs() {
+        let folder = Folder::new("threads");
+        std::thread::scope(|scope| {
+            for thread in 0..4 {
+                let folder = &folder;
+                scope.spawn(move || {
+                    for file in 0..200 {
+                        let path = folder.0.join(format!("{thread}_{file}.csv"));
+                        check_writable(&path).unwrap();
+                        WholeFile::create(&path).unwrap().finish().unwrap();
+                    }
+                });
+            }
+        });
+        assert_eq!(folder.names().len(), 4 * 200);
+        assert!(left_by_killed().iter().all(|path| !path.starts_with(&folder.0)));
     }
 
     #[test]
