@@ -1,6 +1,6 @@
 //! The estimate of a log while it is written, on a page of this computer.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -26,8 +26,11 @@ fn answer(address: &str, host: &str, path: &str, until: &str) -> String {
     let (mut text, mut bytes) = (String::new(), [0; 4096]);
     while !text.contains(until) {
         match stream.read(&mut bytes) {
-            Ok(0) | Err(_) => break,
+            Ok(0) => break,
             Ok(count) => text += &String::from_utf8_lossy(&bytes[..count]),
+            // A timeout makes a read of a socket end with the signals of others.
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(_) => break,
         }
     }
     text
