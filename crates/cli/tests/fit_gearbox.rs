@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{Folder, ROOT, printed, refused, said, stderr, wetclutch};
+use crate::support::{Folder, ROOT, printed, refused, said, shown, stderr, wetclutch};
 
 pub(crate) const CAR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml");
 
@@ -145,18 +145,24 @@ fn logs_that_cannot_be_fitted_are_refused_with_a_reason() {
 }
 
 #[test]
-fn shifts_that_one_way_clutches_make_are_refused_with_their_reason() {
+fn shifts_of_one_way_clutches_are_fitted_and_those_of_dogs_are_left_out_with_their_reason() {
     let folder = Folder::new("fit-one-way");
-    let drive = folder.write("up.toml", "name = \"up\"\n[[segment]]\nduration_s = 25\nthrottle = 0.3\n");
-    let car = format!("{ROOT}vehicles/three_speed_th400.toml");
-    said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
-    let log = folder.path("sim/up_measured.csv");
-    let text = refused(&wetclutch(&["fit", &log, "--vehicle", &car, "-o", &folder.path("fitted.toml")]));
-    assert!(
-        text.contains("not used: 1-2 at ") && text.contains("s: one of its elements is a one-way clutch or a dog"),
-        "{text}"
-    );
-    assert!(text.contains("shifts of the logs can be fitted\nhint: the lines `not used` have the reasons"), "{text}");
+    let fitted = |name: &str, drive: &str, vehicle: &str| {
+        let drive = folder.write(&format!("{name}.toml"), format!("name = \"{name}\"\n{drive}"));
+        let car = format!("{ROOT}vehicles/{vehicle}.toml");
+        said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
+        let log = folder.path(&format!("sim/{name}_measured.csv"));
+        wetclutch(&["fit", &log, "--vehicle", &car, "-o", &folder.path(&format!("{name}_fitted.toml"))])
+    };
+    let up = "[[segment]]\nduration_s = 25\nthrottle = 0.3\n";
+    let text = shown(&fitted("sprag", up, "three_speed_th400"));
+    assert!(!text.contains("not used: ") && text.contains("DIR: kiss point") && text.contains("INT: kiss"), "{text}");
+    assert!(text.contains("no fitted shift uses FWD, LR"), "{text}");
+    // From the fourth to the fifth gear a dog of this gearbox opens.
+    let dog = "[start]\ngear = \"4\"\nvehicle_m_s = 14\n[[segment]]\nduration_s = 6\nthrottle = 0.2\n[[shift]]\ntime_s = 2\ngear = \"5\"\n";
+    let text = refused(&fitted("dog", dog, "nine_speed_9hp"));
+    assert!(text.contains("not used: 4-5 at ") && text.contains("s: one of its elements is a dog"), "{text}");
+    assert!(text.contains("none of the 1 shifts of the logs can be fitted\nhint: the lines `not used` have"), "{text}");
 }
 
 /// A table with one column multiplied.

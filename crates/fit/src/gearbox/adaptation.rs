@@ -18,7 +18,7 @@ use super::contradicted::without_pressures;
 use super::fitting::{GearboxFit, Progress, fit_with};
 use super::monotone::not_rising;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
-use super::shift_log::ShiftLog;
+use super::shift_log::{ShiftLog, is_fitted, transmitting};
 use super::zero_offset::without_offsets;
 use crate::driving::Driving;
 use crate::fill::fill_sd;
@@ -249,16 +249,17 @@ impl GearboxFit {
 }
 
 impl Fitted<'_> {
-    /// Neighbouring gears, up and down, whose shift is from one clutch to another.
+    /// Neighbouring gears, up and down, whose shift has a model.
     fn pairs(&self) -> Vec<[usize; 2]> {
         let rows = self.tables.tables();
-        let is_used = |gears: &[usize; 2]| {
-            let row = rows.shift(gears[0], gears[1]);
-            row.is_some_and(|row| row.clutches.iter().all(|clutch| clutch.has_pressure()))
-        };
-        let is_forward = |gear: &usize| self.car.gearbox.gears[*gear].ratio > 0.0;
-        let forward: Vec<usize> = (0..self.car.gearbox.gears.len()).filter(is_forward).collect();
-        forward.windows(2).flat_map(|pair| [[pair[0], pair[1]], [pair[1], pair[0]]]).filter(is_used).collect()
+        let is_used = |gears: &[usize; 2]| rows.shift(gears[0], gears[1]).is_some_and(is_fitted);
+        self.car
+            .gearbox
+            .forward_gears()
+            .windows(2)
+            .flat_map(|pair| [[pair[0], pair[1]], [pair[1], pair[0]]])
+            .filter(is_used)
+            .collect()
     }
 
     /// The rows of a group.
@@ -326,18 +327,19 @@ impl Fitted<'_> {
     fn clutches_of(&self, gears: [usize; 2]) -> Vec<(usize, Option<AdaptedShift>)> {
         let Some(row) = self.tables.tables().shift(gears[0], gears[1]).copied() else { return Vec::new() };
         let names = gears.map(|gear| self.car.gearbox.gears[gear].name.clone());
-        let both = row.clutches.iter().zip(ShiftRole::BOTH);
-        both.filter_map(|(clutch, role)| {
-            Some((clutch.element.place()?, Some(AdaptedShift { gears: names.clone(), role })))
-        })
-        .collect()
+        let both = row.clutches.iter().zip(ShiftRole::BOTH).zip(transmitting(&row));
+        both.filter(|(_, is_used)| *is_used)
+            .filter_map(|((clutch, role), _)| {
+                Some((clutch.element.place()?, Some(AdaptedShift { gears: names.clone(), role })))
+            })
+            .collect()
     }
 
-    /// What a clutch does in a shift, if it is one of its two.
+    /// What a clutch does in a shift, if it transmits torque in it.
     fn role_of(&self, log: &ShiftLog, place: usize) -> Option<ShiftRole> {
         let row = self.tables.tables().shift(log.gears[0], log.gears[1]).copied()?;
         let at = row.clutches.iter().position(|clutch| clutch.element.place() == Some(place))?;
-        Some(ShiftRole::BOTH[at])
+        transmitting(&row)[at].then_some(ShiftRole::BOTH[at])
     }
 }
 

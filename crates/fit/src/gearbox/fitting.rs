@@ -156,7 +156,7 @@ pub(super) fn fit_with(
     for model in &models {
         let kind = ShiftKind::ALL.iter().position(|kind| Some(*kind) == model.kind);
         by_pair[model.pair][kind.unwrap_or(0)] += 1;
-        model.elements().iter().for_each(|at| elements_seen[*at] = true);
+        model.elements().for_each(|at| elements_seen[at] = true);
     }
     let scales = solved.point.driving.scales();
     let squares = solved.point.shifts.iter().map(|shift| Real::powi(shift.torque_error, 2)).sum::<f64>();

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! `T_t` is the converter's by engine and turbine speed, or without a converter the reported engine torque, and `p_c` that of the
-//! valve's model. The output speed is measured and is no unknown. Driving in a gear between shifts shows the torques on car and engine
+//! valve's model; a one-way clutch overruns then, and its torque, or that of a clutch in series with it, is zero. The output speed is measured and is no unknown. Driving in a gear between shifts shows the torques on car and engine
 //! ([`Driving`]). [`Recorder`] takes the steps of a log and keeps what belongs to its shifts and between them; [`fit`] finds the parameters that all shifts have in common ([`Quantity`]).
 
 mod adaptation;

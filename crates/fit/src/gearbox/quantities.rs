@@ -3,10 +3,10 @@
 use car::{Car, ErrorBudget};
 use drivetrain::Real;
 use nalgebra::DMatrix;
-use observer::gearbox::{ElementUncertainty, GearboxFilter, ShiftClutch};
+use observer::gearbox::{ElementUncertainty, GearboxFilter};
 use observer::{ShiftTables, element_uncertainty, gearbox_filter};
 
-use super::shift_log::ShiftLog;
+use super::shift_log::{ShiftLog, is_fitted};
 use super::zero_offset::{sd_before_pa, zero_offsets};
 use crate::driving::{AIR, DRAG_UNIT_N_M, ROLLING, Term, WIND, rolling_floor};
 use crate::parameters::OFFSET_FLOOR_PA;
@@ -86,7 +86,7 @@ pub struct Quantities {
     pub all: Vec<Quantity>,
     /// Names of the friction elements, by their places in the tables.
     pub elements: Vec<String>,
-    /// Pairs of gears with a shift from one clutch to another, the lower one first.
+    /// Pairs of gears with a shift that has a model, the lower one first.
     pub pairs: Vec<[usize; 2]>,
     /// Names of these pairs.
     pub pair_names: Vec<String>,
@@ -310,7 +310,7 @@ pub(crate) fn std_dev_of(bound: f64) -> f64 {
     bound / 3.0_f64.sqrt()
 }
 
-/// The pairs of neighbouring gears and of these shifts with a shift from one clutch or brake to another, the lower gear first.
+/// The pairs of neighbouring gears and of these shifts with a shift that has a model, the lower gear first.
 fn pairs(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<[usize; 2]> {
     let rows = tables.tables();
     let forward = car.gearbox.forward_gears();
@@ -322,10 +322,8 @@ fn pairs(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<[usiz
             pairs.push(pair);
         }
     }
-    let is_fitted = |from: usize, to: usize| {
-        rows.shift(from, to).is_some_and(|row| row.clutches.iter().all(ShiftClutch::has_pressure))
-    };
-    pairs.retain(|[low, high]| is_fitted(*low, *high) || is_fitted(*high, *low));
+    let has_fit = |from: usize, to: usize| rows.shift(from, to).is_some_and(is_fitted);
+    pairs.retain(|[low, high]| has_fit(*low, *high) || has_fit(*high, *low));
     pairs
 }
 

@@ -5,9 +5,9 @@ use std::ops::RangeInclusive;
 use car::{Car, Gear, ShiftCommand};
 use observer::Reading;
 use observer::ShiftTables;
-use observer::gearbox::{MAX_ELEMENTS, ShiftClutch, ShiftInput};
+use observer::gearbox::{MAX_ELEMENTS, ShiftInput, ShiftRow};
 
-use super::shift_log::ShiftLog;
+use super::shift_log::{ShiftLog, is_fitted};
 use crate::driving::{DrivenCar, Driving, DrivingRecorder, RowState};
 use crate::{ReadingAges, Series};
 
@@ -251,7 +251,9 @@ impl<'a> Recorder<'a> {
         let rows = self.tables.tables();
         let Some(row) = rows.commanded(gears) else { return };
         let found = log.find_slip(row).and_then(|()| match (&self.car.converter, lock_up) {
-            _ if self.begins_within(&log) => Err("its commands begin too late to know the oil volume of its pistons"),
+            _ if self.begins_within(&log, row) => {
+                Err("its commands begin too late to know the oil volume of its pistons")
+            }
             (Some(_), true) => Err("the lock-up clutch of the converter was applied"),
             (Some(_), false) if log.engine.between(log.slip_s).count() < 2 => Err("the engine speed is missing"),
             (None, _) if log.engine_torque.between(log.slip_s).count() < 2 => Err("the engine torque is missing"),
@@ -269,10 +271,10 @@ impl<'a> Recorder<'a> {
     }
 
     /// Whether the commands of a shift of pistons with a stroke begin so late that the pistons may have moved before.
-    fn begins_within(&self, log: &ShiftLog) -> bool {
+    fn begins_within(&self, log: &ShiftLog, row: &ShiftRow<f64>) -> bool {
         let is_late =
             |commands: &Series| commands.time_s.first().is_none_or(|first_s| *first_s > log.slip_s[0] - self.emptied_s);
-        self.emptied_s > 0.0 && log.commands.iter().any(is_late)
+        self.emptied_s > 0.0 && log.transmitted(row).any(is_late)
     }
 
     /// The readings of a shift.
@@ -288,8 +290,11 @@ impl<'a> Recorder<'a> {
         };
         let rows = self.tables.tables();
         let row = rows.commanded(gears).ok_or("it is not from one clutch to another")?;
-        if !row.clutches.iter().all(ShiftClutch::has_pressure) {
-            return Err("one of its elements is a one-way clutch or a dog");
+        if row.clutches.iter().any(|clutch| clutch.element.is_dog()) {
+            return Err("one of its elements is a dog");
+        }
+        if !is_fitted(row) {
+            return Err("one-way clutches overrun while its elements slip, and none transmits torque");
         }
         let span = [open.begun_s - 0.1, ended_s + AFTER_S];
         let commands = row.clutches.map(|clutch| {

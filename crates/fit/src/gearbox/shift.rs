@@ -1,4 +1,4 @@
-//! The model of one shift while both of its clutches slip.
+//! The model of one shift while both of its elements slip.
 
 use car::Car;
 use drivetrain::clutch::drag_torque;
@@ -9,7 +9,7 @@ use observer::ShiftTables;
 
 use super::clutch::{AtValve, ClutchModel};
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
-use super::shift_log::ShiftLog;
+use super::shift_log::{ShiftLog, is_fitted, transmitting};
 use crate::Series;
 use crate::driving::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_FRACTION};
 use crate::pressure::{Grid, Hydraulics};
@@ -28,7 +28,8 @@ pub(crate) struct ShiftModel {
     pub(crate) kind: Option<ShiftKind>,
     pub(crate) pair: usize,
     grid: Grid,
-    clutches: [ClutchModel; 2],
+    /// Of the offgoing and the oncoming element; none of one that transmits no torque while both slip.
+    clutches: [Option<ClutchModel>; 2],
     /// Without a converter the reported engine torque, N m.
     reported: Option<Series>,
     /// Torque at the input by the file, and the part of it by the torque ratio above 1, N m.
@@ -98,8 +99,14 @@ impl ShiftModel {
         let torques = times().map(|time_s| input(car, log, time_s));
         let (input_n_m, above_one_n_m): (Vec<f64>, Vec<f64>) = torques.unzip();
         let by_engine_delay_n_m = times().map(|time_s| by_engine_delay(car, log, time_s)).collect();
-        let clutches = [0, 1].map(|which| ClutchModel::new((car, tables, quantities), row, (log, which), grid));
-        let [Some(offgoing), Some(oncoming)] = clutches else { return None };
+        let is_used = transmitting(row);
+        let clutches = [0, 1].map(|which| {
+            let model = || ClutchModel::new((car, tables, quantities), row, (log, which), grid);
+            is_used[which].then(model).flatten()
+        });
+        if !is_fitted(row) || clutches.each_ref().map(Option::is_some) != is_used {
+            return None;
+        }
         let (time_s, reading): (Vec<f64>, Vec<f64>) = log.turbine.between(log.slip_s).unzip();
         let start = log.output.at(begin_s);
         let by_output = time_s
@@ -112,7 +119,7 @@ impl ShiftModel {
             kind: log.kind(car, mean),
             pair: quantities.pair(log.gears[0], log.gears[1])?,
             grid,
-            clutches: [offgoing, oncoming],
+            clutches,
             reported: car.converter.is_none().then(|| log.engine_torque.clone()),
             input_n_m,
             above_one_n_m,
@@ -132,16 +139,15 @@ impl ShiftModel {
         [&self.input_n_m, &self.above_one_n_m].map(|torques| torques.iter().map(|torque| torque * torque).sum())
     }
 
-    /// Places of its elements in the tables.
-    pub(crate) fn elements(&self) -> [usize; 2] {
-        self.clutches.each_ref().map(|clutch| clutch.place)
+    /// Places in the tables of its elements that transmit torque.
+    pub(crate) fn elements(&self) -> impl Iterator<Item = usize> {
+        self.clutches.iter().flatten().map(|clutch| clutch.place)
     }
 
     /// The same shift with another way to the pressure of an element; none where that element is not one of its clutches.
     pub(crate) fn with_hydraulics(&self, place: usize, change: impl Fn(&mut Hydraulics)) -> Option<Self> {
-        let which = self.clutches.iter().position(|clutch| clutch.place == place)?;
         let mut other = self.clone();
-        other.clutches[which].change(change);
+        other.clutches.iter_mut().flatten().find(|clutch| clutch.place == place)?.change(change);
         Some(other)
     }
 
@@ -150,13 +156,13 @@ impl ShiftModel {
         let of = |clutch: &ClutchModel| {
             clutch.beside(self.grid).into_iter().map(|both| (clutch.place, both)).collect::<Vec<_>>()
         };
-        self.clutches.iter().flat_map(of).collect()
+        self.clutches.iter().flatten().flat_map(of).collect()
     }
 
     /// The same shift with all commands so much earlier.
     pub(crate) fn with_commands_earlier(&self, late_s: f64) -> Self {
         let mut other = self.clone();
-        other.clutches.iter_mut().for_each(|clutch| clutch.move_commands(-late_s));
+        other.clutches.iter_mut().flatten().for_each(|clutch| clutch.move_commands(-late_s));
         other
     }
 
@@ -166,7 +172,7 @@ impl ShiftModel {
         let mut unknowns = Unknowns { quantities, at, by_momentum: DMatrix::zeros(rows, at.len()) };
         let mut momentum = self.input_momentum(&mut unknowns);
         let mut pressure = Vec::new();
-        for clutch in &self.clutches {
+        for clutch in self.clutches.iter().flatten() {
             let (of_clutch, measured) = self.clutch_momentum(clutch, &mut unknowns);
             momentum.iter_mut().zip(of_clutch).for_each(|(sum, more)| *sum += more);
             pressure.extend(measured);
@@ -311,7 +317,7 @@ fn drag(
     Some((file_n_m, each))
 }
 
-/// Torque of both clutches of a shift by the valve models of a file alone.
+/// Torque of both clutches of a shift by the valve models of a file alone; zero of one that transmits none, as its one-way clutch overruns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpenLoop {
     /// Time in the log, s.
@@ -328,14 +334,16 @@ pub fn open_loop(car: &Car, tables: &ShiftTables<f64>, log: &ShiftLog) -> Vec<Op
     let rows = tables.tables();
     let row = rows.shift(log.gears[0], log.gears[1]);
     let (Some(model), Some(row)) = (ShiftModel::new(car, tables, &quantities, log), row) else { return Vec::new() };
-    let pressure = model.clutches.each_ref().map(|clutch| clutch.pressures(model.grid, &AtValve::default()));
+    let clutches = model.clutches.each_ref().map(Option::as_ref);
+    let pressure = clutches.map(|clutch| clutch.map(|clutch| clutch.pressures(model.grid, &AtValve::default())));
     let of_reading = |time_s: &f64| {
         let i = ((time_s - model.grid.begin_s) / model.grid.step_s).round() as usize;
+        let pressure_pa = pressure.each_ref().map(|pressure| pressure.as_ref().map_or(0.0, |pressure| pressure[i]));
         let torque = |which: usize| {
-            let clutch = &model.clutches[which];
-            clutch.per_pa[i].abs() * (pressure[which][i] - clutch.kiss_pa).max(0.0) / row.clutches[which].alpha.abs()
+            let Some(clutch) = clutches[which] else { return 0.0 };
+            clutch.per_pa[i].abs() * (pressure_pa[which] - clutch.kiss_pa).max(0.0) / row.clutches[which].alpha.abs()
         };
-        OpenLoop { time_s: *time_s, torque_n_m: [0, 1].map(torque), pressure_pa: [0, 1].map(|c| pressure[c][i]) }
+        OpenLoop { time_s: *time_s, torque_n_m: [0, 1].map(torque), pressure_pa }
     };
     model.time_s.iter().map(of_reading).collect()
 }

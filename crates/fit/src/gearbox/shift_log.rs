@@ -1,4 +1,4 @@
-//! What was measured in a shift, and when both of its clutches slipped.
+//! What was measured in a shift, and when both of its elements slipped.
 
 use car::Car;
 use drivetrain::ShiftKind;
@@ -41,7 +41,7 @@ pub struct ShiftLog {
     /// Measured pressure of the offgoing and of the oncoming element, Pa, where the log has it; that of an element from before and after the shift
     /// too.
     pub pressure: [Series; 2],
-    /// When both clutches slip, s; found from the readings.
+    /// When both elements slip, s; found from the readings.
     pub slip_s: [f64; 2],
     /// Whether the lock-up clutch of the converter was applied.
     pub lock_up: bool,
@@ -49,8 +49,20 @@ pub struct ShiftLog {
     pub oil_degc: Option<f64>,
 }
 
+/// Which of offgoing and oncoming element transmits torque by its pressure while both slip. A one-way clutch overruns then and transmits none, and so does a
+/// clutch or brake behind one that overruns: where the turbine turns slower than in its gear.
+pub(crate) fn transmitting(row: &ShiftRow<f64>) -> [bool; 2] {
+    let [off, on] = &row.clutches;
+    [(off, on), (on, off)].map(|(one, other)| one.has_pressure() && !(one.may_overrun() && other.ratio < one.ratio))
+}
+
+/// Whether the fit has a model of a shift: neither of its elements is a dog, and one at least transmits torque by its pressure.
+pub(crate) fn is_fitted(row: &ShiftRow<f64>) -> bool {
+    transmitting(row).contains(&true) && !row.clutches.iter().any(|clutch| clutch.element.is_dog())
+}
+
 impl ShiftLog {
-    /// Finds when both clutches slip.
+    /// Finds when both elements slip.
     pub(crate) fn find_slip(&mut self, row: &ShiftRow<f64>) -> Result<(), &'static str> {
         let [off, on] = row.clutches.map(|clutch| clutch.ratio);
         let direction = (on - off).signum();
@@ -88,10 +100,15 @@ impl ShiftLog {
             return Err("the car is too slow: readings of toothed wheels are too old");
         }
         let is_commanded = |commands: &Series| commands.time_s.first().is_some_and(|first_s| *first_s < span[0]);
-        if !self.commands.iter().all(is_commanded) {
-            return Err("commands of its two elements are missing");
+        if !self.transmitted(row).all(is_commanded) {
+            return Err("commands of its elements are missing");
         }
         Ok(())
+    }
+
+    /// The commands of the elements that transmit torque by their pressure.
+    pub(crate) fn transmitted(&self, row: &ShiftRow<f64>) -> impl Iterator<Item = &Series> {
+        self.commands.iter().zip(transmitting(row)).filter_map(|(commands, is_used)| is_used.then_some(commands))
     }
 
     /// Direction, and power by the torque at the input.

@@ -393,3 +393,30 @@ fn a_measured_pressure_tells_a_fill_volume() {
     assert!(cylinder.preload_pa < cylinder.kiss_pa);
     assert!(with.report().iter().any(|row| row.name == "C: fill volume"));
 }
+
+/// In these gearboxes one-way clutches are elements of some shifts; of the TH400 of all, one of them in series with a brake.
+#[test]
+fn shifts_with_one_way_clutches_tell_the_other_element() {
+    for (vehicle, draws, shifts, reduced) in [
+        ("three_speed_c6.toml", 3, 24, 0.6),
+        ("three_speed_th400.toml", 3, 18, 0.75),
+        ("four_speed_4l60e.toml", 1, 40, 0.5),
+    ] {
+        let (mut given, mut found) = (0.0, 0.0);
+        for seed in 1..=draws {
+            let drawn = Drawn::of(car(vehicle), seed, Case::Usual);
+            let (recorded, truth) = drawn.driven(&city(6));
+            assert!(recorded.shifts.len() >= shifts, "{vehicle}: {:?}", recorded.skipped);
+            let [fitted_shifts, held_out] = every_fifth(recorded.shifts);
+            let fit = fitted(&drawn, &fitted_shifts);
+            assert!(fit.is_converged && fit.at_limit.is_empty() && fit.torque_misfit < 2.0, "{}", fit.torque_misfit);
+            assert!(held(&drawn, &fit) > 0.85, "{vehicle} {seed}: {}", held(&drawn, &fit));
+            let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
+            given += truth.squared_error(&drawn.file, &held_out);
+            found += truth.squared_error(&file, &held_out);
+        }
+        let [given, found] = [given, found].map(|sum| (sum / f64::from(draws as u32)).sqrt());
+        println!("{vehicle}: torque error {given:.1} N m with the given file, {found:.1} with the fitted one");
+        assert!(found < reduced * given, "{vehicle}: {given} {found}");
+    }
+}
