@@ -106,10 +106,10 @@ impl<'c> ClutchTorques<'c> {
         let each = each.collect::<Vec<_>>().join(", ");
         let hint = match (falls, some.len() >= MANY) {
             (_, true) => {
-                "check the oil (another fluid, its temperature), the line pressure and the scale of the commands"
+                "check the oil (another fluid, its temperature, air in it), the line pressure and the scale of the commands"
             }
             (true, false) => {
-                "check the plates of this clutch (worn, glazed), its piston (leak), its valve and its oil; another one that holds without its command has the same effect"
+                "check the plates of this clutch (worn, glazed), its piston (leak), its valve and its oil; valves with a longer lag, as by air in the oil, or another clutch that holds without its command have the same effect"
             }
             (false, false) => "check the valve of this clutch, its plates and its oil",
         };

@@ -245,13 +245,13 @@ impl<'c> CommandDelay<'c> {
         let (delay_s, is_at_end) = self.found?;
         // It is not known to the millisecond.
         let delay_s = 0.01 * (delay_s / 0.01).round();
-        let late = if delay_s > 0.0 { "late" } else { "early" };
+        let (late, cause) = if delay_s > 0.0 { ("late", "") } else { ("early", ", as by air in the oil,") };
         let or_more = if is_at_end { " or more" } else { "" };
         Some(format!(
             "warning: the commands of the valves come about {:.0} ms{or_more} too {late} against the speeds, by the turbine's torques in {} shifts: then the \
              guaranteed ranges do not hold, and the estimates are worse. `late_s = {delay_s:.2}` in each `channel.element_NAME_...` of a channel map moves \
              them to their time (in those of gear and target_gear too if they have the same delay); `wetclutch inspect LOG --suggest` makes a map. An \
-             offset of all commands looks alike, and valves that are further off than their bounds do: check both first, as the ranges do not hold either where \
+             offset of all commands looks alike, and valves that are further off than their bounds{cause} do: check both first, as the ranges do not hold either where \
              commands are moved that were in time",
             1e3 * delay_s.abs(),
             self.shifts.iter().sum::<u32>()
