@@ -39,8 +39,9 @@ pub(super) const FINE_S: f64 = 0.015;
 const KEPT: f64 = 0.97;
 /// Shifts that are needed: one alone may be one with wrong readings.
 const SHIFTS: u8 = 2;
-/// Evidence below which nothing follows.
-const LEAST: f64 = 0.05;
+/// Evidence below which nothing follows: with it the shifts alone know the size to two standard deviations of the quantity unlearnt. What less evidence
+/// shows follows from the errors that shifts have alike, and is often larger than any car: a friction below zero.
+const LEAST: f64 = 0.25;
 /// Variance `beta` of what all shifts have wrong alike, in that of the quantity unlearnt \[chosen: none of thirty drives of cars within usual bounds is
 /// beyond\]: smaller than what is said of a car allows, as the innovation has the whole budget. Of the scale of all torques 8 %.
 const OF_FACTOR: f64 = 0.5;
