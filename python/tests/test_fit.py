@@ -108,9 +108,9 @@ def test_progress_comes_at_most_ten_times_a_second_and_may_end_the_fit(car: wc.C
 
 
 def test_ctrl_c_ends_a_fit(car: wc.Car, run: wc.Simulation) -> None:
-    threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
     begin = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
         wc.fit(car, [run.measured] * 20)
     assert time.monotonic() - begin < 10.0
 

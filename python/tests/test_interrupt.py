@@ -29,8 +29,8 @@ def time_to_end_s(call: Callable[[], object], after_s: float) -> float:
         os.kill(os.getpid(), signal.SIGINT)
 
     timer = threading.Timer(after_s, interrupt)
-    timer.start()
     with pytest.raises(KeyboardInterrupt):
+        timer.start()
         call()
     ended_s = time.monotonic()
     timer.join()

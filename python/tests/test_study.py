@@ -153,8 +153,8 @@ def test_the_window_holds_two_tasks_for_each_worker(file: Path, expected: bytes)
 
 
 def test_ctrl_c_ends_a_study() -> None:
-    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
         wc.study(ROOT / "experiments" / "combined.toml")
 
 

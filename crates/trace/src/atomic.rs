@@ -197,8 +197,11 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     let _one = PROBING.lock().unwrap_or_else(PoisonError::into_inner);
     remove_dead(folder, OsStr::new(PROBE));
     let probe = folder.join(format!("{PROBE}.{}.partial", std::process::id()));
-    drop(locked(&probe)?);
-    fs::remove_file(probe)
+    // It goes while it is locked: nobody else takes it for one of a killed program.
+    let held = locked(&probe)?;
+    let removed = fs::remove_file(probe);
+    drop(held);
+    removed
 }
 
 /// The metadata of the file at the path of an output, if there is one.

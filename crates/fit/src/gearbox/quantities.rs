@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use observer::gearbox::{ElementUncertainty, GearboxFilter};
 use observer::{ShiftTables, element_uncertainty, gearbox_filter};
 
-use super::shift_log::{ShiftLog, is_fitted};
+use super::shift_log::{ShiftLog, is_fitted, transmitting};
 use super::zero_offset::{sd_before_pa, zero_offsets};
 use crate::driving::{AIR, DRAG_UNIT_N_M, ROLLING, Term, WIND, rolling_floor};
 use crate::parameters::OFFSET_FLOOR_PA;
@@ -327,15 +327,15 @@ fn pairs(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<[usiz
     pairs
 }
 
-/// Which elements have a measured pressure, by their places in the tables.
+/// Which elements have a measured pressure in a shift in which they transmit torque, by their places in the tables.
 fn measured(tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<bool> {
     let rows = tables.tables();
     let mut measured = vec![false; rows.elements.len()];
     for log in shifts {
         let Some(row) = rows.shift(log.gears[0], log.gears[1]) else { continue };
-        for (clutch, pressure) in row.clutches.iter().zip(&log.pressure) {
+        for ((clutch, pressure), is_used) in row.clutches.iter().zip(&log.pressure).zip(transmitting(row)) {
             if let Some(place) = clutch.element.place() {
-                measured[place] |= pressure.between(log.slip_s).next().is_some();
+                measured[place] |= is_used && pressure.between(log.slip_s).next().is_some();
             }
         }
     }
