@@ -216,7 +216,7 @@ def estimate(
         shift: The shift with this number alone, from 1.
         shifts: Shifts between these gears alone, such as ``["1-2", "2-3"]``.
         learnt: What was learnt of the car in an earlier log: ``Estimates.learnt``.
-        threads: Threads that read a log.
+        threads: Threads on which a log is read, estimated and written; the results are the same on any number.
         page: Whether to make the page of the drive.
         progress: True for a bar, or a function that takes words and the done fraction or None, at most ten times a second.
         executor: Where many logs are estimated: any ``concurrent.futures.Executor``, or a ``dask.distributed.Client``; in this process if

@@ -29,7 +29,7 @@ impl Arrays {
 
     /// Reads streams side by side, on at most so many threads. Those that have no more to read work for the others.
     pub(crate) fn on_threads(
-        streams: Vec<Box<dyn Stream + Send + '_>>,
+        streams: Vec<Box<dyn Stream + '_>>,
         threads: usize,
         crew: &Crew,
     ) -> Result<Self, LogError> {
@@ -42,7 +42,7 @@ impl Arrays {
         let next = || waiting.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let read = || {
             let reader = crew.reader();
-            let wholes = wholes(std::iter::from_fn(next).map(|(at, stream)| (at, stream as Box<dyn Stream>)));
+            let wholes = wholes(std::iter::from_fn(next));
             reader.serve();
             wholes
         };

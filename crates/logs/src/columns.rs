@@ -155,7 +155,7 @@ impl Batch {
 }
 
 /// What shares one clock.
-pub(crate) trait Stream {
+pub(crate) trait Stream: Send {
     /// Appends the next samples in the order of the file, with finite times and the quality as far as the format says it: one by one, or
     /// to the block. False at the end.
     fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError>;

@@ -51,7 +51,7 @@ impl CsvLog {
     pub(crate) fn open(
         path: &Path,
         head: Vec<u8>,
-        rest: Box<dyn Read>,
+        rest: Box<dyn Read + Send>,
         time: Option<&TimeColumn>,
         is_followed: bool,
     ) -> Result<(Self, Vec<Channel>), LogError> {
@@ -135,15 +135,16 @@ impl CsvLog {
         let Some(records) = self.records.take() else {
             return Err(LogError::file(&self.path, "the log was read already"));
         };
+        let midnight = match self.time.1 {
+            TimeForm::Stamps(form) => form.turns(),
+            TimeForm::Numbers(_) | TimeForm::Parts(_) => Midnight::default(),
+        };
         Ok(Box::new(Rows {
             channels: (0..self.columns.len()).filter(|channel| wanted[*channel]).collect(),
             log: self,
             records,
             text: Vec::new(),
-            midnight: match self.time.1 {
-                TimeForm::Stamps(form) => form.turns(),
-                TimeForm::Numbers(_) | TimeForm::Parts(_) => Midnight::default(),
-            },
+            midnight,
             order: RowOrder::default(),
             rows: 0,
             without_time: 0,
@@ -173,7 +174,7 @@ impl Read for Beginning {
 
 /// The rows of a table.
 struct Rows<'a> {
-    log: &'a CsvLog,
+    log: &'a mut CsvLog,
     records: Records,
     /// Those that are wanted.
     channels: Vec<usize>,

@@ -78,7 +78,7 @@ impl Log {
     /// # Errors
     /// The file cannot be read, or is none of the known formats.
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Self, LogError> {
-        let reader: Box<dyn Read> = match path.to_str() {
+        let reader: Box<dyn Read + Send> = match path.to_str() {
             Some("-") => Box::new(io::stdin()),
             _ => Box::new(File::open(path).map_err(LogError::io(path))?),
         };
@@ -100,11 +100,16 @@ impl Log {
     ///
     /// # Errors
     /// See [`Self::open`].
-    pub fn of_text(path: &Path, options: &OpenOptions, text: Box<dyn Read>) -> Result<Self, LogError> {
+    pub fn of_text(path: &Path, options: &OpenOptions, text: Box<dyn Read + Send>) -> Result<Self, LogError> {
         Self::of(path, options, text, false)
     }
 
-    fn of(path: &Path, options: &OpenOptions, reader: Box<dyn Read>, is_followed: bool) -> Result<Self, LogError> {
+    fn of(
+        path: &Path,
+        options: &OpenOptions,
+        reader: Box<dyn Read + Send>,
+        is_followed: bool,
+    ) -> Result<Self, LogError> {
         let (head, reader) = beginning(path, reader)?;
         let database = options.database()?;
         let is_file = path != Path::new("-");
@@ -261,7 +266,7 @@ impl Log {
             Source::Parquet(log) => vec![log.stream(&mask)?],
             Source::Mdf(log) => {
                 log.unpack_with(Crew::of(self.threads));
-                log.streams(&mask)?.into_iter().map(|stream| stream as Box<dyn Stream>).collect()
+                log.streams(&mask)?
             }
             Source::Can(log) => vec![log.stream(&mask)?],
         })
@@ -371,7 +376,7 @@ pub fn needs_map(path: &Path) -> Result<bool, LogError> {
 }
 
 /// The first bytes of a log and what comes behind them, as UTF-8 without a mark where it is text.
-fn beginning(path: &Path, mut reader: Box<dyn Read>) -> Result<(Vec<u8>, Box<dyn Read>), LogError> {
+fn beginning(path: &Path, mut reader: Box<dyn Read + Send>) -> Result<(Vec<u8>, Box<dyn Read + Send>), LogError> {
     let io = LogError::io(path);
     let mut head = first_bytes(&mut reader).map_err(&io)?;
     if is_utf16(&head) {

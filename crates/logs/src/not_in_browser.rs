@@ -26,7 +26,7 @@ pub(crate) struct Blf(Infallible);
 type Opened<L> = Result<(L, Vec<Channel>), LogError>;
 
 impl Blf {
-    pub(crate) fn open(path: &Path, _: Box<dyn Read>) -> Result<Self, LogError> {
+    pub(crate) fn open(path: &Path, _: Box<dyn Read + Send>) -> Result<Self, LogError> {
         Err(LogError::file(path, NOT_READ))
     }
 }
@@ -70,7 +70,7 @@ impl MdfLog {
         match self.0 {}
     }
 
-    pub(crate) fn streams(&self, _: &[bool]) -> Result<Vec<Box<dyn Stream + Send + '_>>, LogError> {
+    pub(crate) fn streams(&self, _: &[bool]) -> Result<Vec<Box<dyn Stream + '_>>, LogError> {
         match self.0 {}
     }
 }

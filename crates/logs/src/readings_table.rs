@@ -58,7 +58,7 @@ impl ReadingsTable {
     pub(crate) fn open(
         path: &Path,
         head: Vec<u8>,
-        rest: Box<dyn Read>,
+        rest: Box<dyn Read + Send>,
         is_followed: bool,
     ) -> Result<(Self, Vec<Channel>), LogError> {
         let beginning = text(&head);
@@ -97,7 +97,7 @@ impl ReadingsTable {
 
 /// The readings of a table.
 struct Readings<'a> {
-    log: &'a ReadingsTable,
+    log: &'a mut ReadingsTable,
     records: Records,
     wanted: Vec<bool>,
     rows: u64,

@@ -79,7 +79,7 @@ pub fn text_of(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// The first bytes cannot be read.
-pub fn as_utf8(mut input: Box<dyn Read>) -> io::Result<Box<dyn Read>> {
+pub fn as_utf8(mut input: Box<dyn Read + Send>) -> io::Result<Box<dyn Read + Send>> {
     let mut head = Vec::with_capacity(WITHOUT_MARK);
     (&mut input).take(WITHOUT_MARK as u64).read_to_end(&mut head)?;
     Ok(if is_utf16(&head) { Box::new(Utf16::new(head, input)) } else { Box::new(io::Cursor::new(head).chain(input)) })
@@ -87,7 +87,7 @@ pub fn as_utf8(mut input: Box<dyn Read>) -> io::Result<Box<dyn Read>> {
 
 /// Reads a text in UTF-16, without its mark, as UTF-8. What is no letter becomes U+FFFD.
 pub struct Utf16 {
-    input: Box<dyn Read>,
+    input: Box<dyn Read + Send>,
     order: ByteOrder,
     /// What was read and not decoded yet: parts of a letter.
     bytes: Vec<u8>,
@@ -100,7 +100,7 @@ pub struct Utf16 {
 
 impl Utf16 {
     /// The text of an input that begins with this head, of which [`is_utf16`] holds.
-    pub fn new(head: Vec<u8>, rest: Box<dyn Read>) -> Self {
+    pub fn new(head: Vec<u8>, rest: Box<dyn Read + Send>) -> Self {
         Self {
             order: utf16(&head).unwrap_or(ByteOrder::LowFirst),
             input: Box::new(io::Cursor::new(head).chain(rest)),

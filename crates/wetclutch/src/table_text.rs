@@ -1,8 +1,6 @@
 //! A table in memory as the text of a log, made while it is read.
 
-use std::cell::RefCell;
-use std::io::{self, Read, Write};
-use std::rc::Rc;
+use std::io::{self, Read};
 use std::sync::Arc;
 
 use trace::{CsvWriter, TableRows};
@@ -14,34 +12,19 @@ const ROWS: usize = 256;
 pub(crate) struct TableText {
     table: Arc<dyn TableRows>,
     columns: usize,
-    writer: CsvWriter<Piece>,
-    piece: Piece,
+    /// Writes into what was made and not read yet.
+    writer: CsvWriter<Vec<u8>>,
     /// The next row.
     row: usize,
-    /// How much of the piece has been read.
+    /// How much of what was made has been read.
     read: usize,
-}
-
-/// What was written and not read yet.
-#[derive(Clone, Default)]
-struct Piece(Rc<RefCell<Vec<u8>>>);
-
-impl Write for Piece {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.borrow_mut().extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }
 
 impl TableText {
     pub(crate) fn new(table: Arc<dyn TableRows>) -> io::Result<Self> {
-        let (piece, names) = (Piece::default(), table.names());
-        let (columns, writer) = (names.len(), CsvWriter::without_time(piece.clone(), names)?);
-        Ok(Self { table, columns, writer, piece, row: 0, read: 0 })
+        let names = table.names();
+        let (columns, writer) = (names.len(), CsvWriter::without_time(Vec::new(), names)?);
+        Ok(Self { table, columns, writer, row: 0, read: 0 })
     }
 
     fn write_rows(&mut self) -> io::Result<()> {
@@ -56,13 +39,12 @@ impl TableText {
 
 impl Read for TableText {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.read == self.piece.0.borrow().len() {
-            self.piece.0.borrow_mut().clear();
+        if self.read == self.writer.inner().len() {
+            self.writer.inner().clear();
             self.read = 0;
             self.write_rows()?;
         }
-        let piece = self.piece.0.borrow();
-        let rest = &piece[self.read..];
+        let rest = &self.writer.inner()[self.read..];
         let count = rest.len().min(buffer.len());
         buffer[..count].copy_from_slice(&rest[..count]);
         self.read += count;

@@ -213,7 +213,7 @@ impl Estimate {
         if self.learnt.is_some() { 1 } else { self.threads.count().min(self.logs.len()).max(1) }
     }
 
-    /// How many threads read one of the logs.
+    /// On how many threads one of the logs is read, estimated and written.
     pub(crate) fn threads_of_log(&self) -> usize {
         (self.threads.count() / self.logs_at_a_time()).max(1)
     }

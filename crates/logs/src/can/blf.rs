@@ -26,7 +26,7 @@ const CAN_FD_MESSAGE_64: u32 = 101;
 /// A BLF file that is read object by object.
 pub(crate) struct Blf {
     path: PathBuf,
-    input: BufReader<Box<dyn Read>>,
+    input: BufReader<Box<dyn Read + Send>>,
     /// Place in the file.
     offset: u64,
     /// What is left of the containers so far: whole objects and the beginning of one.
@@ -86,7 +86,7 @@ fn u32_at(bytes: &[u8], at: usize) -> u32 {
 }
 
 impl Blf {
-    pub(crate) fn open(path: &Path, input: Box<dyn Read>) -> Result<Self, LogError> {
+    pub(crate) fn open(path: &Path, input: Box<dyn Read + Send>) -> Result<Self, LogError> {
         let mut blf = Self {
             path: path.to_owned(),
             input: BufReader::new(input),

@@ -37,7 +37,7 @@ impl Frame {
 }
 
 /// Something that gives frames.
-pub(crate) trait Frames {
+pub(crate) trait Frames: Send {
     /// The next data frame; none at the end.
     fn next_frame(&mut self) -> Result<Option<Frame>, LogError>;
 

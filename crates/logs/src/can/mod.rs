@@ -34,7 +34,7 @@ use crate::samples::Sample;
 pub(crate) struct CanLog {
     path: PathBuf,
     kind: CanKind,
-    input: Option<Box<dyn Read>>,
+    input: Option<Box<dyn Read + Send>>,
     database: Database,
     /// Frames in a batch: one where each is wanted as it comes.
     batch: usize,
@@ -45,12 +45,12 @@ impl CanLog {
         path: &Path,
         kind: CanKind,
         head: Vec<u8>,
-        rest: Box<dyn Read>,
+        rest: Box<dyn Read + Send>,
         database: Database,
         is_followed: bool,
     ) -> Self {
         const FRAMES: usize = 64;
-        let input: Box<dyn Read> = Box::new(Cursor::new(head).chain(rest));
+        let input: Box<dyn Read + Send> = Box::new(Cursor::new(head).chain(rest));
         let batch = if is_followed { 1 } else { FRAMES };
         Self { path: path.to_owned(), kind, input: Some(input), database, batch }
     }
@@ -78,7 +78,7 @@ impl CanLog {
     }
 }
 
-fn frames(path: &Path, kind: CanKind, input: Box<dyn Read>) -> Result<Box<dyn Frames>, LogError> {
+fn frames(path: &Path, kind: CanKind, input: Box<dyn Read + Send>) -> Result<Box<dyn Frames>, LogError> {
     Ok(match kind {
         CanKind::Blf => Box::new(Blf::open(path, input)?),
         _ => Box::new(text::Lines::new(path, kind, input)),

@@ -22,7 +22,7 @@ const ERROR_FRAME: u32 = 0x2000_0000;
 pub(crate) struct Lines {
     path: PathBuf,
     kind: CanKind,
-    input: BufReader<Box<dyn Read>>,
+    input: BufReader<Box<dyn Read + Send>>,
     line: Vec<u8>,
     number: u64,
     frames: u64,
@@ -47,7 +47,7 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    pub(crate) fn new(path: &Path, kind: CanKind, input: Box<dyn Read>) -> Self {
+    pub(crate) fn new(path: &Path, kind: CanKind, input: Box<dyn Read + Send>) -> Self {
         Self {
             path: path.to_owned(),
             kind,

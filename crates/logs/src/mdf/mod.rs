@@ -177,13 +177,13 @@ impl MdfLog {
         &self.crew
     }
 
-    pub(crate) fn streams(&self, wanted: &[bool]) -> Result<Vec<Box<dyn Stream + Send + '_>>, LogError> {
+    pub(crate) fn streams(&self, wanted: &[bool]) -> Result<Vec<Box<dyn Stream + '_>>, LogError> {
         let mut over: BTreeMap<GroupAt, BTreeMap<GroupAt, Vec<usize>>> = BTreeMap::new();
         for (i, place) in self.places.iter().enumerate().filter(|(i, _)| wanted[*i]) {
             over.entry(place.time).or_default().entry(place.group).or_default().push(i);
         }
         let cut = self.cut.as_ref().map(|(place, what)| LogError::damaged(&self.path, place, what));
-        let mut streams: Vec<Box<dyn Stream + Send + '_>> = vec![Box::new(Remarks { notes: &self.notes, cut })];
+        let mut streams: Vec<Box<dyn Stream + '_>> = vec![Box::new(Remarks { notes: &self.notes, cut })];
         for (time, groups) in over {
             streams.extend(self.streams_over(time, groups)?.into_iter().map(|group| Box::new(group) as Box<_>));
         }

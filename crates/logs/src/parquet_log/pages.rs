@@ -8,13 +8,13 @@ use parquet::schema::types::ColumnDescPtr;
 /// The pages of a column. What their heads say is checked, because the decoder takes it on trust: that a dictionary stands
 /// before the pages that need it and has as many values as it says, and that levels lie within their page.
 pub(super) struct CheckedPages {
-    pages: Box<dyn PageReader>,
+    pages: Box<dyn PageReader + Send>,
     column: ColumnDescPtr,
     dictionary: bool,
 }
 
 impl CheckedPages {
-    pub(super) fn new(pages: Box<dyn PageReader>, column: ColumnDescPtr) -> Self {
+    pub(super) fn new(pages: Box<dyn PageReader + Send>, column: ColumnDescPtr) -> Self {
         Self { pages, column, dictionary: false }
     }
 

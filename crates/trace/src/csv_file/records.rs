@@ -25,7 +25,7 @@ pub enum RecordError {
 
 /// The records of a text, one at a time. Lines end with LF, CR LF or CR; empty lines are passed over, as is a byte order mark.
 pub struct Records {
-    input: Box<dyn Read>,
+    input: Box<dyn Read + Send>,
     delimiter: u8,
     /// What was read: up to `filled`.
     bytes: Vec<u8>,
@@ -65,7 +65,7 @@ enum Found {
 
 impl Records {
     /// The records of a text whose cells are separated by this sign.
-    pub fn new(input: Box<dyn Read>, delimiter: u8) -> Self {
+    pub fn new(input: Box<dyn Read + Send>, delimiter: u8) -> Self {
         Self {
             input,
             delimiter,

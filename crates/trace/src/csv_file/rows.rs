@@ -44,7 +44,7 @@ impl CsvRows {
     ///
     /// # Errors
     /// See [`Self::open`].
-    pub fn of_log(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
+    pub fn of_log(path: &Path, input: Box<dyn Read + Send>) -> Result<Self, TraceError> {
         Ok(Self { may_be_cut: true, ..Self::of(path, input)? })
     }
 
@@ -56,7 +56,7 @@ impl CsvRows {
         Self::from_source(path, Source::Table(TableSource::new(table)))
     }
 
-    fn of(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
+    fn of(path: &Path, input: Box<dyn Read + Send>) -> Result<Self, TraceError> {
         let input = text::as_utf8(input).map_err(|source| TraceError::Io { path: path.to_owned(), source })?;
         Self::from_source(path, Source::Text(Box::new(Records::new(input, b','))))
     }

@@ -147,6 +147,11 @@ impl<W: Write> CsvWriter<W> {
         handed
     }
 
+    /// The writer below, to which the rows go that [`Self::flush`] hands on.
+    pub fn inner(&mut self) -> &mut W {
+        &mut self.writer
+    }
+
     /// Hands the rows so far to the writer below, and flushes it.
     ///
     /// # Errors

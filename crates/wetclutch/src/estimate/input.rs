@@ -31,7 +31,7 @@ pub struct EstimateOptions {
     pub shifts: ShiftChoice,
     /// What was learnt of a car with a gearbox in earlier logs.
     pub learnt: Option<Learnt<f64>>,
-    /// Threads that read the log; none counts as one.
+    /// Threads on which the log is read, estimated and written; none counts as one. The results are the same on any number.
     pub threads: usize,
     /// Shifts of which every row is kept, for a page.
     pub with_page: bool,
@@ -46,6 +46,12 @@ pub struct EstimateOptions {
 impl EstimateOptions {
     pub(crate) fn is_followed(&self) -> bool {
         self.follow.is_some()
+    }
+
+    /// On how many threads a log is read, estimated and written: what comes by and by is done before more of it is waited for.
+    pub(crate) fn threads_of(&self, log: &LogInput<'_>) -> usize {
+        let is_there = log.memory.is_some() || log.path.is_file();
+        if is_there && !self.is_followed() { self.threads } else { 1 }
     }
 
     /// Counts a row as done, and ends the estimate if it is to end.
@@ -107,7 +113,7 @@ impl LogInput<'_> {
     }
 
     /// The text of the log in memory, if it is there.
-    pub(crate) fn text(&self) -> io::Result<Option<Box<dyn Read>>> {
+    pub(crate) fn text(&self) -> io::Result<Option<Box<dyn Read + Send>>> {
         Ok(match (self.table(), self.memory) {
             (Some(table), _) => Some(Box::new(TableText::new(table)?)),
             (None, Some(InMemory::Text(text))) => Some(Box::new(Cursor::new(Arc::clone(text)))),
@@ -130,7 +136,7 @@ impl LogInput<'_> {
     }
 
     /// Opens its text.
-    fn reader(&self, stop: Option<&Arc<AtomicBool>>) -> Result<Box<dyn Read>, Error> {
+    fn reader(&self, stop: Option<&Arc<AtomicBool>>) -> Result<Box<dyn Read + Send>, Error> {
         let opening = |source| LogError::Io { path: self.path.to_owned(), source };
         Ok(match (self.text().map_err(opening)?, stop) {
             (Some(text), _) => text,

@@ -8,6 +8,7 @@ mod no_column;
 pub mod one_shift;
 pub(crate) mod output;
 pub mod selection;
+mod stages;
 pub(crate) mod watched;
 
 use observer::gearbox::Learnt;

@@ -30,6 +30,7 @@ use super::one_shift::ratios::check_wheel;
 use super::output::Destination;
 use super::output::Output;
 use super::selection::Selection;
+use super::stages::{ReadAhead, WriteBehind, with_stages};
 use crate::{Error, Notes, Table, grouped};
 
 /// What is common to all logs of a car.
@@ -146,30 +147,41 @@ pub fn estimate(
     let mut times = RowTimes::default();
     // Without a page no shift is drawn.
     let max_drawn = if options.with_page { MAX_DRAWN } else { 0 };
-    while let Some(step) = source.next_step()? {
-        options.row_done()?;
-        times.push(&step);
-        if let Some(checks) = &mut checks {
-            checks.push(&step);
-        }
-        let estimate = drive.push(&step);
-        drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, shift.gears));
-        let (gears, ranges_pa) = (step.input.gear, drive.pressure_ranges_pa());
-        let (input, reported_n_m) = (step.input, step.reported_n_m);
-        let row = Row { car, numbers: &numbers, places: &places, gears, estimate, ranges_pa, input, reported_n_m };
-        passing.push(step.time_s, row, |time_s, row| {
-            let same = Same {
-                readings: said.replace(row.said()) == Some(row.said()),
-                others: named_before.replace(row.named()) == Some(row.named()),
-            };
-            let new = if same.readings { &columns[..before_readings] } else { &columns[..] };
-            let rest = (new.len() < columns.len()).then_some(Cell::SameWords);
-            table.cells(time_s, new.iter().map(|column| column.cell(row, same)).chain(rest))
-        })?;
-        if options.is_followed() {
-            table.flush()?;
-        }
-    }
+    let write = |(time_s, row): (f64, Row<'_>)| {
+        let same = Same {
+            readings: said.replace(row.said()) == Some(row.said()),
+            others: named_before.replace(row.named()) == Some(row.named()),
+        };
+        let new = if same.readings { &columns[..before_readings] } else { &columns[..] };
+        let rest = (new.len() < columns.len()).then_some(Cell::SameWords);
+        table.cells(time_s, new.iter().map(|column| column.cell(&row, same)).chain(rest))?;
+        if options.is_followed() { table.flush() } else { Ok(()) }
+    };
+    with_stages(options.threads_of(&log), |stages| {
+        let mut rows = WriteBehind::new(stages, write);
+        let mut steps = ReadAhead::new(stages, || {
+            let step = source.next_step()?;
+            if let Some(step) = &step {
+                times.push(step);
+                if let Some(checks) = &mut checks {
+                    checks.push(step);
+                }
+            }
+            Ok(step)
+        });
+        let passed = steps.try_for_each(|step| {
+            let step = step?;
+            options.row_done()?;
+            let estimate = drive.push(&step);
+            drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, shift.gears));
+            let (gears, ranges_pa) = (step.input.gear, drive.pressure_ranges_pa());
+            let (input, reported_n_m) = (step.input, step.reported_n_m);
+            let row = Row { car, numbers: &numbers, places: &places, gears, estimate, ranges_pa, input, reported_n_m };
+            passing.push(step.time_s, row, |time_s, row| rows.push((time_s, *row)))
+        });
+        rows.finish()?;
+        passed
+    })?;
     let origin_s = shown_from_s(times.first_s());
     let median_s = times.check(path, !log.map.channels.is_empty())?;
     source.finish(say)?;

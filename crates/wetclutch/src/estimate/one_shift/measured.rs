@@ -350,6 +350,11 @@ impl<'a> Measured<'a> {
         }
     }
 
+    /// Hands out the step that [`Self::advance`] went on to.
+    pub(crate) fn take_step(&mut self) -> Step {
+        std::mem::replace(&mut self.step, Step::none())
+    }
+
     /// The shifts that were not given with a step, after the last step.
     pub(crate) fn last_shifts(&mut self) -> Vec<Shift> {
         self.finder.restart();

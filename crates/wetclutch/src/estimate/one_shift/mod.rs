@@ -27,6 +27,7 @@ use self::table::{EstimateTable, chosen};
 use super::input::{EstimateOptions, LogInput, say_end_of_followed};
 use super::log_checks::{check_span, old_commands, slow_log, warn_of_dbc};
 use super::output::Destination;
+use super::stages::{WriteBehind, with_stages};
 use crate::{Error, Notes, Table};
 
 /// What is common to all logs of a car.
@@ -126,7 +127,8 @@ pub fn estimate(
         written_s: f64::NEG_INFINITY,
         is_followed: options.is_followed(),
     };
-    let (log, mut rows) = pass((&observer, options), vehicle, log, rows)?;
+    let threads = options.threads_of(&input);
+    let (log, mut rows) = pass((&observer, options), (vehicle, threads), log, rows)?;
     if matches!(destination, Destination::Standard) {
         rows.table.flush()?;
     }
@@ -174,35 +176,41 @@ fn open<'a>(
 /// go by it.
 fn pass<'log, 'rows>(
     (observer, options): (&Chosen, &EstimateOptions),
-    vehicle: &Vehicle,
+    (vehicle, threads): (&Vehicle, usize),
     log: Measured<'log>,
-    rows: Rows<'rows>,
+    mut rows: Rows<'rows>,
 ) -> Result<(Measured<'log>, Rows<'rows>), Error> {
-    let (log, rows) = (RefCell::new(log), RefCell::new(rows));
-    let in_gears = std::iter::from_fn(|| {
-        let mut log = log.borrow_mut();
-        loop {
-            if let Err(interrupted) = options.row_done() {
-                return Some(Err(interrupted));
-            }
-            match log.advance() {
-                Ok(false) => return None,
-                Ok(true) if log.step.is_other_gear => {
-                    if let Err(failure) = rows.borrow_mut().take(&mut log.step, None) {
-                        return Some(Err(failure));
-                    }
+    let log = RefCell::new(log);
+    with_stages(threads, |stages| {
+        let write = |(mut step, estimate): (Step, Option<Estimate<f64>>)| rows.take(&mut step, estimate.as_ref());
+        let passed = RefCell::new(WriteBehind::new(stages, write));
+        let in_gears = std::iter::from_fn(|| {
+            let mut log = log.borrow_mut();
+            loop {
+                if let Err(interrupted) = options.row_done() {
+                    return Some(Err(interrupted));
                 }
-                Ok(true) => return Some(Ok((log.step.input, ()))),
-                Err(failure) => return Some(Err(failure)),
+                match log.advance() {
+                    Ok(false) => return None,
+                    Ok(true) if log.step.is_other_gear => {
+                        if let Err(failure) = passed.borrow_mut().push((log.take_step(), None)) {
+                            return Some(Err(failure));
+                        }
+                    }
+                    Ok(true) => return Some(Ok((log.step.input, ()))),
+                    Err(failure) => return Some(Err(failure)),
+                }
             }
-        }
-    });
-    observer.observer.run_over(Some(vehicle), in_gears, |(), estimate| {
-        let mut log = log.borrow_mut();
-        log.take_back(&estimate.channels);
-        rows.borrow_mut().take(&mut log.step, Some(&estimate))
+        });
+        let all = observer.observer.run_over(Some(vehicle), in_gears, |(), estimate| {
+            let mut log = log.borrow_mut();
+            log.take_back(&estimate.channels);
+            passed.borrow_mut().push((log.take_step(), Some(estimate)))
+        });
+        passed.into_inner().finish()?;
+        all
     })?;
-    let (mut log, mut rows) = (log.into_inner(), rows.into_inner());
+    let mut log = log.into_inner();
     for shift in log.last_shifts() {
         rows.shift(shift)?;
     }
