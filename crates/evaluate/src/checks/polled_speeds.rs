@@ -60,10 +60,14 @@ impl PolledSpeed {
     fn judge(&mut self) {
         let (Some((first_s, _)), Some((last_s, _))) = (self.window.front(), self.window.back()) else { return };
         let step_s = (last_s - first_s) / (WINDOW - 1) as f64;
+        // Read as often as it is measured, a speed has readings of one age.
+        let is_shorter = |period_s: f64| period_s <= MAX_PERIOD * step_s;
+        if !PERIODS_S.into_iter().any(is_shorter) {
+            return;
+        }
         let Some(ages_s) = self.ages_s(0.5 * (first_s + last_s)) else { return };
         for (at, period_s) in PERIODS_S.into_iter().enumerate() {
-            // Read as often as it is measured, a speed has readings of one age.
-            if period_s > MAX_PERIOD * step_s {
+            if !is_shorter(period_s) {
                 continue;
             }
             let on_grid = |time_s: &dyn Fn(usize) -> f64| {

@@ -23,9 +23,9 @@ pub(super) const CORE: usize = 4;
 const DRIVES: usize = 4;
 const LOAD_DRIVES: usize = 2;
 const RATE_DRIVES: usize = 3;
-/// Terms of the series of the exponential: a step is at most [`super::PIECE_S`] long, which is less than a quarter of the
-/// fastest swing of the shafts, so the terms left out are below 1e-7.
-const TERMS: usize = 14;
+/// Terms of the series for the swing of the shafts: a step is at most [`super::PIECE_S`] long, which is less than a quarter of the
+/// fastest one, so the terms left out are below 1e-9.
+const TERMS: usize = 16;
 
 /// Accelerations of turbine and output per torque on either side, rad/s^2 per N m.
 pub(super) type Response<T> = [[T; 2]; 2];
@@ -238,22 +238,46 @@ pub(super) fn dot<T: Real, const L: usize>(a: &[T; L], b: &[T; L]) -> T {
     a.iter().zip(b).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
 }
 
-/// A matrix with one value on its diagonal.
-fn diagonal<T: Real>(x: T) -> [[T; CORE]; CORE] {
-    core::array::from_fn(|row| core::array::from_fn(|column| if row == column { x } else { T::zero() }))
+/// The swing of the drive shafts over one step.
+///
+/// The torque of the shafts `q = T_s + C_s v`, with the rate of their twist `v = w_o/i_df - w_w + r`, is all that ties the states to each
+/// other: `T_s' = K_s v`, `v' = m q + d`. So `T_s` and `v` are two states by themselves, and the exponential of their matrix is
+/// `a I + b M` with `b'' = m C_s b' + m K_s b`, `b(0) = 0`, `b'(0) = 1` (Cayley and Hamilton).
+struct Swing<T> {
+    /// `b` at the end of the step, its integral over the step, and the integral of that.
+    b: T,
+    integral: T,
+    twice: T,
 }
 
-/// The product of a row and a matrix.
-#[inline]
-fn product<T: Real, const L: usize>(row: &[T], matrix: &[[T; L]]) -> [T; L] {
-    let mut sums = [T::zero(); L];
-    for (x, of) in row.iter().zip(matrix) {
-        for (sum, of) in sums.iter_mut().zip(of) {
-            *sum = *sum + *x * *of;
+impl<T: Real> Swing<T> {
+    /// By the series of `b`; `m` is the change of `v'` per torque of the shafts, 1/(kg m^2).
+    fn new(line: &Driveline<T>, m: T, dt_s: T) -> Self {
+        let damped = m * line.shaft_damping_n_m_s_rad * dt_s;
+        let sprung = m * line.shaft_stiffness_n_m_rad * dt_s * dt_s;
+        let (mut before, mut term) = (T::zero(), T::one());
+        let mut sums = [T::zero(); 3];
+        for per in INVERSE_FACTORIALS.windows(sums.len()).skip(1).take(TERMS) {
+            for (sum, per) in sums.iter_mut().zip(per) {
+                *sum = *sum + term * T::of(*per);
+            }
+            (before, term) = (term, damped * term + sprung * before);
         }
+        let [b, integral, twice] = sums;
+        Self { b: dt_s * b, integral: dt_s * dt_s * integral, twice: dt_s * dt_s * dt_s * twice }
     }
-    sums
 }
+
+/// `1/n!` from `n = 0` on.
+const INVERSE_FACTORIALS: [f64; TERMS + 3] = {
+    let (mut inverse, mut factorial, mut n) = ([1.0; TERMS + 3], 1.0, 1);
+    while n < inverse.len() {
+        factorial *= n as f64;
+        inverse[n] = 1.0 / factorial;
+        n += 1;
+    }
+    inverse
+};
 
 /// The solution over one step under constant torques.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -269,23 +293,36 @@ pub(super) struct Motion<T> {
 }
 
 impl<T: Real> Motion<T> {
-    /// By the series of the matrix exponential.
+    /// Exact but for the end of the series of [`Swing`].
     pub(super) fn new(g: Response<T>, line: &Driveline<T>, wheels_kg_m2: T, dt_s: T, fading_s: [T; 2]) -> Self {
-        let Equations { a, b } = Equations::new(&g, line, wheels_kg_m2);
-        // sum of (A h)^n/n!, and of h (A h)^n/(n+1)!. The turbine speed acts on no rate, which leaves its column out of the products.
-        let mut power = a.map(|row| row.map(|x| dt_s * x));
-        let (mut phi, mut integral) = (diagonal(T::one()), diagonal(dt_s));
-        for n in 2..=TERMS {
-            let per = dt_s / T::of(n as f64);
-            for ((phi, integral), power) in phi.iter_mut().zip(&mut integral).zip(&mut power) {
-                for ((phi, integral), power) in phi.iter_mut().zip(integral.iter_mut()).zip(power.iter()) {
-                    *phi = *phi + *power;
-                    *integral = *integral + per * *power;
-                }
-                *power = product(&power[OUTPUT..], &a[OUTPUT..]).map(|x| per * x);
+        let (zero, one) = (T::zero(), T::one());
+        let (i, damping, stiffness) = (line.final_ratio, line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad);
+        let per_wheel_torque = wheels_kg_m2.recip();
+        // Rates of the speeds per torque of the shafts, and of the rate of their twist per torque and load.
+        let per_shaft_torque = [-g[TURBINE][1] / i, -g[OUTPUT][1] / i, per_wheel_torque];
+        let m = per_shaft_torque[OUTPUT] / i - per_shaft_torque[WHEEL];
+        let Swing { b, integral, twice } = Swing::new(line, m, dt_s);
+        let twist = [g[OUTPUT][0] / i, g[OUTPUT][1] / i, per_wheel_torque];
+        // The integral of the torque of the shafts per rate of twist at the beginning, and per what drives that rate.
+        let (by_rate, by_drive) = (stiffness * integral + damping * b, stiffness * twice + damping * integral);
+        let (mut phi, mut gamma) = ([[zero; CORE]; CORE], [[zero; DRIVES]; CORE]);
+        for (k, per) in per_shaft_torque.into_iter().enumerate() {
+            phi[k][k] = one;
+            phi[k][OUTPUT] = phi[k][OUTPUT] + per * by_rate / i;
+            phi[k][WHEEL] = phi[k][WHEEL] - per * by_rate;
+            phi[k][SPRING] = per * b;
+            let own = if k == WHEEL { [zero, zero, -per_wheel_torque] } else { [g[k][0], g[k][1], zero] };
+            for ((gamma, own), twist) in gamma[k].iter_mut().zip(own).zip(twist) {
+                *gamma = dt_s * own + per * by_drive * twist;
             }
+            gamma[k][RATE_DRIVES] = per * by_rate;
         }
-        let gamma = integral.map(|row| product(&row, &b));
+        let per_rate = stiffness * b;
+        phi[SPRING] = [zero, per_rate / i, -per_rate, one + m * stiffness * integral];
+        for (gamma, twist) in gamma[SPRING].iter_mut().zip(twist) {
+            *gamma = stiffness * integral * twist;
+        }
+        gamma[SPRING][RATE_DRIVES] = per_rate;
         Self { of: (g, dt_s), phi, gamma, stay: fading_s.map(|time_s| (-dt_s / time_s).exp()) }
     }
 
@@ -308,6 +345,7 @@ impl<T: Real> Motion<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gearbox::PIECE_S;
 
     const LINE: Driveline<f64> = Driveline {
         final_ratio: 3.0,
@@ -363,6 +401,27 @@ mod tests {
                 let whole = dot(&rows[k], &state()) + rest[k];
                 let small = x.mean[k];
                 assert!((whole - small).abs() < 2e-4 * (1.0 + small.abs()), "{k}: {whole} {small}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_is_two_of_half_its_length() {
+        for (stiffness, damping) in [(13_000.0, 20.0), (13_000.0, 0.0), (6_000.0, 150.0), (40_000.0, 20.0)] {
+            let line = Driveline { shaft_stiffness_n_m_rad: stiffness, shaft_damping_n_m_s_rad: damping, ..LINE };
+            for g in [free(&MASS), tied(1.0, MASS[1][1] + 2.0 * MASS[0][1] + MASS[0][0])] {
+                let motion = |dt_s: f64| Motion::new(g, &line, WHEELS_KG_M2, dt_s, [1.0; 2]);
+                let (whole, half) = (motion(PIECE_S), motion(0.5 * PIECE_S));
+                for (k, row) in half.phi.iter().enumerate() {
+                    let near = |one: f64, other: f64| (one - other).abs() <= 1e-9 * (1.0 + one.abs());
+                    for j in 0..CORE {
+                        let twice: f64 = (0..CORE).map(|l| row[l] * half.phi[l][j]).sum();
+                        assert!(near(whole.phi[k][j], twice), "{stiffness} {k} {j}: {} {twice}", whole.phi[k][j]);
+                        let driven: f64 = (0..CORE).map(|l| row[l] * half.gamma[l][j]).sum();
+                        let twice = driven + half.gamma[k][j];
+                        assert!(near(whole.gamma[k][j], twice), "{stiffness} {k} {j}: {} {twice}", whole.gamma[k][j]);
+                    }
+                }
             }
         }
     }
