@@ -64,7 +64,7 @@ layout! {
     FrictionElement { clutch, valve, limits, piston, budget, uncertainty }
     GearRow { ratio, inertia_kg_m2, holding }
     ShiftClutch { element, alpha, ratio }
-    ShiftRow { from, to, clutches, mass_kg_m2, has_dog }
+    ShiftRow { from, to, clutches, mass_kg_m2, slips, has_dog }
 }
 
 /// Words of an element of a shift that is no clutch or brake with a place in the tables.

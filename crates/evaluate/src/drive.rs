@@ -353,6 +353,7 @@ mod tests {
             slip_rad_s: if sticks { 0.0 } else { 20.0 },
             slip_range_rad_s: None,
             alpha: 1.0,
+            drag_n_m: 0.0,
             has_pressure: true,
             torque_range_n_m: Some([0.0, 200.0]),
             pressure_range_pa: Some([2e5, 4e5]),

@@ -2,6 +2,7 @@
 
 use car::{Car, Sensors};
 use car::{ErrorBudget, Gear, LOST_S, ShiftCommand};
+use drivetrain::clutch::drag_torque;
 use observer::gearbox::{
     ClutchEstimate, GearboxFilter, GearboxState, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftInput, ShiftPhase,
 };
@@ -306,8 +307,12 @@ impl<'c> LoggedDrive<'c> {
                     let [_, torque_n_m, slip_rad_s] = step.truth[c];
                     let by_speeds = row.clutches[c].alpha * (turbine - row.clutches[c].ratio * output);
                     let slips = [slip_rad_s, by_speeds];
+                    let element = found[c].element.place().and_then(|place| self.tables.element_at(place));
+                    let peak_n_m = element.and_then(|at| self.car.clutches[at].as_ref()).map_or(0.0, |of| of.drag_n_m);
+                    let drag_n_m = drag_torque(peak_n_m, by_speeds);
                     ClutchRow {
                         alpha: row.clutches[c].alpha,
+                        drag_n_m: if found[c].holds || drag_n_m.is_nan() { 0.0 } else { drag_n_m },
                         slip_range_rad_s: ends.map(|ends| {
                             let slips = ends.map(|[turbine, output]| {
                                 row.clutches[c].alpha * (turbine - row.clutches[c].ratio * output)
@@ -421,6 +426,7 @@ fn clutch_row(
         slip_rad_s: if slip_rad_s.is_nan() { by_speeds } else { slip_rad_s },
         slip_range_rad_s: None,
         alpha: f64::NAN,
+        drag_n_m: 0.0,
         torque_n_m: [torque_n_m, found.torque_n_m, found.open_loop_n_m],
         torque_std_dev_n_m: found.std_dev_n_m,
         pressure_std_dev_pa: found.pressure_std_dev_pa,

@@ -27,6 +27,8 @@ pub struct ClutchRow {
     pub slip_range_rad_s: Option<[f64; 2]>,
     /// Its slip per turbine speed, `alpha`: the turbine feels `alpha` times its torque.
     pub alpha: f64,
+    /// What of the estimated torque is the drag of its plates, N m.
+    pub drag_n_m: f64,
     /// Whether it truly sticks; by the estimate where that is not known.
     pub sticks: bool,
     /// The guaranteed range of the torque, N m.
@@ -99,6 +101,7 @@ impl ClutchRow {
             slip_rad_s: f64::NAN,
             slip_range_rad_s: None,
             alpha: f64::NAN,
+            drag_n_m: 0.0,
             sticks,
             has_pressure: true,
             torque_range_n_m: None,
@@ -116,8 +119,9 @@ impl ShiftScoreRow {
             [false, false] => Some(TruePhase::Inertia),
             [true, true] => None,
             [off, _] => {
-                let [truth, estimate, _] = self.clutches[usize::from(off)].torque_n_m;
-                let torque_n_m = if truth.is_nan() { estimate } else { truth };
+                let clutch = &self.clutches[usize::from(off)];
+                let [truth, estimate, _] = clutch.torque_n_m;
+                let torque_n_m = if truth.is_nan() { estimate - clutch.drag_n_m } else { truth };
                 (torque_n_m.abs() > CARRIES_N_M).then_some(TruePhase::Torque)
             }
         }
@@ -279,6 +283,7 @@ pub(crate) fn true_row(sample: &CarSample) -> Option<ShiftScoreRow> {
         slip_rad_s: truth.slip_rad_s,
         slip_range_rad_s: None,
         alpha: f64::NAN,
+        drag_n_m: 0.0,
         sticks: truth.sticks,
         torque_range_n_m: None,
         pressure_range_pa: None,
@@ -320,6 +325,7 @@ pub fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstima
                 slip_rad_s: truth.slip_rad_s,
                 slip_range_rad_s: None,
                 alpha: alphas.map_or(f64::NAN, |alphas| alphas[c]),
+                drag_n_m: 0.0,
                 sticks: truth.sticks,
                 torque_range_n_m: found.torque_range_n_m,
                 pressure_range_pa: found.pressure_range_pa,

@@ -57,7 +57,7 @@ pub(crate) fn certificate(filter: &ExportedFilter) -> String {
          - Shifts: {}. In any other change of the gear the valve models alone give the pressures.\n\
          - A command is at most {} s older than the step that first shows it, and never older than the time step.\n\
          - The direction of a clutch torque is that of its slip, where the speeds show one beyond their errors; else either is possible.\n\
-         - Drag of open clutches is left out.\n\
+         - The drag of plates that slip is between none and the peak of the vehicle file.\n\
          - Single precision, without fused or reordered operations: `wetclutch_{}_selftest` shows it.\n",
         shifts.join(", "),
         number(budget.command_age_s),

@@ -210,6 +210,20 @@ impl Gearbox {
         (0..self.elements.len()).find(|&element| self.is_one_way(element) && slip(element) > ZERO)
     }
 
+    /// Slip of each element per turbine and output speed in a shift, zero of those that are held. `None` of ratios alone, and where the shift
+    /// is none between two elements.
+    pub fn slips_in_shift(&self, shift: &Shift) -> Option<Vec<[f64; 2]>> {
+        let Change::Single { held, .. } = &shift.change else { return None };
+        let train = self.train.as_ref()?;
+        let speeds = train.speeds_in_shift(held)?;
+        let slip = |element: usize| {
+            let slip = train.slip_row(element) * &speeds;
+            [slip[0], slip[1]]
+        };
+        let elements = 0..self.elements.len();
+        Some(elements.map(|element| if held.contains(&element) { [0.0; 2] } else { slip(element) }).collect())
+    }
+
     /// Adds the shift between any two gears.
     fn add_shifts(
         &mut self,

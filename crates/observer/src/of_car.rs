@@ -92,7 +92,13 @@ impl ShiftTables<f64> {
                 return None;
             }
             let has_dog = has_dog(gearbox, shift);
-            Some(ShiftRow { has_dog, ..ShiftRow::new([shift.from, shift.to], clutches, &reduced) })
+            let mut row = ShiftRow { has_dog, ..ShiftRow::new([shift.from, shift.to], clutches, &reduced) };
+            for (place, slip) in places.iter().zip(gearbox.slips_in_shift(shift).unwrap_or_default()) {
+                if let Some(place) = *place {
+                    row.slips[place] = slip;
+                }
+            }
+            Some(row)
         });
         let shifts: Vec<_> = shift_rows.collect();
         // In a gear the inertia is the same in every shift from it or to it.

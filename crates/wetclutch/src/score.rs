@@ -141,6 +141,7 @@ fn clutch_row([pressure_pa, torque_n_m, slip_rad_s]: [f64; 3], found: &[f64]) ->
         slip_rad_s,
         slip_range_rad_s: None,
         alpha: f64::NAN,
+        drag_n_m: 0.0,
         sticks: slip_rad_s.abs() < STICKS_RAD_S,
         torque_range_n_m,
         pressure_range_pa,

@@ -3,7 +3,6 @@
 use car::Car;
 use drivetrain::clutch::drag_torque;
 use drivetrain::{Real, ShiftKind};
-use geartrain::Change;
 use nalgebra::{DMatrix, DVector};
 use observer::ShiftTables;
 
@@ -299,13 +298,10 @@ fn drag(
     log: &ShiftLog,
     grid: Grid,
 ) -> Option<(Vec<f64>, Vec<(usize, Vec<f64>)>)> {
-    let Change::Single { held, .. } = &car.gearbox.shift(log.gears[0], log.gears[1])?.change else { return None };
-    let train = car.gearbox.train.as_ref()?;
-    let speeds = train.speeds_in_shift(held)?;
+    let slips = car.gearbox.slips_in_shift(car.gearbox.shift(log.gears[0], log.gears[1])?)?;
     let (mut file_n_m, mut each) = (vec![0.0; grid.points], Vec::new());
-    for (at, clutch) in car.clutches.iter().enumerate().filter(|(at, _)| !held.contains(at)) {
+    for (at, (clutch, slip)) in car.clutches.iter().zip(slips).enumerate().filter(|(_, (_, slip))| *slip != [0.0; 2]) {
         let Some(clutch) = clutch else { continue };
-        let slip = train.slip_row(at) * &speeds;
         let of_one = |time_s: f64| {
             let slip_rad_s = slip[0] * log.turbine.at(time_s) + slip[1] * log.output.at(time_s);
             -slip[0] * drag_torque(1.0, slip_rad_s)

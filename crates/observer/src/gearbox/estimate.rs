@@ -9,7 +9,7 @@ use super::powertrain::{ClutchTorque, Torques};
 use super::{
     ClutchesAtTurbine, FRACTION, FRICTION, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS, N, Newest,
     OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftElement, ShiftInput, ShiftPhase, ShiftRow,
-    WHEEL, square,
+    TURBINE, WHEEL, square,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -233,8 +233,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         [f, k]: [T; 2],
     ) -> ClutchEstimate<T> {
         let zero = T::zero();
-        let nothing = (ClutchTorque::none(), zero, zero, zero, [zero; 2]);
-        let (torque, valve_pa, pressure_pa, both, [drag, variance]) =
+        let nothing = (ClutchTorque::none(), zero, zero, zero, [zero; 3]);
+        let (torque, valve_pa, pressure_pa, both, [drag, std_dev, variance]) =
             self.element(elements, clutch.element).map_or(nothing, |found| {
                 let (memory, element) = found;
                 let torque = memory.torque(element, clutch, slip, &PressureError::unseen(k));
@@ -242,14 +242,15 @@ impl<T: Real> GearboxFilter<'_, T> {
                 let pressure_pa = element.limits.possible_pressure(valve_pa * (T::one() + element.gain_error(f, k)));
                 let u = &element.uncertainty;
                 let variance = square(valve_pa * u.valve_gain) + square(memory.error_std_dev_pa(element));
-                (torque, valve_pa, pressure_pa, element.correlation_in_shift(), [u.drag_n_m, variance])
+                let drag = element.drag_n_m(clutch.alpha * slip[0]);
+                (torque, valve_pa, pressure_pa, element.correlation_in_shift(), [drag, u.drag_n_m, variance])
             });
         let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
         ClutchEstimate {
             element: clutch.element,
             pressure_pa,
-            torque_n_m: corrected / clutch.alpha,
-            std_dev_n_m: (torque.unlearnt_variance(both) / square(clutch.alpha) + square(drag)).sqrt(),
+            torque_n_m: corrected / clutch.alpha + drag,
+            std_dev_n_m: (torque.unlearnt_variance(both) / square(clutch.alpha) + square(std_dev)).sqrt(),
             pressure_std_dev_pa: variance.sqrt(),
             valve_pa,
             open_loop_n_m: torque.open_loop_n_m / clutch.alpha,
@@ -291,8 +292,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             torque = zero;
         }
         let std_dev = x.variance(&row).sqrt();
-        let nothing = (zero, zero, zero, [zero; 2]);
-        let (valve_pa, pressure_pa, both, [drag, variance]) =
+        let nothing = (zero, zero, zero, [zero; 3]);
+        let (valve_pa, pressure_pa, both, [drag, drag_std_dev, variance]) =
             self.element(elements, clutch.element).map_or(nothing, |(memory, element)| {
                 let modelled_pa = memory.pressure_pa();
                 let gain = modelled_pa * element.gain_error(x.mean[FRICTION[c]], x.mean[KISS[c]]);
@@ -308,17 +309,19 @@ impl<T: Real> GearboxFilter<'_, T> {
                 // Of one that holds the speeds show nothing of it.
                 let unseen = if holds { square(of_itself) } else { zero };
                 pressure[PRESSURE[c]] = if holds { zero } else { of_itself };
-                let drag = if holds { zero } else { element.uncertainty.drag_n_m };
+                let slip = clutch.alpha * (x.mean[TURBINE] - clutch.ratio * x.mean[OUTPUT]);
+                let drag =
+                    [element.drag_n_m(slip), element.uncertainty.drag_n_m].map(|drag| if holds { zero } else { drag });
                 let variance = x.variance(&pressure) + left + unseen;
-                (modelled_pa, possible_pa, element.correlation_in_shift(), [drag, variance])
+                (modelled_pa, possible_pa, element.correlation_in_shift(), [drag[0], drag[1], variance])
             });
         let open_loop_n_m = if holds { own.open_loop_n_m.abs() * torque.signum() } else { own.open_loop_n_m };
         let alone = own.unlearnt_variance(both).sqrt();
         ClutchEstimate {
             element: clutch.element,
             pressure_pa,
-            torque_n_m: torque / clutch.alpha,
-            std_dev_n_m: (square(std_dev / clutch.alpha) + square(drag)).sqrt(),
+            torque_n_m: torque / clutch.alpha + drag,
+            std_dev_n_m: (square(std_dev / clutch.alpha) + square(drag_std_dev)).sqrt(),
             pressure_std_dev_pa: variance.at_least(zero).sqrt(),
             valve_pa,
             open_loop_n_m: open_loop_n_m / clutch.alpha,

@@ -1,10 +1,12 @@
 //! What the powertrain does over one step, for any shift.
 //!
 //! ```text
-//! (w_t', w_o') = G (X, Y)         X = (1 + b + c) T_t - m M11 w_t' - U_off - U_on,   Y = -T_o + i_off U_off + i_on U_on
+//! (w_t', w_o') = G (X, Y)         X = (1 + b + c) T_t - m M11 w_t' - U_off - U_on - D_t,   Y = -T_o + i_off U_off + i_on U_on - D_o
 //! T_o = (T_s + C_s (w_o/i_df - w_w + r))/i_df
 //! w_w' = (i_df T_o - T_L)/J       T_s' = K_s (w_o/i_df - w_w + r)
 //! ```
+//!
+//! `D_t` and `D_o` are the drag of all plates that slip or are open, each times its slip per turbine and output speed.
 //!
 //! `G` is the inverse of the mass while no clutch holds; while one holds with the ratio `i`, the torques of turbine and
 //! output act on one inertia, and the torque of that clutch is left out.
@@ -105,6 +107,8 @@ pub(super) struct Torques<T> {
     pub(super) fraction_n_m: T,
     /// The same times the standard deviation of the part of its error that lasts.
     pub(super) slow_fraction_n_m: T,
+    /// On the turbine and on the output side, by the drag of the plates that slip or are open.
+    pub(super) drag_n_m: [T; 2],
     /// `M11 w_t'` times the standard deviation of `M11`.
     pub(super) inertia_n_m: T,
     pub(super) clutches: [ClutchTorque<T>; 2],
@@ -118,6 +122,7 @@ impl<T: Real> Torques<T> {
             turbine_n_m: half * (self.turbine_n_m + other.turbine_n_m),
             fraction_n_m: half * (self.fraction_n_m + other.fraction_n_m),
             slow_fraction_n_m: half * (self.slow_fraction_n_m + other.slow_fraction_n_m),
+            drag_n_m: [0, 1].map(|side| half * (self.drag_n_m[side] + other.drag_n_m[side])),
             inertia_n_m: half * (self.inertia_n_m + other.inertia_n_m),
             clutches: [self.clutches[0].mean(&other.clutches[0]), self.clutches[1].mean(&other.clutches[1])],
         }
@@ -142,7 +147,7 @@ impl<T: Real> Torques<T> {
     /// on, and what is left beside them.
     pub(super) fn row(&self, per: [T; 2]) -> ([T; N], T) {
         let mut row = [T::zero(); N];
-        let mut rest = per[0] * self.turbine_n_m;
+        let mut rest = per[0] * (self.turbine_n_m + self.drag_n_m[0]) + per[1] * self.drag_n_m[1];
         row[FRACTION] = per[0] * self.fraction_n_m;
         row[SLOW_FRACTION] = per[0] * self.slow_fraction_n_m;
         row[INERTIA] = -per[0] * self.inertia_n_m;
@@ -371,6 +376,7 @@ mod tests {
             turbine_n_m: 120.0,
             fraction_n_m: 115.0,
             slow_fraction_n_m,
+            drag_n_m: [0.0; 2],
             inertia_n_m,
             clutches: [clutch(4.7, -20.0), clutch(3.13, 90.0)],
         }

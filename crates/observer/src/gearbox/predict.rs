@@ -34,6 +34,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     ) -> Torques<T> {
         let u = &self.uncertainty;
         let (mut clutches, mut inertia_n_m) = ([ClutchTorque::none(); 2], T::zero());
+        let drag_n_m = running.shift.as_ref().map_or([T::zero(); 2], |shift| self.tables.drag_n_m(shift, speeds));
         if let Some(shift) = &running.shift {
             inertia_n_m = u.inertia_share * shift.mass_kg_m2[0][0] * running.rates[TURBINE];
             for (c, (torque, clutch)) in clutches.iter_mut().zip(&shift.clutches).enumerate() {
@@ -47,7 +48,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         let fraction_n_m = running.slow_n_m;
         let slow_fraction_n_m = found.fraction * fraction_n_m;
-        Torques { turbine_n_m: found.turbine_n_m, fraction_n_m, slow_fraction_n_m, inertia_n_m, clutches }
+        Torques { turbine_n_m: found.turbine_n_m, fraction_n_m, slow_fraction_n_m, drag_n_m, inertia_n_m, clutches }
     }
 
     pub(super) fn element<'s>(

@@ -203,6 +203,8 @@ pub struct ShiftRow<T> {
     pub clutches: [ShiftClutch<T>; 2],
     /// Mass `M` in turbine and output speed, kg m^2.
     pub mass_kg_m2: [[T; 2]; 2],
+    /// Slip of each element, in the order of [`GearboxTables::elements`], per turbine and output speed; zero of one that is held.
+    pub slips: [[T; 2]; MAX_ELEMENTS],
     /// Whether a dog that is held has to be put in, which is not in the gear before: until it is, the shaft of the oncoming clutch
     /// turns at another ratio.
     pub has_dog: bool,
@@ -220,14 +222,22 @@ pub struct GearboxTables<'a, T> {
 }
 
 impl<T: Real> ShiftRow<T> {
-    /// The shift between two gears with these offgoing and oncoming elements, without dogs.
+    /// The shift between two gears with these offgoing and oncoming elements, without dogs, and without the slips of all others.
     pub fn new(gears: [usize; 2], elements: [ShiftElement; 2], reduced: &ReducedShift<T>) -> Self {
         let clutch = |element, slip: [T; 2]| ShiftClutch { element, alpha: slip[0], ratio: -slip[1] / slip[0] };
+        let [offgoing, oncoming] = [reduced.slip_offgoing, reduced.slip_oncoming];
+        let mut slips = [[T::zero(); 2]; MAX_ELEMENTS];
+        for (element, slip) in elements.iter().zip([offgoing, oncoming]) {
+            if let Some(of) = element.place().and_then(|place| slips.get_mut(place)) {
+                *of = slip;
+            }
+        }
         Self {
             from: gears[0],
             to: gears[1],
-            clutches: [clutch(elements[0], reduced.slip_offgoing), clutch(elements[1], reduced.slip_oncoming)],
+            clutches: [clutch(elements[0], offgoing), clutch(elements[1], oncoming)],
             mass_kg_m2: reduced.mass_kg_m2,
+            slips,
             has_dog: false,
         }
     }
@@ -261,6 +271,7 @@ impl<T: Real> ShiftRow<T> {
                 ratio: to(clutch.ratio),
             }),
             mass_kg_m2: self.mass_kg_m2.map(|row| row.map(to)),
+            slips: self.slips.map(|slip| slip.map(to)),
             has_dog: self.has_dog,
         }
     }
@@ -305,6 +316,18 @@ impl<'a, T: Real> GearboxTables<'a, T> {
     /// is the same. `None` for a shift that skips a gear.
     pub fn pair(&self, from: usize, to: usize) -> Option<usize> {
         (from.abs_diff(to) == 1).then_some(from.min(to))
+    }
+
+    /// Torque on the turbine and on the output side by the drag of all plates that slip or are open in a shift, at these speeds of both, N m.
+    pub(super) fn drag_n_m(&self, shift: &ShiftRow<T>, [turbine, output]: [T; 2]) -> [T; 2] {
+        let mut sum = [T::zero(); 2];
+        for (slip, element) in shift.slips.iter().zip(self.elements) {
+            let drag = element.drag_n_m(slip[0] * turbine + slip[1] * output);
+            for (sum, per) in sum.iter_mut().zip(slip) {
+                *sum = *sum - *per * drag;
+            }
+        }
+        sum
     }
 
     /// A shift out of a gear: in the gear its balance of the turbine holds with the offgoing clutch alone.

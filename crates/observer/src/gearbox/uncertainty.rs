@@ -1,6 +1,7 @@
 //! What the filter does not know, as standard deviations: of each element, and of the rest of the car.
 
 use drivetrain::Real;
+use drivetrain::clutch::drag_torque;
 
 use super::{FrictionElement, square};
 
@@ -52,7 +53,7 @@ pub struct ElementUncertainty<T> {
     pub valve_delay_s: T,
     /// Error of the pressure at rest that does not last, Pa.
     pub pressure_pa: T,
-    /// Torque of the plates that no model has, of a clutch that slips or is open: its drag, N m.
+    /// Peak of the drag of its plates, N m ([`drivetrain::clutch::drag_torque`]).
     pub drag_n_m: T,
     /// How many times as wide as usual the bounds of its errors are: the wider of friction and gain, of hysteresis and command, of lag and delay.
     pub widths: [T; 3],
@@ -112,6 +113,12 @@ impl<T: Real> ShiftUncertainty<T> {
 }
 
 impl<T: Real> FrictionElement<T> {
+    /// Drag of its plates at a slip, rad/s, with the sign of the slip, N m.
+    #[inline]
+    pub(super) fn drag_n_m(&self, slip_rad_s: T) -> T {
+        drag_torque(self.uncertainty.drag_n_m, slip_rad_s)
+    }
+
     /// Standard deviation of the kiss point, Pa: what lasts is an own one and that of the valve's gain.
     pub(super) fn kiss_std_dev_pa(&self) -> T {
         let u = &self.uncertainty;

@@ -99,7 +99,7 @@ fn print(rows: &[MatrixRow]) {
     println!("rows that say that an element slips: {} of {}", counts.slips_said, counts.rows);
 }
 
-/// Takes out of the true car what the filter has no model of, to see what it costs: `WITHOUT="drag delay"`.
+/// Takes out of the true car what the filter does not know, to see what it costs: `WITHOUT="drag delay"`.
 fn leave_out(truth: &mut Car) {
     let Ok(what) = std::env::var("WITHOUT") else { return };
     for clutch in truth.clutches.iter_mut().flatten() {
@@ -127,17 +127,17 @@ const MATRIX_DRAWS: u64 = 40;
 type Ratios = [(ShiftKind, [f64; 2]); 4];
 
 const DOCUMENTED: Ratios = [
-    (ShiftKind::PowerOnUp, [0.75, 0.32]),
-    (ShiftKind::PowerOnDown, [0.52, 0.56]),
-    (ShiftKind::PowerOffUp, [0.52, 0.55]),
-    (ShiftKind::CoastDown, [0.71, 0.35]),
+    (ShiftKind::PowerOnUp, [0.78, 0.32]),
+    (ShiftKind::PowerOnDown, [0.49, 0.56]),
+    (ShiftKind::PowerOffUp, [0.455, 0.50]),
+    (ShiftKind::CoastDown, [0.70, 0.365]),
 ];
 
 const DOCUMENTED_OF_WHOLE_BUDGET: Ratios = [
-    (ShiftKind::PowerOnUp, [0.73, 0.36]),
-    (ShiftKind::PowerOnDown, [0.71, 0.52]),
-    (ShiftKind::PowerOffUp, [0.56, 0.59]),
-    (ShiftKind::CoastDown, [0.67, 0.39]),
+    (ShiftKind::PowerOnUp, [0.70, 0.36]),
+    (ShiftKind::PowerOnDown, [0.67, 0.50]),
+    (ShiftKind::PowerOffUp, [0.47, 0.57]),
+    (ShiftKind::CoastDown, [0.64, 0.38]),
 ];
 
 /// The matrix is that of the documentation to the last digit, and all values are in their guaranteed ranges.
@@ -165,7 +165,7 @@ fn matrix_of_cars_of_the_whole_budget() {
     let rows = rows(&cars(), MATRIX_DRAWS, true);
     print(&rows);
     is_not_worse_than_the_open_loop(&rows);
-    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 212);
+    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 195);
 }
 
 /// All values are in their guaranteed ranges, and of no kind and no phase is the filter worse than the valve model, over all
@@ -187,7 +187,7 @@ fn is_not_worse_than_the_open_loop(rows: &[MatrixRow]) {
 fn matrix_of_shifts_and_kinds() {
     let rows = rows(&cars(), MATRIX_DRAWS, false);
     print(&rows);
-    is_as_documented(&rows, &DOCUMENTED, 228);
+    is_as_documented(&rows, &DOCUMENTED, 282);
 }
 
 /// The same numbers on one thread and on three, and other cars with another seed.
