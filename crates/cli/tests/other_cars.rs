@@ -1,7 +1,7 @@
 //! Estimates of cars with other parts than a converter that is open and a gearbox whose train is known.
 
 use crate::any_car::numbers;
-use crate::support::{Folder, ROOT, printed, refused, said, stderr, wetclutch};
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, said, stderr, stdout, wetclutch};
 
 /// Two shifts of a car with the two-speed gearbox.
 const TWO_SHIFTS: &str = "name = \"d\"\n[[shift]]\ntime_s = 6\ngear = \"2\"\n[[shift]]\ntime_s = 14\ngear = \"1\"\n\
@@ -49,6 +49,29 @@ fn simulated(folder: &Folder, drive: &str, car: &str) -> [String; 2] {
 fn estimate(folder: &Folder, log: &str, car: &str, output: &str) -> String {
     said(&wetclutch(&["estimate", log, "--vehicle", car, "-o", &folder.path(output)]));
     folder.read(output)
+}
+
+/// A row whose time is no number ends a log with the same error.
+#[test]
+fn a_log_has_the_same_estimate_on_any_number_of_threads() {
+    let folder = Folder::new("stages");
+    let pressure = "[hydraulics]\nline_pressure_pa = 1.0e6\n";
+    let car = vehicle(&folder, "car", &format!("{ROOT}gearboxes/two_speed.toml"), pressure);
+    let [_, log] = simulated(&folder, TWO_SHIFTS, &car);
+    let whole = folder.read("sim/d_measured.csv");
+    let commas = whole.lines().next().unwrap().matches(',').count();
+    let broken = folder.write("broken.csv", format!("{whole}soon{}\n", ",".repeat(commas)));
+    let one_shift = folder.path("e1");
+    said(&wetclutch(&["simulate", EXPERIMENT, "-o", &one_shift]));
+    let of_one_shift = folder.path("e1/e1_measured.csv");
+    for (log, vehicle) in [(&log, car.as_str()), (&broken, &car), (&of_one_shift, VEHICLE)] {
+        let estimate = |threads: &str| wetclutch(&["estimate", log, "--vehicle", vehicle, "--threads", threads]);
+        let (one, three) = (estimate("1"), estimate("3"));
+        assert_eq!(one.status.success(), log != &broken);
+        assert!(log == &broken || stdout(&one).lines().count() > 500, "{log}");
+        assert!((stdout(&one), stderr(&one)) == (stdout(&three), stderr(&three)), "{log}: {}", stderr(&three));
+        assert_eq!(one.status, three.status);
+    }
 }
 
 #[test]
