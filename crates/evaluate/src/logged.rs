@@ -401,7 +401,6 @@ impl<'c> LoggedDrive<'c> {
     }
 }
 
-/// The row of a clutch beside the pressure and torque that are known, with its true slip and that by the readings.
 /// Turbine and output speed at both ends of what they can be in a shift between gears of these ratios, by the recent ones and the last ones, rad/s; none
 /// where both are recent, and not numbers where one has not come for long.
 fn speeds_without(recent: [f64; 2], last: [f64; 2], ratios: [f64; 2]) -> Option<[[f64; 2]; 2]> {
@@ -417,6 +416,7 @@ fn speeds_without(recent: [f64; 2], last: [f64; 2], ratios: [f64; 2]) -> Option<
     Some([outside(lower, -1.0), outside(higher, 1.0)])
 }
 
+/// The row of a clutch beside the pressure and torque that are known, with its true slip and that by the readings.
 fn clutch_row(
     found: &ClutchEstimate<f64>,
     [pressure_pa, torque_n_m]: [f64; 2],

@@ -6,7 +6,8 @@
 use std::collections::VecDeque;
 use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
-use std::thread::{Scope, ScopedJoinHandle};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{Builder, Scope, ScopedJoinHandle};
 
 use crate::Error;
 
@@ -39,14 +40,14 @@ pub(crate) enum ReadAhead<T, F> {
 
 impl<T: Send, F: FnMut() -> Result<Option<T>, Error>> ReadAhead<T, F> {
     /// `next` gives the next item, and none behind the last.
-    pub(crate) fn new<'scope>(stages: Stages<'scope, '_>, mut next: F) -> Self
+    pub(crate) fn new<'scope>(stages: Stages<'scope, '_>, next: F) -> Self
     where
         T: 'scope,
         F: Send + 'scope,
     {
         let Stages::Together(scope) = stages else { return Self::Here(next) };
         let (mut giver, taker) = handed();
-        scope.spawn(move || {
+        let read = move |mut next: F| {
             while let Some(item) = next().transpose() {
                 let is_last = item.is_err();
                 // No one takes it where the stage behind has failed.
@@ -54,8 +55,11 @@ impl<T: Send, F: FnMut() -> Result<Option<T>, Error>> ReadAhead<T, F> {
                     return;
                 }
             }
-        });
-        Self::There(taker)
+        };
+        match spawned(Builder::new(), scope, next, read) {
+            Ok(_) => Self::There(taker),
+            Err(next) => Self::Here(next),
+        }
     }
 }
 
@@ -73,7 +77,7 @@ impl<T, F: FnMut() -> Result<Option<T>, Error>> Iterator for ReadAhead<T, F> {
 /// A stage behind this one.
 pub(crate) enum WriteBehind<'scope, T: Send, F> {
     Here(F),
-    There(Giver<T>, ScopedJoinHandle<'scope, Result<(), Error>>),
+    There(Giver<T>, ScopedJoinHandle<'scope, Option<Result<(), Error>>>),
     /// It has failed, and what with was returned.
     Failed,
 }
@@ -87,7 +91,10 @@ impl<'scope, T: Send, F: FnMut(T) -> Result<(), Error>> WriteBehind<'scope, T, F
     {
         let Stages::Together(scope) = stages else { return Self::Here(write) };
         let (giver, mut taker) = handed();
-        Self::There(giver, scope.spawn(move || taker.try_for_each(write)))
+        match spawned(Builder::new(), scope, write, move |write: F| taker.try_for_each(write)) {
+            Ok(writer) => Self::There(giver, writer),
+            Err(write) => Self::Here(write),
+        }
     }
 
     /// Hands an item on.
@@ -110,7 +117,23 @@ impl<'scope, T: Send, F: FnMut(T) -> Result<(), Error>> WriteBehind<'scope, T, F
     pub(crate) fn finish(self) -> Result<(), Error> {
         let Self::There(giver, writer) = self else { return Ok(()) };
         drop(giver);
-        writer.join().unwrap_or_else(|panic| resume_unwind(panic))
+        writer.join().unwrap_or_else(|panic| resume_unwind(panic)).unwrap_or(Ok(()))
+    }
+}
+
+/// Runs work on a thread of its own. Where the system has no more threads, the work comes back.
+fn spawned<'scope, W: Send + 'scope, R: Send + 'scope>(
+    thread: Builder,
+    scope: &'scope Scope<'scope, '_>,
+    work: W,
+    run: impl FnOnce(W) -> R + Send + 'scope,
+) -> Result<ScopedJoinHandle<'scope, Option<R>>, W> {
+    let take = |of: &Mutex<Option<W>>| of.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let here = Arc::new(Mutex::new(Some(work)));
+    let there = Arc::clone(&here);
+    match (thread.spawn_scoped(scope, move || take(&there).map(run)), &here) {
+        (Ok(handle), _) => Ok(handle),
+        (Err(error), here) => take(here).map_or_else(|| panic!("{error}"), Err),
     }
 }
 
@@ -220,6 +243,15 @@ mod tests {
         }
         // A log without an end.
         assert!(through(3, u32::MAX, None, Some(7)).1.is_err());
+    }
+
+    #[test]
+    fn work_comes_back_where_the_system_has_no_thread() {
+        std::thread::scope(|scope| {
+            let huge = Builder::new().stack_size(1 << 48);
+            assert_eq!(spawned(huge, scope, 7, |work| work + 1).map(|_| ()), Err(7));
+            assert_eq!(spawned(Builder::new(), scope, 7, |work| work + 1).unwrap().join().unwrap(), Some(8));
+        });
     }
 
     #[test]
