@@ -8,6 +8,7 @@ mod no_column;
 pub mod one_shift;
 pub(crate) mod output;
 pub mod selection;
+#[cfg_attr(target_family = "wasm", path = "stages_in_browser.rs")]
 mod stages;
 pub(crate) mod watched;
 
