@@ -262,27 +262,20 @@ impl<T: Real> Swing<T> {
         let sprung = m * line.shaft_stiffness_n_m_rad * dt_s * dt_s;
         let (mut before, mut term) = (T::zero(), T::one());
         let mut sums = [T::zero(); 3];
-        for per in INVERSE_FACTORIALS.windows(sums.len()).skip(1).take(TERMS) {
-            for (sum, per) in sums.iter_mut().zip(per) {
-                *sum = *sum + term * T::of(*per);
+        // 1/n!, 1/(n+1)!, 1/(n+2)!, and n + 2.
+        let (mut per, mut last) = ([T::one(), T::of(1.0 / 2.0), T::of(1.0 / 6.0)], T::of(3.0));
+        for _ in 0..TERMS {
+            for (sum, per) in sums.iter_mut().zip(&per) {
+                *sum = *sum + term * *per;
             }
             (before, term) = (term, damped * term + sprung * before);
+            last = last + T::one();
+            per = [per[1], per[2], per[2] / last];
         }
         let [b, integral, twice] = sums;
         Self { b: dt_s * b, integral: dt_s * dt_s * integral, twice: dt_s * dt_s * dt_s * twice }
     }
 }
-
-/// `1/n!` from `n = 0` on.
-const INVERSE_FACTORIALS: [f64; TERMS + 3] = {
-    let (mut inverse, mut factorial, mut n) = ([1.0; TERMS + 3], 1.0, 1);
-    while n < inverse.len() {
-        factorial *= n as f64;
-        inverse[n] = 1.0 / factorial;
-        n += 1;
-    }
-    inverse
-};
 
 /// The solution over one step under constant torques.
 #[derive(Debug, Clone, Copy, PartialEq)]
