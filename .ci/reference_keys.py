@@ -68,8 +68,13 @@ SENSOR_DEFAULTS = [
     (r"(.*\.)?current\.sample_time_s$|(.*\.)?current$", "those of the rows"),
     (r"(.*\.)?outlier_rad_s$", "5.0"),
     (r"(.*\.)?outlier_a$", "0.1"),
-    (r"(.*\.)?(engine|turbine|output|wheel|current)\.missing_share$", "that of all channels"),
-    (r"(.*\.)?(engine|turbine|output|wheel|current)\.(burst_s|frozen_s|outliers|offset_s|delay_s)$", "0"),
+    (r"(.*\.)?outlier_m_s2$", "2.0"),
+    (r"(.*\.)?acceleration$", "not measured"),
+    (r"(.*\.)?acceleration\.noise_m_s2$", "0.05"),
+    (r"(.*\.)?acceleration\.sample_time_s$", "0.01"),
+    (r"(.*\.)?acceleration\.(bias|resolution)_m_s2$", "0"),
+    (r"(.*\.)?(engine|turbine|output|wheel|current|acceleration)\.missing_share$", "that of all channels"),
+    (r"(.*\.)?(engine|turbine|output|wheel|current|acceleration)\.(burst_s|frozen_s|outliers|offset_s|delay_s)$", "0"),
     (r"(.*\.)?(row_offset_s|missing_share|outliers)", "0"),
 ]
 OFF_NOMINAL = [

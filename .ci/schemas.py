@@ -262,7 +262,8 @@ def write_parts():
     for path in (WORK / "experiments").glob("*.toml"):
         table = tomllib.loads(path.read_text())
         if "sensors" in table and "shift" in table:
-            path.with_name(f"sensors_of_{path.name}").write_text(f"sensors = {toml(table['sensors'])}\n")
+            sensors = {**table["sensors"], "acceleration": {"noise_m_s2": 0.05}}
+            path.with_name(f"sensors_of_{path.name}").write_text(f"sensors = {toml(sensors)}\n")
     for path in (WORK / "vehicles").glob("two_speed*.toml"):
         parts = {key: of for key, of in tomllib.loads(path.read_text()).items() if isinstance(of, dict) and key != "gear_train"}
         path.with_name(f"part_of_{path.name}").write_text("".join(f"{key} = {toml(of)}\n" for key, of in parts.items()))
@@ -285,7 +286,7 @@ def write_parts():
     )
     # Drives and studies with sensors, and with every fault.
     bench = tomllib.loads((WORK / "experiments" / "bench.toml").read_text())
-    sensors = f"sensors = {toml(bench['sensors'])}\n"
+    sensors = f"sensors = {toml({**bench['sensors'], 'acceleration': {'noise_m_s2': 0.05}})}\n"
     faults = [
         {"kind": "weak-clutch", "element": "A", "friction_factor": 0.5},
         {"kind": "stuck-solenoid", "element": "A", "command": 0.5},

@@ -181,6 +181,9 @@ impl Experiment {
             if let Some(current) = &mut sensors.current {
                 current.noise_a *= scenario.sensor_noise_factor;
             }
+            if let Some(acceleration) = &mut sensors.acceleration {
+                acceleration.noise_m_s2 *= scenario.sensor_noise_factor;
+            }
         }
         varied
     }

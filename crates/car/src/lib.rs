@@ -75,7 +75,7 @@ pub use self::{
     off_nominal::OffNominal,
     one_shift::OneShiftError,
     ratios_alone::TURBINE_SIDE_INERTIA_KG_M2,
-    sensors::{CurrentSensor, OUTLIER_A, ReadingErrors, Sensors, SpeedSensor},
+    sensors::{AccelerationSensor, CurrentSensor, OUTLIER_A, ReadingErrors, Sensors, SpeedSensor},
     speed_trace::SpeedTrace,
     template::{CarSize, TemplateError},
     vehicle::{

@@ -84,6 +84,41 @@ impl CurrentSensor {
     };
 }
 
+/// An accelerometer along the car, as of a stability control: it reads the acceleration with the part of gravity along the road.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AccelerationSensor {
+    /// Standard deviation of a reading, m/s^2.
+    pub noise_m_s2: f64,
+    /// Constant error, m/s^2.
+    pub bias_m_s2: f64,
+    /// Step of the readings, m/s^2.
+    pub resolution_m_s2: f64,
+    /// Time between two readings on the bus, s.
+    pub sample_time_s: f64,
+    /// Time of the first reading after that of the first row, s.
+    pub offset_s: f64,
+    /// Age of a reading when it arrives, s.
+    pub delay_s: f64,
+    /// What goes wrong with its readings.
+    pub errors: ReadingErrors,
+    /// Size of the error of an outlier, m/s^2; its sign is random.
+    pub outlier_m_s2: f64,
+}
+
+impl AccelerationSensor {
+    /// A usual one \[chosen\].
+    pub const USUAL: Self = Self {
+        noise_m_s2: 0.05,
+        bias_m_s2: 0.0,
+        resolution_m_s2: 0.0,
+        sample_time_s: 0.01,
+        offset_s: 0.0,
+        delay_s: 0.0,
+        errors: ReadingErrors::NONE,
+        outlier_m_s2: 2.0,
+    };
+}
+
 /// The sensors of a car.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensors {
@@ -103,6 +138,8 @@ pub struct Sensors {
     pub wheel: SpeedSensor,
     /// Current of the oncoming clutch's valve; without a sensor the command is known exactly, as a duty cycle is.
     pub current: Option<CurrentSensor>,
+    /// Longitudinal acceleration, if it is measured.
+    pub acceleration: Option<AccelerationSensor>,
 }
 
 impl Sensors {
@@ -115,6 +152,9 @@ impl Sensors {
         }
         if let Some(current) = &mut self.current {
             current.errors = ReadingErrors::NONE;
+        }
+        if let Some(acceleration) = &mut self.acceleration {
+            acceleration.errors = ReadingErrors::NONE;
         }
         self
     }

@@ -8,7 +8,7 @@
 mod errors;
 mod teeth;
 
-use car::{CurrentSensor, SpeedSensor};
+use car::{AccelerationSensor, CurrentSensor, SpeedSensor};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64Mcg;
 use teeth::Teeth;
@@ -126,6 +126,28 @@ pub fn read_current(sensor: &CurrentSensor, truth: Channel<'_>, rows: Rows<'_>) 
     });
     errors::disturb(&mut readings, &sensor.errors, sensor.outlier_a, truth.name, rows);
     readings
+}
+
+/// Readings of an accelerometer, m/s^2; between two records the acceleration is on the line through them.
+pub fn read_acceleration(sensor: &AccelerationSensor, truth: Channel<'_>, rows: Rows<'_>) -> Readings {
+    let mut noise = Noise::new(rows.seed, truth.name);
+    let mut readings = taken(rows, Some(sensor.sample_time_s), sensor.offset_s, |taken_s| {
+        let acceleration = on_line(truth, taken_s - sensor.delay_s);
+        let analog = sensor.errors.scale * acceleration + sensor.bias_m_s2 + sensor.noise_m_s2 * noise.normal();
+        let step = sensor.resolution_m_s2;
+        if step > 0.0 { (analog / step).round() * step } else { analog }
+    });
+    errors::disturb(&mut readings, &sensor.errors, sensor.outlier_m_s2, truth.name, rows);
+    readings
+}
+
+/// The value of a channel at a time, s, on the line between its records; beyond them the nearest one.
+fn on_line(of: Channel<'_>, at_s: f64) -> f64 {
+    let after = of.time_s.partition_point(|&time_s| time_s <= at_s).min(of.time_s.len().saturating_sub(1));
+    let before = after.saturating_sub(1);
+    let span_s = of.time_s[after] - of.time_s[before];
+    let fraction = if span_s > 0.0 { ((at_s - of.time_s[before]) / span_s).clamp(0.0, 1.0) } else { 0.0 };
+    of.values[before] + fraction * (of.values[after] - of.values[before])
 }
 
 /// Deals this many outliers out to `channels` channels, each to one drawn at random.

@@ -63,6 +63,7 @@ pub(crate) struct RawSensors {
     pub(super) output: Option<Spanned<RawSpeedSensor>>,
     pub(super) wheel: Option<Spanned<RawSpeedSensor>>,
     pub(super) current: Option<Spanned<RawCurrentSensor>>,
+    pub(super) acceleration: Option<Spanned<RawAccelerationSensor>>,
 }
 
 #[derive(Deserialize)]
@@ -98,6 +99,23 @@ pub(super) struct RawCurrentSensor {
     pub(super) frozen_s: Option<Number>,
     pub(super) outliers: Option<Number>,
     pub(super) outlier_a: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct RawAccelerationSensor {
+    pub(super) noise_m_s2: Option<Number>,
+    pub(super) bias_m_s2: Option<Number>,
+    pub(super) resolution_m_s2: Option<Number>,
+    pub(super) sample_time_s: Option<Number>,
+    pub(super) delay_s: Option<Number>,
+    pub(super) offset_s: Option<Number>,
+    pub(super) scale: Option<Number>,
+    pub(super) missing_share: Option<Number>,
+    pub(super) burst_s: Option<Number>,
+    pub(super) frozen_s: Option<Number>,
+    pub(super) outliers: Option<Number>,
+    pub(super) outlier_m_s2: Option<Number>,
 }
 
 #[derive(Deserialize)]

@@ -3,10 +3,10 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use car::{CurrentSensor, OUTLIER_A, ReadingErrors, Sensors, SpeedSensor};
+use car::{AccelerationSensor, CurrentSensor, OUTLIER_A, ReadingErrors, Sensors, SpeedSensor};
 use toml::Spanned;
 
-use super::raw::{RawCurrentSensor, RawSensors, RawSensorsFile, RawSpeedSensor};
+use super::raw::{RawAccelerationSensor, RawCurrentSensor, RawSensors, RawSensorsFile, RawSpeedSensor};
 use crate::check::{Check, Key, Number};
 use crate::{ConfigError, Source};
 
@@ -137,6 +137,14 @@ pub(crate) fn sensors(
         let base = current.or(base.map(|_| CurrentSensor::EXACT));
         current = Some(current_sensor(check, keys.key("current").to_string(), raw, base, missing_share)?);
     }
+    let mut acceleration = base.and_then(|base| base.acceleration);
+    if let (Some(acceleration), Some(fraction)) = (&mut acceleration, missing_share) {
+        acceleration.errors.missing_share = fraction;
+    }
+    if let Some(raw) = &raw.acceleration {
+        acceleration =
+            Some(acceleration_sensor(check, keys.key("acceleration").to_string(), raw, acceleration, missing_share)?);
+    }
     Ok(Sensors {
         seed: seed.ok_or_else(|| keys.missing("seed"))?,
         row_offset_s: keys.number(
@@ -151,6 +159,7 @@ pub(crate) fn sensors(
         output: speed("output", &raw.output, base.map(|base| &base.output))?,
         wheel: speed("wheel", &raw.wheel, base.map(|base| &base.wheel))?,
         current,
+        acceleration,
     })
 }
 
@@ -253,5 +262,37 @@ fn current_sensor(
             missing_share,
         )?,
         outlier_a: keys.number("outlier_a", &raw.outlier_a, or(|s| s.outlier_a, OUTLIER_A), 0.0..=2.0)?,
+    })
+}
+
+/// An accelerometer; what neither the table nor `base` says is as of a usual one.
+fn acceleration_sensor(
+    check: &Check<'_>,
+    table: String,
+    raw: &Spanned<RawAccelerationSensor>,
+    base: Option<AccelerationSensor>,
+    missing_share: Option<f64>,
+) -> Result<AccelerationSensor, ConfigError> {
+    let keys = Keys { check, table, at: raw.span().start };
+    let raw = raw.get_ref();
+    let usual = base.unwrap_or(AccelerationSensor::USUAL);
+    Ok(AccelerationSensor {
+        noise_m_s2: keys.number("noise_m_s2", &raw.noise_m_s2, Some(usual.noise_m_s2), 0.0..=5.0)?,
+        bias_m_s2: keys.number("bias_m_s2", &raw.bias_m_s2, Some(usual.bias_m_s2), -5.0..=5.0)?,
+        resolution_m_s2: keys.number(
+            "resolution_m_s2",
+            &raw.resolution_m_s2,
+            Some(usual.resolution_m_s2),
+            0.0..=1.0,
+        )?,
+        sample_time_s: keys.number("sample_time_s", &raw.sample_time_s, Some(usual.sample_time_s), 1e-4..=LONGEST_S)?,
+        offset_s: keys.number("offset_s", &raw.offset_s, Some(usual.offset_s), 0.0..=LONGEST_S)?,
+        delay_s: keys.number("delay_s", &raw.delay_s, Some(usual.delay_s), 0.0..=LONGEST_S)?,
+        errors: keys.errors(
+            [&raw.scale, &raw.missing_share, &raw.burst_s, &raw.frozen_s, &raw.outliers],
+            Some(usual.errors),
+            missing_share,
+        )?,
+        outlier_m_s2: keys.number("outlier_m_s2", &raw.outlier_m_s2, Some(usual.outlier_m_s2), 0.0..=100.0)?,
     })
 }
