@@ -24,7 +24,7 @@ pub struct Step<T = f64> {
     pub lock_up_applied: bool,
     /// Torque of the engine as its controller reports it, N m: that of combustion less its friction, before the inertia.
     pub engine_torque_n_m: Option<Reading<T>>,
-    /// Acceleration of the car, m/s^2, positive forward.
+    /// Longitudinal acceleration of the car by an accelerometer, m/s^2, positive forward: with the part of gravity along the road.
     pub acceleration_m_s2: Option<Reading<T>>,
 }
 

@@ -11,7 +11,7 @@ use crate::words::{Layout, Sink, Words};
 /// The first word: "WCLT", the lowest byte first.
 pub const MAGIC: u32 = u32::from_le_bytes(*b"WCLT");
 /// Version of the layout.
-pub const FORMAT_VERSION: u32 = 4;
+pub const FORMAT_VERSION: u32 = 5;
 /// Most gears and shifts of an image.
 pub const MAX_GEARS: u32 = 32;
 /// See [`MAX_GEARS`].

@@ -35,6 +35,8 @@ pub struct Input {
     pub wheel_rad_s: Reading,
     /// Engine torque as the engine's controller reports it, N m.
     pub engine_n_m: Reading,
+    /// Longitudinal acceleration by an accelerometer, positive forward, with the part of gravity along the road, m/s^2.
+    pub acceleration_m_s2: Reading,
     /// Temperature of the oil in the gearbox, degC.
     pub oil_degc: Reading,
     /// Not zero while the lock-up clutch of the converter carries torque.
@@ -132,9 +134,9 @@ pub struct Estimate {
     pub element_pa: [f32; MAX_ELEMENTS],
     /// Lowest and highest pressure of each element for errors within the budget, Pa.
     pub element_range_pa: [[f32; 2]; MAX_ELEMENTS],
-    /// What became of the readings of engine, turbine, output and wheel speed and engine torque: 0 unused, 1 good, 2 absent, 3 refused,
-    /// 4 lost.
-    pub channels: [u32; 5],
+    /// What became of the readings of engine, turbine, output and wheel speed, engine torque and acceleration: 0 unused, 1 good, 2 absent,
+    /// 3 refused, 4 lost.
+    pub channels: [u32; 6],
     /// The same of the command of each element.
     pub commands: [u32; MAX_ELEMENTS],
 }
@@ -193,7 +195,7 @@ impl Input {
         byte < first || !is_whole && in_readings % size_of::<Reading>() != offset_of!(Reading, came)
     }
 
-    /// In neutral, with a reading of each speed and command in each step, and none of torque and oil.
+    /// In neutral, with a reading of each speed and command in each step, and none of torque, acceleration and oil.
     pub fn usual() -> Self {
         let came = Reading { came: 1, ..Reading::default() };
         Self {
@@ -236,6 +238,7 @@ impl Input {
             output_rad_s: Reading::of(input.output_rad_s),
             wheel_rad_s: Reading::of(input.wheel_rad_s),
             engine_n_m: Reading::of(input.engine_n_m),
+            acceleration_m_s2: Reading::of(input.acceleration_m_s2),
             oil_degc: Reading::default(),
             lock_up_applied: u32::from(input.lock_up_applied),
             gear_from: place_of(input.gear.from),
@@ -253,6 +256,7 @@ impl Input {
             output_rad_s: self.output_rad_s.reading(),
             wheel_rad_s: self.wheel_rad_s.reading(),
             engine_n_m: self.engine_n_m.reading(),
+            acceleration_m_s2: self.acceleration_m_s2.reading(),
             lock_up_applied: self.lock_up_applied != 0,
             commands: self.commands.map(|command| command.reading()),
             gear,
@@ -324,7 +328,7 @@ impl Estimate {
         for (at, range) in ranges_pa.iter().enumerate() {
             given |= flag(given::ELEMENT_RANGE << at, range.is_some());
         }
-        let Channels { engine, turbine, output, wheel, engine_torque, .. } = estimate.channels;
+        let Channels { engine, turbine, output, wheel, engine_torque, acceleration, .. } = estimate.channels;
         let [offgoing, oncoming] = estimate.clutches.map_or([Clutch::default(); 2], |of| of.each_ref().map(Clutch::of));
         Self {
             status: 0,
@@ -342,7 +346,7 @@ impl Estimate {
             at_turbine_n_m: estimate.at_turbine.map_or([0.0; 2], |of| [of.torque_n_m, of.std_dev_n_m]),
             element_pa: estimate.valve_pa,
             element_range_pa: ranges_pa.map(Option::unwrap_or_default),
-            channels: [engine, turbine, output, wheel, engine_torque].map(channel_number),
+            channels: [engine, turbine, output, wheel, engine_torque, acceleration].map(channel_number),
             commands: estimate.commands.map(channel_number),
         }
     }

@@ -6,8 +6,8 @@ use car::FillBudget;
 use drivetrain::table::MAX_POINTS;
 use drivetrain::{Clutch, ClutchValve, Converter, Cylinder, Driveline, Passage, PulseWidth, Table1, ValveMaps};
 use observer::gearbox::{
-    ElementUncertainty, FrictionElement, GearRow, Piston, ShiftClutch, ShiftElement, ShiftRow, ShiftUncertainty,
-    TurbineTorque, ValveLimits,
+    AccelerationReading, ElementUncertainty, FrictionElement, GearRow, Piston, ShiftClutch, ShiftElement, ShiftRow,
+    ShiftUncertainty, TurbineTorque, ValveLimits,
 };
 use observer::{Budget, EngineNoise, GearboxFilter, GearboxTables, InputLimits, SpeedReading, ValveModel};
 
@@ -40,6 +40,7 @@ layout! {
     }
     SpeedReading { std_dev_rad_s, lag_rad, pitch_rad, delay_s }
     EngineNoise { reading_rad_s, acceleration_walk, acceleration_max_rad_s2 }
+    AccelerationReading { std_dev_m_s2, bias_m_s2, scale_fraction, delay_s, delay_std_dev_s, is_stated, per_torque }
     InputLimits { speed_max_rad_s, command_max, command_error, pressure_max_pa, shaft_torque_max_n_m }
     Clutch { mean_radius_m, friction_faces, piston_area_m2, return_spring_n, friction, static_friction }
     ValveMaps { time_constant_s, gain_pa_a, delay_s }
@@ -166,25 +167,46 @@ pub(crate) struct Parameters<T> {
     readings: [SpeedReading<T>; 3],
     engine: SpeedReading<T>,
     engine_noise: EngineNoise<T>,
+    acceleration: AccelerationReading<T>,
     limits: InputLimits<T>,
 }
 
 layout! {
-    Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, engine_noise, limits }
+    Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, engine_noise, acceleration, limits }
 }
 
 impl Parameters<f32> {
     /// Those of a filter.
     pub(crate) fn of(filter: &GearboxFilter<'_, f32>) -> Self {
-        let GearboxFilter { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits, .. } = *filter;
+        let GearboxFilter {
+            tables: _,
+            driveline,
+            wheels_kg_m2,
+            turbine,
+            uncertainty,
+            readings,
+            engine,
+            acceleration,
+            limits,
+        } = *filter;
         let (engine, engine_noise) = engine;
-        Self { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, engine_noise, limits }
+        Self { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, engine_noise, acceleration, limits }
     }
 
     /// The filter with these tables.
     pub(crate) fn filter<'a>(&self, tables: GearboxTables<'a, f32>) -> GearboxFilter<'a, f32> {
-        let Self { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, engine_noise, limits } = *self;
+        let Self {
+            driveline,
+            wheels_kg_m2,
+            turbine,
+            uncertainty,
+            readings,
+            engine,
+            engine_noise,
+            acceleration,
+            limits,
+        } = *self;
         let engine = (engine, engine_noise);
-        GearboxFilter { tables, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits }
+        GearboxFilter { tables, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, acceleration, limits }
     }
 }

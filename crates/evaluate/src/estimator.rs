@@ -164,6 +164,7 @@ impl Estimator {
             output_rad_s: step.speeds.output,
             wheel_rad_s: step.speeds.wheel,
             engine_n_m: step.engine_torque_n_m,
+            acceleration_m_s2: step.acceleration_m_s2,
             lock_up_applied: step.lock_up_applied,
             commands,
             gear: step.shift.unwrap_or(ShiftCommand::NEUTRAL),
@@ -173,8 +174,28 @@ impl Estimator {
 
 /// The filter without its gearbox.
 fn without_tables(filter: &GearboxFilter<'_, f64>) -> GearboxFilter<'static, f64> {
-    let GearboxFilter { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits, .. } = *filter;
-    GearboxFilter { tables: NO_TABLES, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits }
+    let GearboxFilter {
+        tables: _,
+        driveline,
+        wheels_kg_m2,
+        turbine,
+        uncertainty,
+        readings,
+        engine,
+        acceleration,
+        limits,
+    } = *filter;
+    GearboxFilter {
+        tables: NO_TABLES,
+        driveline,
+        wheels_kg_m2,
+        turbine,
+        uncertainty,
+        readings,
+        engine,
+        acceleration,
+        limits,
+    }
 }
 
 #[cfg(test)]

@@ -8,12 +8,13 @@ use std::convert::Infallible;
 
 use car::columns::element_commands;
 use car::{Car, FailedReading, FailedSensor, Fault, FaultKind, Sensors};
-use drivetrain::CommandKind;
+use drivetrain::road::GRAVITY_M_S2;
+use drivetrain::{CommandKind, Real};
 use observer::Reading;
 use observer::ShiftTables;
 use observer::gearbox::ShiftInput;
 use plant::car::CarSample;
-use plant::sensors::{Channel, Readings, Rows, dealt, read_current, read_speed};
+use plant::sensors::{Channel, Readings, Rows, dealt, read_acceleration, read_current, read_speed};
 
 use crate::mixed;
 use crate::recording::input;
@@ -24,8 +25,9 @@ const BLOCK_S: f64 = 60.0;
 const BEFORE_S: f64 = 1.0;
 /// Elements of a gearbox, with room for more.
 const ELEMENTS: usize = 16;
-/// Names of the speeds, which keep their random numbers apart.
+/// Names of the speeds and of the acceleration, which keep their random numbers apart.
 const SPEEDS: [&str; 4] = ["engine", "turbine", "output", "wheel"];
+pub(crate) const ACCELERATION: &str = "acceleration";
 
 /// A row of a drive: the truth, and what is read of it. Without a reading a value is not a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,13 +38,16 @@ pub struct MeasuredRow {
     pub speeds: [[f64; 2]; 4],
     /// Command of the valve of each element, A or %, with its age, s.
     pub commands: [[f64; 2]; ELEMENTS],
+    /// Longitudinal acceleration, m/s^2, with its age, s; none of a car that does not measure it.
+    pub acceleration: [f64; 2],
 }
 
 impl MeasuredRow {
     /// Of a car that measures exactly.
     pub fn exact(sample: &CarSample) -> Self {
         let commands = sample.commands.map(|command| [command, 0.0]);
-        Self { sample: *sample, speeds: speeds_of(sample).map(|speed| [speed, 0.0]), commands }
+        let speeds = speeds_of(sample).map(|speed| [speed, 0.0]);
+        Self { sample: *sample, speeds, commands, acceleration: [f64::NAN; 2] }
     }
 }
 
@@ -51,7 +56,8 @@ impl MeasuredRow {
     pub fn input(&self, car: &Car, tables: &ShiftTables<f64>) -> ShiftInput<f64> {
         let reading = |[value, age_s]: [f64; 2]| (!value.is_nan()).then_some(Reading { value, age_s });
         let command = |element: usize| reading(self.commands[element]);
-        input(car, tables, &self.sample, self.speeds.map(reading), command)
+        let of_commands = input(car, tables, &self.sample, self.speeds.map(reading), command);
+        ShiftInput { acceleration_m_s2: reading(self.acceleration), ..of_commands }
     }
 }
 
@@ -106,6 +112,11 @@ fn speeds_of(sample: &CarSample) -> [f64; 4] {
     [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s, sample.wheel_rad_s]
 }
 
+/// What an accelerometer along the car reads: the acceleration with the part of gravity along the road, m/s^2.
+pub(crate) fn specific_force(sample: &CarSample) -> f64 {
+    sample.vehicle_m_s2 + GRAVITY_M_S2 * Real::sin(sample.driver.grade_rad)
+}
+
 /// A channel with the values of its records.
 struct Recorded {
     name: String,
@@ -126,6 +137,7 @@ pub struct SensedDrive<'s> {
     speeds: [Recorded; 4],
     /// Elements whose valve has a current that is read.
     currents: Vec<(usize, Recorded)>,
+    acceleration: Recorded,
     /// Rows whose readings are not yet made.
     waiting: VecDeque<CarSample>,
     /// Times of the rows in the records, those of earlier blocks too.
@@ -155,6 +167,7 @@ impl<'s> SensedDrive<'s> {
             time_s: Vec::new(),
             speeds: SPEEDS.map(recorded),
             currents: currents.collect(),
+            acceleration: recorded(ACCELERATION),
             waiting: VecDeque::new(),
             rows_s: Vec::new(),
         }
@@ -178,6 +191,7 @@ impl<'s> SensedDrive<'s> {
         for (element, channel) in &mut self.currents {
             channel.values.push(sample.commands[*element]);
         }
+        self.acceleration.values.push(specific_force(sample));
         let at = self.records;
         self.records += 1;
         if at >= self.first && (at - self.first).is_multiple_of(self.every) {
@@ -213,6 +227,9 @@ impl<'s> SensedDrive<'s> {
                 Some((*element, read_current(self.sensors.current.as_ref()?, truth, rows)))
             })
             .collect();
+        let Recorded { name, values } = &self.acceleration;
+        let truth = Channel { name, time_s: &self.time_s, values };
+        let acceleration = self.sensors.acceleration.as_ref().map(|sensor| read_acceleration(sensor, truth, rows));
         let before = self.rows_s.len() - self.waiting.len();
         for (at, sample) in self.waiting.iter().enumerate() {
             let of = |readings: &Readings| [readings.values[before + at], readings.age_s[before + at]];
@@ -220,6 +237,7 @@ impl<'s> SensedDrive<'s> {
             for (element, readings) in &currents {
                 row.commands[*element] = of(readings);
             }
+            row.acceleration = acceleration.as_ref().map_or(row.acceleration, of);
             take(&row)?;
         }
         self.begin_block(shift_s[1]);
@@ -248,7 +266,8 @@ impl<'s> SensedDrive<'s> {
         self.waiting.clear();
         let records = self.time_s.partition_point(|&time_s| time_s < end_s - BEFORE_S);
         self.time_s.drain(..records);
-        let channels = self.speeds.iter_mut().chain(self.currents.iter_mut().map(|(_, channel)| channel));
+        let currents = self.currents.iter_mut().map(|(_, channel)| channel);
+        let channels = self.speeds.iter_mut().chain(currents).chain([&mut self.acceleration]);
         channels.for_each(|channel| drop(channel.values.drain(..records)));
         // Readings need all times of the rows from here on.
         let rows = self.rows_s.partition_point(|&time_s| time_s < end_s - BEFORE_S);

@@ -6,8 +6,9 @@ use observer::Reading;
 use observer::ShiftTables;
 use observer::gearbox::{MAX_ELEMENTS, ShiftInput};
 use plant::car::CarSample;
-use plant::sensors::{Channel, Readings, Rows, read_speed};
+use plant::sensors::{Channel, Readings, Rows, read_acceleration, read_speed};
 
+use crate::measured::{ACCELERATION, specific_force};
 use crate::{RECORD_S, SAMPLE_S};
 
 /// Torque of the lock-up clutch from which on it counts as applied, N m.
@@ -19,6 +20,8 @@ pub struct Recording {
     time_s: Vec<f64>,
     /// Engine, turbine, output and wheel speed, rad/s.
     speeds_rad_s: [Vec<f64>; 4],
+    /// Longitudinal acceleration with the part of gravity, m/s^2.
+    force_m_s2: Vec<f64>,
     /// Every [`SAMPLE_S`].
     pub samples: Vec<CarSample>,
 }
@@ -40,6 +43,7 @@ impl Recording {
         for (column, speed) in self.speeds_rad_s.iter_mut().zip(speeds) {
             column.push(speed);
         }
+        self.force_m_s2.push(specific_force(sample));
     }
 
     /// What the filter is shown, an input for each of the samples.
@@ -63,6 +67,8 @@ impl Recording {
             let ((name, sensor), values) = columns.next().unwrap_or((channels[0], &self.speeds_rad_s[0]));
             read_speed(sensor, Channel { name, time_s: &self.time_s, values }, rows)
         });
+        let truth = Channel { name: ACCELERATION, time_s: &self.time_s, values: &self.force_m_s2 };
+        let acceleration = sensors.acceleration.as_ref().map(|sensor| read_acceleration(sensor, truth, rows));
         (0..self.samples.len()).map(move |row| {
             let sample = &self.samples[row];
             let reading = |of: &Readings| {
@@ -70,7 +76,8 @@ impl Recording {
                 (!value.is_nan()).then_some(Reading { value, age_s })
             };
             let command = |element: usize| Some(Reading::now(sample.commands[element]));
-            input(car, tables, sample, speeds.each_ref().map(reading), command)
+            let of_speeds = input(car, tables, sample, speeds.each_ref().map(reading), command);
+            ShiftInput { acceleration_m_s2: acceleration.as_ref().and_then(reading), ..of_speeds }
         })
     }
 }
@@ -101,6 +108,7 @@ pub(crate) fn input(
         output_rad_s,
         wheel_rad_s,
         engine_n_m: (car.converter.is_none() || lock_up_applied).then_some(Reading::now(engine_n_m)),
+        acceleration_m_s2: None,
         lock_up_applied,
         commands,
         gear: sample.gears(),

@@ -109,9 +109,9 @@ pub(crate) fn members() -> Vec<Member> {
         ),
         (
             "channels",
-            5,
+            6,
             offset_of!(Estimate, channels),
-            (Channel, "1", "engine, turbine, output, wheel, engine torque"),
+            (Channel, "1", "engine, turbine, output, wheel, engine torque, acceleration"),
         ),
         ("commands", MAX_ELEMENTS, offset_of!(Estimate, commands), (Channel, "1", "command of an element")),
     ] {

@@ -15,6 +15,12 @@ pub(crate) fn input_members() -> Vec<Member> {
         ("output_rad_s", offset_of!(Input, output_rad_s), "rad/s", "speed of the gearbox output"),
         ("wheel_rad_s", offset_of!(Input, wheel_rad_s), "rad/s", "speed of the driven wheels"),
         ("engine_n_m", offset_of!(Input, engine_n_m), "N m", "engine torque as the engine's controller reports it"),
+        (
+            "acceleration_m_s2",
+            offset_of!(Input, acceleration_m_s2),
+            "m/s^2",
+            "longitudinal acceleration by an accelerometer, with the part of gravity along the road",
+        ),
         ("oil_degc", offset_of!(Input, oil_degc), "degC", "temperature of the oil in the gearbox"),
     ];
     let mut all: Vec<Member> =

@@ -111,8 +111,8 @@ fn compared(estimate: &Estimate) -> [f32; COMPARED.len()] {
 
 /// An input as the initialiser of a `wetclutch_input`.
 fn row(input: &Input, elements: usize) -> String {
-    let speeds =
-        [&input.engine_rad_s, &input.turbine_rad_s, &input.output_rad_s, &input.wheel_rad_s, &input.engine_n_m];
+    let Input { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, engine_n_m, acceleration_m_s2, .. } = input;
+    let speeds = [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, engine_n_m, acceleration_m_s2];
     let speeds = speeds.map(reading).join(", ");
     let commands: Vec<String> = input.commands.iter().take(elements.max(1)).map(reading).collect();
     format!(

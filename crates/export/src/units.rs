@@ -18,6 +18,7 @@ pub(crate) fn unit_of(path: &[impl AsRef<str>]) -> &'static str {
         "axis" => of_axis(above.last().map_or("", AsRef::as_ref)),
         "values" => unit_of(above),
         name if name.bytes().all(|c| c.is_ascii_digit()) => unit_of(above),
+        "per_torque" => "m/s^2/(N m)",
         "command" | "command_max" | "command_error" => "A or %",
         name => {
             let walk = WALKS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit);

@@ -45,6 +45,7 @@ typedef struct {
   wetclutch_reading output_rad_s;  /* speed of the gearbox output, rad/s */
   wetclutch_reading wheel_rad_s;   /* speed of the driven wheels, rad/s */
   wetclutch_reading engine_n_m;    /* engine torque as the engine's controller reports it, N m */
+  wetclutch_reading acceleration_m_s2; /* longitudinal acceleration by an accelerometer, with the part of gravity along the road, m/s^2 */
   wetclutch_reading oil_degc;      /* temperature of the oil in the gearbox, degC */
   uint32_t lock_up_applied;       /* 1 while the lock-up clutch of the converter carries torque */
   int32_t gear_from;              /* place of the gear before, -1 neutral; the gear itself while there is no shift */
@@ -83,7 +84,7 @@ typedef struct {
   float at_turbine_n_m[2];             /* torque of all clutches at the turbine, N m, and its standard deviation */
   float element_pa[WETCLUTCH_ELEMENTS]; /* pressure of each element by the models of its valve and piston, Pa */
   float element_range_pa[WETCLUTCH_ELEMENTS][2]; /* lowest and highest pressure of each element, Pa */
-  uint32_t channels[5];                /* engine, turbine, output, wheel speed, engine torque: WETCLUTCH_CHANNEL_... */
+  uint32_t channels[6];                /* engine, turbine, output, wheel speed, engine torque, acceleration: WETCLUTCH_CHANNEL_... */
   uint32_t commands[WETCLUTCH_ELEMENTS]; /* the same of the commands */
 } wetclutch_estimate;
 

@@ -89,6 +89,7 @@ pub(crate) fn input_bytes(input: &Input) -> Vec<u8> {
         &input.output_rad_s,
         &input.wheel_rad_s,
         &input.engine_n_m,
+        &input.acceleration_m_s2,
         &input.oil_degc,
     ];
     let words = [dt_s.to_bits()].into_iter().chain(speeds.into_iter().flat_map(reading));

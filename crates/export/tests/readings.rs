@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use car::{Drive, Sensors};
+use car::{AccelerationSensor, Drive, Sensors};
 use config::{CarFile, DriveFile, ExperimentFile};
 use evaluate::measured::SensedDrive;
 use export::{ExportOptions, ExportedFilter, shift_inputs};
@@ -23,7 +23,8 @@ pub(crate) fn filter_of(name: &str) -> ExportedFilter {
 }
 
 pub(crate) fn usual_sensors() -> Sensors {
-    ExperimentFile::bench().unwrap().experiment.sensors.unwrap()
+    let sensors = ExperimentFile::bench().unwrap().experiment.sensors.unwrap();
+    Sensors { acceleration: Some(AccelerationSensor::USUAL), ..sensors }
 }
 
 /// What is read of a drive through a city.

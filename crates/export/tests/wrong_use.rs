@@ -141,6 +141,7 @@ fn a_reading_that_is_no_number_is_refused_and_the_estimate_stays_one() {
                 output_rad_s: reading,
                 wheel_rad_s: reading,
                 engine_n_m: reading,
+                acceleration_m_s2: reading,
                 oil_degc: reading,
                 commands: [reading; 8],
                 ..input

@@ -74,6 +74,7 @@ pub(crate) fn learnt(car: &Car, input: &[u8]) {
             output_rad_s: reading(200.0 / car.gearbox.gears[2].ratio),
             wheel_rad_s: None,
             engine_n_m: None,
+            acceleration_m_s2: None,
             lock_up_applied: false,
             commands: [reading(fraction); MAX_ELEMENTS],
             gear,

@@ -141,8 +141,16 @@ impl<T: Real> Alignment<'_, T> {
             command: taken.map_or_else(T::nan, |reading| reading.value),
         };
         let unused = ChannelHealth::Unused;
-        let channels =
-            Channels { engine, turbine, output, wheel, command, offgoing_command: unused, engine_torque: unused };
+        let channels = Channels {
+            engine,
+            turbine,
+            output,
+            wheel,
+            command,
+            offgoing_command: unused,
+            engine_torque: unused,
+            acceleration: unused,
+        };
         Aligned { sample, channels }
     }
 }

@@ -3,11 +3,11 @@
 use alloc::vec::Vec;
 
 use crate::gearbox::{
-    ElementUncertainty, FrictionElement, GearRow, GearboxFilter, GearboxTables, MAX_ELEMENTS, Piston, ShiftElement,
-    ShiftRow, ShiftUncertainty, TurbineTorque, ValveLimits,
+    AccelerationReading, ElementUncertainty, FrictionElement, GearRow, GearboxFilter, GearboxTables, MAX_ELEMENTS,
+    Piston, ShiftElement, ShiftRow, ShiftUncertainty, TurbineTorque, ValveLimits,
 };
 use crate::{Budget, FillBudget, InputLimits, ValveModel};
-use car::{Car, ElementErrors, ErrorBudget, Sensors};
+use car::{AccelerationSensor, Car, ElementErrors, ErrorBudget, Sensors};
 use drivetrain::{Cylinder, Real};
 use geartrain::{Change, Gear, Gearbox, Shift};
 
@@ -271,6 +271,7 @@ pub fn gearbox_filter<'a>(
             speed_reading(sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
             engine_noise(sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
         ),
+        acceleration: acceleration_reading(car, sensors.and_then(|sensors| sensors.acceleration.as_ref())),
         limits: InputLimits {
             speed_max_rad_s: SPEED_MAX_RAD_S,
             // Of any element; each has its own.
@@ -279,6 +280,37 @@ pub fn gearbox_filter<'a>(
             pressure_max_pa: budget.widest(|element| element.pressure_max_pa),
             shaft_torque_max_n_m: 3.0 * shaft_n_m(car),
         },
+    }
+}
+
+/// Standard deviations of an accelerometer of which nothing is known: of a reading, m/s^2, and of its delay, s; and of a delay that is stated
+/// \[chosen\].
+const ACCELERATION_NOISE_M_S2: f64 = 0.1;
+const ACCELERATION_DELAY_S: f64 = 0.02;
+const ACCELERATION_STATED_DELAY_S: f64 = 0.002;
+/// What the model of the car leaves out, m/s^2 \[chosen\].
+const ACCELERATION_MODEL_M_S2: f64 = 0.05;
+/// Of its bias, m/s^2, and of its scale, as a fraction: with the mass of the car, of which passengers and load are a tenth \[chosen\].
+const ACCELERATION_BIAS_M_S2: f64 = 0.5;
+const ACCELERATION_SCALE: f64 = 0.1;
+
+/// How the longitudinal acceleration is read.
+fn acceleration_reading(car: &Car, sensor: Option<&AccelerationSensor>) -> AccelerationReading<f64> {
+    let radius_m = car.road.wheel_radius_m;
+    let [of_mass, of_wheels] = [car.road.inertia_at_wheel(), car.driveline.wheel_inertia_kg_m2];
+    let inertia = of_mass + of_wheels;
+    let noise = |sensor: &AccelerationSensor| {
+        let reading = Real::hypot(sensor.noise_m_s2, sensor.resolution_m_s2 / 12.0_f64.sqrt());
+        Real::hypot(reading, ACCELERATION_MODEL_M_S2)
+    };
+    AccelerationReading {
+        std_dev_m_s2: sensor.map_or(ACCELERATION_NOISE_M_S2, noise),
+        bias_m_s2: ACCELERATION_BIAS_M_S2,
+        scale_fraction: ACCELERATION_SCALE,
+        delay_s: sensor.map_or(0.0, |sensor| sensor.delay_s),
+        delay_std_dev_s: sensor.map_or(ACCELERATION_DELAY_S, |_| ACCELERATION_STATED_DELAY_S),
+        is_stated: sensor.is_some(),
+        per_torque: [radius_m / inertia, of_wheels * radius_m / (inertia * of_mass)],
     }
 }
 

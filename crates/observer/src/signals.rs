@@ -277,6 +277,8 @@ pub struct Channels<V> {
     pub offgoing_command: V,
     /// Reported engine torque.
     pub engine_torque: V,
+    /// Longitudinal acceleration.
+    pub acceleration: V,
 }
 
 impl<V: Copy> Channels<V> {
@@ -290,12 +292,22 @@ impl<V: Copy> Channels<V> {
             command: value,
             offgoing_command: value,
             engine_torque: value,
+            acceleration: value,
         }
     }
 
     /// In the order of the fields.
-    pub fn each(&self) -> [V; 7] {
-        [self.engine, self.turbine, self.output, self.wheel, self.command, self.offgoing_command, self.engine_torque]
+    pub fn each(&self) -> [V; 8] {
+        [
+            self.engine,
+            self.turbine,
+            self.output,
+            self.wheel,
+            self.command,
+            self.offgoing_command,
+            self.engine_torque,
+            self.acceleration,
+        ]
     }
 }
 

@@ -153,6 +153,7 @@ mod tests {
                 output_rad_s: None,
                 wheel_rad_s: None,
                 engine_n_m: None,
+                acceleration_m_s2: None,
                 lock_up_applied,
                 commands: [None; MAX_ELEMENTS],
                 gear: ShiftCommand::between(1, 1),

@@ -121,6 +121,7 @@ fn locked(drawn: &Drawn, output_s: f64, output_scale: f64, engine_s: f64) -> Dri
             output_rad_s: reading(output(output_s) / output_scale + noise(3)),
             wheel_rad_s: None,
             engine_n_m: None,
+            acceleration_m_s2: None,
             lock_up_applied: true,
             commands: [None; 8],
             gear: ShiftCommand::between(gear, gear),

@@ -201,6 +201,7 @@ fn constant_speed_in_one_gear_tells_no_mass() {
                 output_rad_s: reading(output),
                 wheel_rad_s: None,
                 engine_n_m: None,
+                acceleration_m_s2: None,
                 lock_up_applied: false,
                 commands: [None; 8],
                 gear: ShiftCommand::between(gear, gear),

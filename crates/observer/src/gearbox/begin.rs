@@ -170,6 +170,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             misfit: T::one(),
             before: None,
             compared: Compared::nothing(),
+            felt: state.felt,
         };
         running.renew_shift();
         if phase == ShiftPhase::BothSlip {

@@ -1,8 +1,8 @@
 //! Corrections by the readings of turbine, output and wheel speed.
 
 use super::{
-    ChannelHealth, Channels, GAP_S, GearboxFilter, MISFIT_S, Measured, OUTPUT, Rates, Reading, Running, SCALE, SPEEDS,
-    ShiftInput, TOOTH, TURBINE, TWIST_RAD, Verdict, WHEEL, WHEEL_S, square,
+    ChannelHealth, GAP_S, GearboxFilter, MISFIT_S, Measured, Moment, OUTPUT, Rates, Reading, Running, SCALE, SPEEDS,
+    TOOTH, TURBINE, TWIST_RAD, Verdict, WHEEL, WHEEL_S, square,
 };
 use crate::gearbox::learnt::EDGE;
 use drivetrain::Real;
@@ -12,12 +12,11 @@ impl<T: Real> GearboxFilter<'_, T> {
     pub(super) fn take_speeds(
         &self,
         running: &mut Running<T>,
-        input: &ShiftInput<T>,
-        channels: &Channels<ChannelHealth>,
+        Moment { input, acceleration, channels, dt_s, .. }: &Moment<'_, T>,
         speeds: [T; 2],
-    ) -> [ChannelHealth; SPEEDS] {
+    ) -> [ChannelHealth; SPEEDS + 1] {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
-        let mut health = [channels.turbine, channels.output, channels.wheel];
+        let mut health = [channels.turbine, channels.output, channels.wheel, channels.acceleration];
         let unseen = self.may_slip_unseen(running, speeds);
         let Some(torques) = running.torques else { return health.map(unused) };
         let torques = torques.without(running.phase.phase.holding());
@@ -33,6 +32,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             }
             health[k] = self.correct(running, k, &reading, &rates);
         }
+        health[SPEEDS] = self.take_acceleration(running, (acceleration.as_ref(), health[SPEEDS]), &rates, *dt_s);
         running.x.timing.add_pressure(&by_timing.map(|by| by.map(|by| -by)));
         running.rates = [TURBINE, OUTPUT, WHEEL].map(|k| rates.of(k, &running.x));
         if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {

@@ -2,6 +2,7 @@
 
 use drivetrain::Real;
 
+use super::bias::Bias;
 use super::elements::PressureError;
 use super::powertrain::{CORE, dot};
 use super::timing::{TIMINGS, Timing};
@@ -17,6 +18,8 @@ pub(super) struct Gaussian<T> {
     pub(super) active: usize,
     /// What the readings of a shift have shown of lag and delay of its valves.
     pub(super) timing: Timing<T>,
+    /// The bias of the accelerometer, where there is one.
+    pub(super) bias: Option<Bias<T>>,
 }
 
 /// A scalar measurement, as a row over the states.
@@ -34,9 +37,11 @@ pub(super) struct Innovation<T> {
     /// Its variance.
     pub(super) variance: T,
     /// Covariance of the states with it.
-    with: [T; N],
+    pub(super) with: [T; N],
     /// By how much it is off per standard deviation of the timing.
     by_timing: [T; TIMINGS],
+    /// Covariance of the bias with it.
+    pub(super) with_bias: T,
 }
 
 impl<T: Real> Gaussian<T> {
@@ -46,7 +51,7 @@ impl<T: Real> Gaussian<T> {
         for (k, std_dev) in std_devs.into_iter().enumerate() {
             covariance[k][k] = std_dev * std_dev;
         }
-        Self { mean, covariance, active: N, timing: Timing::nothing([[T::zero(); 2]; 2]) }
+        Self { mean, covariance, active: N, timing: Timing::nothing([[T::zero(); 2]; 2]), bias: None }
     }
 
     /// Whether only the states of a gear are active. Loops over a number of states that the compiler knows are unrolled; so
@@ -65,6 +70,9 @@ impl<T: Real> Gaussian<T> {
     }
 
     fn pass_first<const M: usize>(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE]) {
+        if let Some(bias) = &mut self.bias {
+            bias.pass(rows);
+        }
         let mut mean = *rest;
         for (mean, row) in mean.iter_mut().zip(rows) {
             *mean = *mean + dot_first::<T, M>(row, &self.mean);
@@ -98,6 +106,9 @@ impl<T: Real> Gaussian<T> {
         let (state, active) = (state.min(N - 1), self.active);
         self.mean[state] = factor * self.mean[state];
         self.timing.fade(state, factor);
+        if let Some(bias) = &mut self.bias {
+            bias.fade(state, factor);
+        }
         for row in self.covariance.iter_mut().take(active) {
             row[state] = factor * row[state];
         }
@@ -129,6 +140,9 @@ impl<T: Real> Gaussian<T> {
             self.covariance[state][k] = T::zero();
         }
         self.timing.fade(state, T::zero());
+        if let Some(bias) = &mut self.bias {
+            bias.fade(state, T::zero());
+        }
         self.mean[state] = mean;
         self.covariance[state][state] = variance;
     }
@@ -143,6 +157,9 @@ impl<T: Real> Gaussian<T> {
         }
         let by_mean = (mean - self.mean[state]) / own;
         let by_variance = (variance - own) / (own * own);
+        if let Some(bias) = &mut self.bias {
+            bias.replace(state, &with, [by_mean, by_variance]);
+        }
         for ((row, x), own) in self.covariance.iter_mut().zip(&mut self.mean).zip(&with) {
             *x = *x + *own * by_mean;
             for (p, other) in row.iter_mut().zip(&with) {
@@ -155,6 +172,9 @@ impl<T: Real> Gaussian<T> {
     pub(super) fn swap(&mut self, a: usize, b: usize) {
         let (a, b) = (a.min(N - 1), b.min(N - 1));
         self.mean.swap(a, b);
+        if let Some(bias) = &mut self.bias {
+            bias.swap(a, b);
+        }
         self.covariance.swap(a, b);
         for row in &mut self.covariance {
             row.swap(a, b);
@@ -174,6 +194,9 @@ impl<T: Real> Gaussian<T> {
         let output = joined(self.mean[TURBINE], self.mean[OUTPUT]);
         (self.mean[TURBINE], self.mean[OUTPUT]) = (ratio * output, output);
         self.timing.tie(ratio, fraction);
+        if let Some(bias) = &mut self.bias {
+            bias.tie(ratio, fraction);
+        }
         let p = &mut self.covariance;
         for row in p.iter_mut() {
             let output = joined(row[TURBINE], row[OUTPUT]);
@@ -216,7 +239,8 @@ impl<T: Real> Gaussian<T> {
     fn innovation_of_first<const M: usize>(&self, measured: &Measured<T>) -> Innovation<T> {
         let with = self.with_first::<M>(&measured.row);
         let variance = dot_first::<T, M>(&with, &measured.row).at_least(T::zero()) + measured.noise;
-        Innovation { value: measured.innovation, variance, with, by_timing: [T::zero(); TIMINGS] }
+        let with_bias = self.bias.as_ref().map_or(T::zero(), |bias| bias.with(&measured.row));
+        Innovation { value: measured.innovation, variance, with, by_timing: [T::zero(); TIMINGS], with_bias }
     }
 
     /// Corrects by a measurement: `x + S e/V`, `P - S S'/V`. The product is made of two equal factors, so that `P` stays
@@ -250,7 +274,11 @@ impl<T: Real> Gaussian<T> {
                 *variance = variance.at_least(T::zero());
             }
         }
+        let own = per * innovation.with_bias;
         let innovation = per * innovation.value;
+        if let Some(bias) = &mut self.bias {
+            bias.correct(&factor, own, innovation);
+        }
         for (x, factor) in self.mean.iter_mut().zip(&factor) {
             *x = *x + *factor * innovation;
         }
@@ -269,7 +297,7 @@ impl<T: Real> Gaussian<T> {
         let (sound, sum) = states.fold((true, T::zero()), |(sound, sum), (k, (row, x))| {
             (sound & (row[k] >= T::zero()), sum + (row[k] + x.abs()))
         });
-        sound && sum.is_finite()
+        sound && sum.is_finite() && self.bias.as_ref().is_none_or(Bias::is_sound)
     }
 }
 

@@ -6,8 +6,8 @@
 
 use super::phases::PhaseMemory;
 use super::{
-    ChannelHealth, Channels, ElementState, GearboxFilter, MAX_ELEMENTS, Newest, Running, SPEEDS, ShiftInput,
-    ShiftPhase, turbine,
+    Acceleration, ChannelHealth, Channels, ElementState, GearboxFilter, MAX_ELEMENTS, Newest, Running, SPEEDS,
+    ShiftInput, ShiftPhase, turbine,
 };
 use drivetrain::Real;
 
@@ -19,6 +19,8 @@ pub(super) struct Moment<'m, T> {
     /// For how long the noise of the torque has been one error, s.
     pub(super) same_s: Option<T>,
     pub(super) input: &'m ShiftInput<T>,
+    /// The reading of the acceleration, if it can be taken.
+    pub(super) acceleration: Option<Acceleration<T>>,
     pub(super) channels: Channels<ChannelHealth>,
     pub(super) dt_s: T,
 }
@@ -31,14 +33,14 @@ impl<T: Real> GearboxFilter<'_, T> {
         running: &mut Running<T>,
         slipping: &mut Option<Running<T>>,
         at: &Moment<'_, T>,
-    ) -> [ChannelHealth; SPEEDS] {
+    ) -> [ChannelHealth; SPEEDS + 1] {
         if slipping.as_ref().is_some_and(|other| (other.shift, other.gear) != (running.shift, running.gear)) {
             *slipping = None;
         }
         let speeds = self.predict_at(running, at);
         if let Some(other) = slipping {
             let speeds = self.predict_at(other, at);
-            let health = self.take_speeds(other, at.input, &at.channels, speeds);
+            let health = self.take_speeds(other, at, speeds);
             if running.phase.phase == ShiftPhase::BothSlip {
                 *running = *other;
                 *slipping = None;
@@ -50,7 +52,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         } else if slipping.is_none() {
             *slipping = self.slipping(running, at, speeds);
         }
-        self.take_speeds(running, at.input, &at.channels, speeds)
+        self.take_speeds(running, at, speeds)
     }
 
     /// Predicts over the step, and decides which clutches hold. The speeds by the readings.
@@ -69,7 +71,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         other.phase = PhaseMemory::new(ShiftPhase::BothSlip);
         Self::untie(&mut other, ratio, self.slip(ratio, speeds).value);
         other.torques = Some(self.torques(&other, at.elements, at.torque, speeds));
-        self.take_speeds(&mut other, at.input, &at.channels, speeds);
+        self.take_speeds(&mut other, at, speeds);
         Some(other)
     }
 }

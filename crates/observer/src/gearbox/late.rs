@@ -5,7 +5,7 @@
 //! ahead       from there to t  in each step anew, with the readings that have come
 //! ```
 //!
-//! `D` is the longest delay of the four speeds. Each reading acts at its own time, among the commands of that time; the estimate for now is the
+//! `D` is the longest delay of the four speeds and the acceleration. Each reading acts at its own time, among the commands of that time; the estimate for now is the
 //! filter's state carried on by the commands since. It costs a step for each row within `D`. A reading compared with `w - age w'`
 //! instead would be wrong by the swing of the drive shafts, which turns by 80 degrees in 20 ms.
 
@@ -43,6 +43,7 @@ impl<T: Real> Late<T> {
             turbine_rad_s: None,
             output_rad_s: None,
             wheel_rad_s: None,
+            acceleration_m_s2: None,
             ..*input
         };
         match &mut self.steps[0] {
@@ -88,6 +89,7 @@ fn together<T: Real>(first: &ShiftInput<T>, second: &ShiftInput<T>) -> ShiftInpu
         (&mut both.output_rad_s, first.output_rad_s),
         (&mut both.wheel_rad_s, first.wheel_rad_s),
         (&mut both.engine_n_m, first.engine_n_m),
+        (&mut both.acceleration_m_s2, first.acceleration_m_s2),
     ] {
         *both = both.or(older(first));
     }
@@ -101,19 +103,20 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// The longest delay of a speed, s, as far as it is taken off; `None` where none is long.
     pub(super) fn longest_delay_s(&self) -> Option<T> {
         let [turbine, output, wheel] = &self.readings;
-        let longest =
-            [turbine, output, wheel].iter().fold(self.engine.0.delay_s, |longest, of| longest.at_least(of.delay_s));
+        let others = [turbine.delay_s, output.delay_s, wheel.delay_s, self.acceleration.delay_s];
+        let longest = others.into_iter().fold(self.engine.0.delay_s, |longest, delay_s| longest.at_least(delay_s));
         (longest >= T::of(SHORTEST_S)).then(|| longest.at_most(T::of(LONGEST_DELAY_S)))
     }
 
     /// The same filter of readings that are not late.
     fn on_time(&self) -> Self {
         let left = |delay_s: T| (delay_s - T::of(LONGEST_DELAY_S)).at_least(T::zero());
-        let (mut readings, mut engine) = (self.readings, self.engine);
+        let (mut readings, mut engine, mut acceleration) = (self.readings, self.engine, self.acceleration);
         for sensor in readings.iter_mut().chain([&mut engine.0]) {
             sensor.delay_s = left(sensor.delay_s);
         }
-        Self { readings, engine, ..*self }
+        acceleration.delay_s = left(acceleration.delay_s);
+        Self { readings, engine, acceleration, ..*self }
     }
 
     /// A step with readings that are late by up to this time, s.
@@ -132,17 +135,23 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         state.late.push(input, dt_s);
         let [turbine, output, wheel] = self.readings;
-        for (reading, sensor, channel) in [
-            (input.engine_rad_s, self.engine.0, 0),
-            (input.turbine_rad_s, turbine, 1),
-            (input.output_rad_s, output, 2),
-            (input.wheel_rad_s, wheel, 3),
+        for (reading, delay_s, channel) in [
+            (input.engine_rad_s, self.engine.0.delay_s, 0),
+            (input.turbine_rad_s, turbine.delay_s, 1),
+            (input.output_rad_s, output.delay_s, 2),
+            (input.wheel_rad_s, wheel.delay_s, 3),
+            (input.acceleration_m_s2, self.acceleration.delay_s, 4),
         ] {
             let Some(reading) = reading else { continue };
-            let delay_s = sensor.delay_s.at_most(T::of(LONGEST_DELAY_S));
+            let delay_s = delay_s.at_most(T::of(LONGEST_DELAY_S));
             if let Some((step, before_s)) = state.late.at(delay_s) {
-                let of =
-                    [&mut step.engine_rad_s, &mut step.turbine_rad_s, &mut step.output_rad_s, &mut step.wheel_rad_s];
+                let of = [
+                    &mut step.engine_rad_s,
+                    &mut step.turbine_rad_s,
+                    &mut step.output_rad_s,
+                    &mut step.wheel_rad_s,
+                    &mut step.acceleration_m_s2,
+                ];
                 if let Some(place) = of.into_iter().nth(channel) {
                     *place = Some(Reading { age_s: reading.age_s + before_s, ..reading });
                 }
@@ -163,6 +172,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let (now, of_then) = (&mut estimate.channels, &then.channels);
         (now.engine, now.turbine, now.output, now.wheel) =
             (of_then.engine, of_then.turbine, of_then.output, of_then.wheel);
+        now.acceleration = of_then.acceleration;
         estimate.health = estimate.health.max(then.health);
         estimate
     }
@@ -184,6 +194,7 @@ mod tests {
             output_rad_s: None,
             wheel_rad_s: None,
             engine_n_m: None,
+            acceleration_m_s2: None,
             lock_up_applied: false,
             commands,
             gear: ShiftCommand::between(0, 0),

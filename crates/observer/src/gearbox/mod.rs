@@ -27,9 +27,11 @@
 //! `s`, `c`, `f`, `k` and `m` last longer than a shift. What a shift or the time in a gear has shown of them is kept in [`Learnt`], which can be saved
 //! and given to another filter of the same car ([`GearboxFilter::start_with`]), which believes it as far as its shifts show it.
 
+mod acceleration;
 mod at_turbine;
 mod begin;
 mod beyond_bounds;
+mod bias;
 mod correct;
 mod covariance;
 mod doubt;
@@ -63,6 +65,7 @@ use drivetrain::{Driveline, Real};
 use crate::kalman::engine::Engine;
 use crate::kalman::gate::{Gate, Verdict};
 use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, LOST_S, Reading, SpeedReading};
+use acceleration::{Acceleration, ByTorque, Felt};
 use beyond_bounds::{Evidence, FINE_S};
 use covariance::{Gaussian, Measured};
 use doubt::Moment;
@@ -78,6 +81,7 @@ use skew::Skew;
 use timing::Timing;
 use turbine::InputSide;
 
+pub use acceleration::AccelerationReading;
 pub use at_turbine::ClutchesAtTurbine;
 pub use beyond_bounds::{BeyondBounds, CarQuantity, Elements};
 pub use estimate::{ClutchEstimate, ShiftEstimate};
@@ -165,6 +169,8 @@ pub struct ShiftInput<T> {
     pub wheel_rad_s: Option<Reading<T>>,
     /// Engine torque as the engine's controller reports it, N m.
     pub engine_n_m: Option<Reading<T>>,
+    /// Longitudinal acceleration by an accelerometer, m/s^2, positive forward: with the part of gravity along the road.
+    pub acceleration_m_s2: Option<Reading<T>>,
     /// Whether the lock-up clutch of the converter carries torque.
     pub lock_up_applied: bool,
     /// Commands of the valves, in the order of [`GearboxTables::elements`]: current in A, or duty cycle in %.
@@ -184,6 +190,7 @@ impl<T: Real> ShiftInput<T> {
             output_rad_s: to(self.output_rad_s),
             wheel_rad_s: to(self.wheel_rad_s),
             engine_n_m: to(self.engine_n_m),
+            acceleration_m_s2: to(self.acceleration_m_s2),
             lock_up_applied: self.lock_up_applied,
             commands: self.commands.map(to),
             gear: self.gear,
@@ -208,6 +215,8 @@ pub struct GearboxFilter<'a, T> {
     pub readings: [SpeedReading<T>; 3],
     /// How the engine speed is read.
     pub engine: (SpeedReading<T>, EngineNoise<T>),
+    /// How the longitudinal acceleration is read.
+    pub acceleration: AccelerationReading<T>,
     /// What counts as a measurement.
     pub limits: InputLimits<T>,
 }
@@ -229,6 +238,10 @@ pub struct GearboxState<T> {
     skew: Skew<T>,
     /// The steps whose readings are late, if the readings are.
     late: Late<T>,
+    /// The longitudinal acceleration against the torque, once a reading came.
+    by_torque: Option<ByTorque<T>>,
+    /// What the filter knew of its readings when it lost its state.
+    felt: Option<Felt<T>>,
     /// Whether a wheel speed ever came: a car without one has not lost it.
     wheel_came: bool,
     running: Option<Running<T>>,
@@ -283,6 +296,8 @@ struct Running<T> {
     before: Option<Known<T>>,
     /// The converter's maps against the reported engine torque, in this gear.
     compared: Compared<T>,
+    /// The readings of the longitudinal acceleration, once one came.
+    felt: Option<Felt<T>>,
 }
 
 impl<T: Real> GearboxFilter<'_, T> {
@@ -296,6 +311,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             uncertainty: self.uncertainty.cast(),
             readings: self.readings.map(|reading| reading.cast()),
             engine: (self.engine.0.cast(), self.engine.1.cast()),
+            acceleration: self.acceleration.cast(),
             limits: self.limits.cast(),
         }
     }
@@ -328,6 +344,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             noise: ReadingNoise::stated(),
             skew: Skew::nothing(),
             late: Late::nothing(),
+            by_torque: None,
+            felt: None,
             wheel_came: false,
             running: None,
             slipping: None,
@@ -384,6 +402,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         channels.command = self.of_commands(&commands, input.gear);
         channels.engine_torque = self.take_reported(state, input, dt_s);
         channels.engine = self.take_engine(state, input, dt_s);
+        channels.acceleration = self.judge_acceleration(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);
         self.take_noise(state, input);
         self.take_skew(state, input, dt_s);
@@ -392,6 +411,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let torque = side.as_ref().and_then(|side| self.turbine.at(side));
         let input_clutch = side.as_ref().and_then(|side| self.input_clutch(state, input, side));
         let at_turbine = torque.as_ref().and_then(|torque| self.at_turbine(state, input.gear, torque));
+        let acceleration = self.acceleration(state, input, channels.acceleration);
         if let Some(running) = &mut state.running {
             running.compared.step(&self.turbine, side.as_ref().filter(|_| running.shift.is_none()), dt_s);
             match &torque {
@@ -402,10 +422,11 @@ impl<T: Real> GearboxFilter<'_, T> {
                         torque,
                         same_s: state.engine.and_then(|engine| engine.same_error_s()),
                         input,
+                        acceleration,
                         channels,
                         dt_s,
                     };
-                    [channels.turbine, channels.output, channels.wheel] =
+                    [channels.turbine, channels.output, channels.wheel, channels.acceleration] =
                         self.go_on(running, &mut state.slipping, &moment);
                 }
                 None => state.lose(),
@@ -427,6 +448,9 @@ impl<T: Real> GearboxFilter<'_, T> {
         state.skew.pause();
         state.engine = None;
         state.reported = None;
+        if let Some(by_torque) = &mut state.by_torque {
+            by_torque.pause();
+        }
         for (memory, element) in state.elements.iter_mut().zip(self.tables.elements) {
             if let Some(memory) = memory {
                 memory.forget(element);
@@ -520,6 +544,20 @@ impl<T: Real> GearboxState<T> {
         self.skew.late_s()
     }
 
+    /// By how much the readings of the longitudinal acceleration have shown to be late beyond what is stated, s, with its standard deviation;
+    /// they are taken to be so. `None` if none was taken.
+    pub fn acceleration_late_s(&self) -> Option<[T; 2]> {
+        let felt = self.running.as_ref().and_then(|running| running.felt).or(self.felt)?;
+        let [late_s, variance] = felt.late;
+        Some([late_s, variance.sqrt()])
+    }
+
+    /// Scale of these readings, with the mass of the car, over that by the vehicle file, with its standard deviation; `None` if it is not known.
+    pub fn acceleration_scale(&self, filter: &GearboxFilter<'_, T>) -> Option<[T; 2]> {
+        let [scale, variance] = self.by_torque.as_ref()?.scale(&filter.acceleration)?;
+        Some([scale, variance.sqrt()])
+    }
+
     /// Whether it can be the memory of the filter of a gearbox with these tables.
     pub fn fits(&self, tables: &GearboxTables<'_, T>) -> bool {
         self.elements.iter().flatten().count() == tables.elements.len()
@@ -533,7 +571,9 @@ impl<T: Real> GearboxState<T> {
 
     /// Ends the filter. What a shift has shown up to then is not learnt: it is not known what went wrong.
     fn lose(&mut self) {
-        self.lost = self.lost || self.running.take().is_some();
+        let running = self.running.take();
+        self.felt = running.as_ref().and_then(|running| running.felt).or(self.felt);
+        self.lost = self.lost || running.is_some();
         self.slipping = None;
     }
 }

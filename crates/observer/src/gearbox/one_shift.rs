@@ -15,8 +15,8 @@ use car::{Input, ShiftCommand};
 use drivetrain::{Driveline, Real, ReducedShift};
 
 use super::{
-    FrictionElement, GearRow, GearboxFilter, GearboxState, GearboxTables, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
-    ShiftPhase, ShiftRow, ShiftUncertainty, TurbineTorque,
+    AccelerationReading, FrictionElement, GearRow, GearboxFilter, GearboxState, GearboxTables, MAX_ELEMENTS,
+    ShiftEstimate, ShiftInput, ShiftPhase, ShiftRow, ShiftUncertainty, TurbineTorque,
 };
 use crate::{
     EngineNoise, Estimate, Estimator, Health, InputLimits, Phase, Reading, SpeedReading, Supervisor, SupervisorState,
@@ -63,6 +63,7 @@ struct Parameters<T> {
     uncertainty: ShiftUncertainty<T>,
     readings: [SpeedReading<T>; 3],
     engine: (SpeedReading<T>, EngineNoise<T>),
+    acceleration: AccelerationReading<T>,
     limits: InputLimits<T>,
 }
 
@@ -136,8 +137,19 @@ impl<T: Real> OneShiftFilter<T> {
         supervisor: Supervisor<T>,
         unheard: UnheardTorque<T>,
     ) -> Self {
-        let GearboxFilter { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits, .. } = *filter;
-        let parameters = Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits };
+        let GearboxFilter {
+            tables: _,
+            driveline,
+            wheels_kg_m2,
+            turbine,
+            uncertainty,
+            readings,
+            engine,
+            acceleration,
+            limits,
+        } = *filter;
+        let parameters =
+            Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, acceleration, limits };
         Self { tables, parameters, shift, supervisor, unheard }
     }
 
@@ -159,9 +171,10 @@ impl<T: Real> OneShiftFilter<T> {
 
     /// The filter with its tables.
     fn filter(&self) -> GearboxFilter<'_, T> {
-        let Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits } = self.parameters;
+        let Parameters { driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, acceleration, limits } =
+            self.parameters;
         let tables = self.tables.as_slices();
-        GearboxFilter { tables, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, limits }
+        GearboxFilter { tables, driveline, wheels_kg_m2, turbine, uncertainty, readings, engine, acceleration, limits }
     }
 
     /// Follows the command of the oncoming clutch before a step.
@@ -347,6 +360,7 @@ impl<T: Real> OneShiftFilter<T> {
             output_rad_s: input.output_rad_s,
             wheel_rad_s: input.wheel_rad_s,
             engine_n_m: input.engine_torque_n_m,
+            acceleration_m_s2: None,
             lock_up_applied: false,
             commands,
             gear: state.stage.command(),

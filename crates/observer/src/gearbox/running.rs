@@ -181,6 +181,9 @@ impl<T: Real> GearboxFilter<'_, T> {
                 let covariance = fraction * x.covariance[SLOW_FRACTION][core];
                 x.add(state, core, covariance);
             }
+            if let Some(bias) = &mut x.bias {
+                bias.take_fraction(state, fraction, SLOW_FRACTION);
+            }
             for (b, other) in LASTING.into_iter().enumerate().take(a) {
                 x.add(state, other, known.covariance[a][b]);
             }
