@@ -75,6 +75,7 @@ MEANINGS = [
     (r"_duty_percent$", "command of the valve, pulse-width"),
     (r"_pressure_pa$", "true pressure"),
     (r"^reported_engine_torque_n_m$", "engine torque as its controller reports it"),
+    (r"^longitudinal_acceleration_m_s2$", "longitudinal acceleration by an accelerometer"),
     (r"_torque_n_m$", "true torque"),
     (r"^(throttle|brake)$", "0 to 1"),
     (r"^engine_share$", "fraction of the engine torque that the shift lets through"),

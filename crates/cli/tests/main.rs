@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
+mod acceleration;
 mod adaptation_table;
 mod any_car;
 mod any_car_checks;

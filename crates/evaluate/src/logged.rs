@@ -101,14 +101,16 @@ impl<'c> LoggedDrive<'c> {
         }
     }
 
-    /// The same where engine, turbine, output and wheel speed come later by these times, s, than their sensors do.
+    /// The same where engine, turbine, output and wheel speed and the longitudinal acceleration come later by these times, s, than their sensors
+    /// do.
     #[must_use]
-    pub fn with_speed_delays(mut self, delays_s: [f64; 4]) -> Self {
-        let [engine, of_gearbox @ ..] = delays_s;
+    pub fn with_delays(mut self, delays_s: [f64; 5]) -> Self {
+        let [engine, of_gearbox @ .., acceleration] = delays_s;
         self.filter.engine.0.delay_s += engine;
         for (reading, delay_s) in self.filter.readings.iter_mut().zip(of_gearbox) {
             reading.delay_s += delay_s;
         }
+        self.filter.acceleration.delay_s += acceleration;
         self
     }
 
@@ -396,7 +398,8 @@ impl<'c> LoggedDrive<'c> {
         let of_car = self.beyond_bounds.warning(self.car, self.tables);
         let late = late_speeds::warnings(self.state.speeds_late_s(), self.filter.longest_found_s());
         let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings());
-        let warnings = warnings.chain(late).chain(of_car).collect();
+        let acceleration = late_speeds::acceleration_warning(self.state.acceleration_late_s());
+        let warnings = warnings.chain(late).chain(acceleration).chain(of_car).collect();
         ScoredDrive { warnings, ..self.passing.drive }
     }
 }

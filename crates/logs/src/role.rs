@@ -15,8 +15,10 @@ pub enum Role {
     WheelSpeed,
     /// Speed of the car, m/s.
     VehicleSpeed,
-    /// Longitudinal acceleration of the car, m/s^2.
+    /// Acceleration of the car, m/s^2: the rate of its speed.
     VehicleAcceleration,
+    /// Longitudinal acceleration by an accelerometer, m/s^2: with the part of gravity along the road.
+    LongitudinalAcceleration,
     /// Current of the oncoming clutch's valve, A.
     OncomingCurrent,
     /// Current of the offgoing clutch's valve, A.
@@ -69,6 +71,7 @@ const TABLE: &[(Role, &str, Option<Quantity>, &str)] = &[
     (Role::WheelSpeed, "wheel_speed", Some(Quantity::Rotation), "rad/s"),
     (Role::VehicleSpeed, "vehicle_speed", Some(Quantity::Velocity), "m/s"),
     (Role::VehicleAcceleration, "vehicle_acceleration", Some(Quantity::Acceleration), "m/s^2"),
+    (Role::LongitudinalAcceleration, "longitudinal_acceleration", Some(Quantity::Acceleration), "m/s^2"),
     (Role::OncomingCurrent, "oncoming_current", Some(Quantity::Current), "A"),
     (Role::OffgoingCurrent, "offgoing_current", Some(Quantity::Current), "A"),
     (Role::OncomingDuty, "oncoming_duty", Some(Quantity::Fraction), "%"),

@@ -58,6 +58,7 @@ pub const AGES: &[(&str, &str)] = &[
     (ONCOMING_CURRENT, "oncoming_current_age_s"),
     (OFFGOING_CURRENT, "offgoing_current_age_s"),
     (REPORTED_ENGINE_TORQUE, "reported_engine_torque_age_s"),
+    (LONGITUDINAL_ACCELERATION, "longitudinal_acceleration_age_s"),
 ];
 
 /// What became of the reading of the command of the oncoming clutch's valve, a word.
@@ -75,6 +76,9 @@ pub const READINGS: [&str; 7] = [
     OFFGOING_COMMAND_READING,
     "engine_torque_reading",
 ];
+
+/// The same of the longitudinal acceleration.
+pub const ACCELERATION_READING: &str = "longitudinal_acceleration_reading";
 
 /// True pressure of the oncoming clutch, Pa.
 pub const ONCOMING_PRESSURE: &str = "oncoming_pressure_pa";
@@ -98,6 +102,8 @@ pub const VEHICLE_SPEED: &str = "vehicle_speed_m_s";
 pub const OIL_TEMPERATURE: &str = "oil_temperature_degc";
 /// True vehicle acceleration, m/s^2.
 pub const VEHICLE_ACCELERATION: &str = "vehicle_acceleration_m_s2";
+/// Longitudinal acceleration by an accelerometer, with the part of gravity along the road, m/s^2.
+pub const LONGITUDINAL_ACCELERATION: &str = "longitudinal_acceleration_m_s2";
 /// True phase of the shift, a word.
 pub const TRUE_PHASE: &str = "true_phase";
 

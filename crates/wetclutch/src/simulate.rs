@@ -163,6 +163,8 @@ enum DriveValue {
     Speed(usize, Reading),
     /// The command of an element's valve as it is read, or its age.
     Command(usize, Reading),
+    /// The longitudinal acceleration as it is read, or its age.
+    Acceleration(Reading),
     /// The command of the offgoing or oncoming clutch.
     OfShift(fn(&CarSample) -> Option<ElementSample>),
 }
@@ -181,6 +183,7 @@ impl DriveValue {
             Self::Of(value) => value(car, &row.sample),
             Self::Speed(speed, what) => Cell::Number(of(row.speeds.get(speed), what)),
             Self::Command(element, what) => Cell::Number(of(row.commands.get(element), what)),
+            Self::Acceleration(what) => Cell::Number(of(Some(&row.acceleration), what)),
             Self::OfShift(which) => {
                 let clutch = which(&row.sample);
                 Cell::Number(of(clutch.and_then(|clutch| row.commands.get(clutch.element)), Reading::Value))
@@ -195,7 +198,12 @@ const SPEEDS: [&str; 4] = [signal::ENGINE_SPEED, signal::TURBINE_SPEED, signal::
 /// The columns that a car measures or commands; `sensors` with the time between two rows, s, if the drive is read by some.
 pub fn measured_columns(car: &Car, sensors: Option<(&Sensors, f64)>) -> Vec<DriveColumn> {
     let measured = drive_columns(car).into_iter().filter(|column| column.is_measured);
-    measured.chain(sensors.into_iter().flat_map(|of| ages(car, of))).collect()
+    let acceleration = sensors.filter(|(sensors, _)| sensors.acceleration.is_some()).map(|_| DriveColumn {
+        name: signal::LONGITUDINAL_ACCELERATION.to_owned(),
+        is_measured: true,
+        value: DriveValue::Acceleration(Reading::Value),
+    });
+    measured.chain(acceleration).chain(sensors.into_iter().flat_map(|of| ages(car, of))).collect()
 }
 
 /// The columns of the ages of readings that may be older than their rows.
@@ -206,6 +214,9 @@ fn ages(car: &Car, (sensors, row_s): (&Sensors, f64)) -> Vec<DriveColumn> {
     let named = speeds.filter_map(|(at, _)| Some((at, signal::age_of(SPEEDS[at])?)));
     let mut columns: Vec<_> =
         named.map(|(at, age)| measured(age.to_owned(), DriveValue::Speed(at, Reading::Age))).collect();
+    let acceleration = sensors.acceleration.filter(|of| has_ages(of.sample_time_s, of.offset_s, row_s));
+    let named = acceleration.and_then(|_| signal::age_of(signal::LONGITUDINAL_ACCELERATION));
+    columns.extend(named.map(|age| measured(age.to_owned(), DriveValue::Acceleration(Reading::Age))));
     let current = sensors.current.and_then(|of| Some(has_ages(of.sample_time_s?, of.offset_s, row_s)));
     if current.unwrap_or(false) {
         let commands = element_commands(car).into_iter();

@@ -23,6 +23,7 @@ mod slipping_elements;
 mod still_commands;
 pub mod swapped_speeds;
 mod unannounced;
+mod unused_acceleration;
 
 use car::{Car, ErrorBudget};
 use observer::ShiftTables;
@@ -46,6 +47,7 @@ use self::slipping_elements::SlippingElements;
 use self::still_commands::StillCommands;
 use self::swapped_speeds::SwappedSpeeds;
 use self::unannounced::UnannouncedShifts;
+use self::unused_acceleration::UnusedAcceleration;
 
 pub use came_speed::CameSpeed;
 pub use in_gear::Unusable;
@@ -74,6 +76,7 @@ pub(crate) struct Checks<'c> {
     polled: PolledSpeeds,
     failed: FailedSpeeds,
     unannounced: UnannouncedShifts,
+    acceleration: UnusedAcceleration,
     pub(crate) slipping: SlippingElements<'c>,
     pub(crate) torques: ClutchTorques<'c>,
     pub(crate) scales: Scales<'c>,
@@ -98,6 +101,7 @@ impl<'c> Checks<'c> {
             polled: PolledSpeeds::default(),
             failed: FailedSpeeds::default(),
             unannounced: UnannouncedShifts::new(car),
+            acceleration: UnusedAcceleration::default(),
             slipping: SlippingElements::new(car),
             torques: ClutchTorques::new(car),
             scales: Scales::new(car),
@@ -105,7 +109,7 @@ impl<'c> Checks<'c> {
     }
 
     /// Each of them, in the order of their warnings.
-    pub(crate) fn each(&mut self) -> [&mut dyn Check; 19] {
+    pub(crate) fn each(&mut self) -> [&mut dyn Check; 20] {
         [
             &mut self.swapped,
             &mut self.commands,
@@ -122,6 +126,7 @@ impl<'c> Checks<'c> {
             &mut self.other,
             &mut self.polled,
             &mut self.failed,
+            &mut self.acceleration,
             &mut self.unannounced,
             &mut self.slipping,
             &mut self.torques,

@@ -121,7 +121,7 @@ fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>, takes: i
     /// Time around the shift, s.
     const AROUND_S: f64 = 0.3;
     let track = |role: Role| Some(&tracks[role as usize]).filter(|track| !track.is_empty());
-    let acceleration = track(Role::VehicleAcceleration);
+    let acceleration = track(Role::VehicleAcceleration).or_else(|| track(Role::LongitudinalAcceleration));
     let (track, factor) = match (acceleration, track(Role::VehicleSpeed), track(Role::OutputSpeed)) {
         (Some(acceleration), ..) => (acceleration, 1.0),
         (_, Some(speed), _) => (speed, 1.0),

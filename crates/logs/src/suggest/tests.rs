@@ -185,7 +185,9 @@ fn names_that_look_alike_are_not_taken() {
     }
     let role = |name: &str, unit: &str| suggested(&[channel(name, unit)]).pop().map(|(role, _)| role);
     // The acceleration of the car is no pedal, and the lever no gear.
-    assert_eq!(role("ax", "m/s^2").as_deref(), Some("vehicle_acceleration"));
+    assert_eq!(role("ax", "m/s^2").as_deref(), Some("longitudinal_acceleration"));
+    assert_eq!(role("LongAccel", "m/s^2").as_deref(), Some("longitudinal_acceleration"));
+    assert_eq!(role("VehicleAccel", "m/s^2").as_deref(), Some("vehicle_acceleration"));
     assert_eq!(role("GearLever", "").as_deref(), Some("selector"));
     assert_eq!(role("Gear_Sel", "").as_deref(), Some("selector"));
 }

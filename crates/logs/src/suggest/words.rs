@@ -19,6 +19,7 @@ pub(super) const ENGINE: &[&str] = &["engine", "eng", "mot", "motor", "ice", "cr
 pub(super) const SPEED: &[&str] = &["speed", "spd", "n", "rpm", "drehzahl", "nd", "revs", "rad"];
 pub(super) const TURBINE: &[&str] =
     &["turbine", "turb", "tur", "trb", "turbinen*", "input", "nt", "gearboxinput", "transinput", "getriebeeingang*"];
+pub(super) const ACCELERATION: &[&str] = &["acc", "accel", "acceleration", "beschl", "beschleunigung", "ax", "a"];
 pub(super) const TORQUE: &[&str] = &["torque", "tq", "trq", "tqi", "moment", "drehmoment", "md", "m"];
 pub(super) const OUTPUT: &[&str] = &["output", "abtrieb", "abtriebs*", "out", "nab", "getriebeausgang*"];
 pub(super) const WHEEL: &[&str] = &["wheel", "whl", "rad", "raddrehzahl", "radgeschw*", "whlspd", "hr", "hl"];
@@ -130,10 +131,14 @@ pub(super) const TABLE: &[Words] = &[
     },
     Words {
         role: Role::VehicleAcceleration,
-        all: &[
-            &["acc", "accel", "acceleration", "beschl", "beschleunigung", "ax", "a"],
-            &["long", "longitudinal", "laengs", "x", "vehicle", "ax"],
-        ],
+        all: &[ACCELERATION, &["vehicle"]],
+        none: &["pedal", "ped", "lat", "lateral", "long", "longitudinal", "laengs", "x", "ax"],
+        exact: &[],
+        vague: &[],
+    },
+    Words {
+        role: Role::LongitudinalAcceleration,
+        all: &[ACCELERATION, &["long", "longitudinal", "laengs", "x", "ax"]],
         none: &["pedal", "ped", "lat", "lateral"],
         exact: &["ax", "a_x", "along", "laengsbeschleunigung"],
         vague: &[],

@@ -56,6 +56,7 @@ struct Columns {
     output: ReadingColumn,
     wheel: Option<ReadingColumn>,
     engine_torque: Option<ReadingColumn>,
+    acceleration: Option<ReadingColumn>,
     lock_up: Option<usize>,
     gear: usize,
     target: usize,
@@ -100,6 +101,7 @@ impl Columns {
                 true => find(signal::REPORTED_ENGINE_TORQUE),
                 false => Some(require(signal::REPORTED_ENGINE_TORQUE)?),
             },
+            acceleration: find(signal::LONGITUDINAL_ACCELERATION),
             lock_up: rows.find(signal::LOCK_UP_APPLIED),
             gear: rows.require(signal::GEAR)?,
             target: rows.require(signal::TARGET_GEAR)?,
@@ -193,6 +195,11 @@ impl<'c> CarLog<'c> {
         self.columns.commands.iter().any(|(.., of_pressure)| *of_pressure == Some(element))
     }
 
+    /// Whether the table has a longitudinal acceleration.
+    pub fn has_acceleration(&self) -> bool {
+        self.columns.acceleration.is_some()
+    }
+
     /// Whether the table has a signal, of this name in SI, in its SI unit.
     pub fn is_in_si(&self, name: &str) -> bool {
         self.rows.find(name).is_none_or(|column| self.rows.factor(column) == 1.0)
@@ -255,6 +262,7 @@ impl<'c> CarLog<'c> {
             output_rad_s,
             wheel_rad_s,
             engine_n_m: reported_n_m,
+            acceleration_m_s2: reading(columns.acceleration),
             lock_up_applied,
             commands,
             gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),

@@ -16,8 +16,9 @@ use super::gear_numbers::GearNumbers;
 use super::gear_signal::Gears;
 use super::pressure_command::command_for;
 
-/// The speeds that the filter reads, in its order.
-const SPEEDS: [Role; 4] = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
+/// The channels whose delay by the map the filter takes off.
+const DELAYED: [Role; 5] =
+    [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed, Role::LongitudinalAcceleration];
 
 /// The newest reading of each entry of a map since the step before.
 #[derive(Debug, Clone)]
@@ -64,8 +65,8 @@ pub struct CarChannels<'a> {
     entries: Vec<Entry>,
     /// Commands of which the map says that they are sent on change, by their places in the filter's tables.
     on_change: [OnChange; MAX_ELEMENTS],
-    /// Delays by the map of engine, turbine, output and wheel speed, s.
-    speed_delays_s: [f64; 4],
+    /// Delays by the map, s, in the order of [`DELAYED`].
+    delays_s: [f64; 5],
     gears: Gears,
     lock_up_applied: bool,
     pedal: f64,
@@ -92,7 +93,7 @@ impl<'a> CarChannels<'a> {
                 on_change[place] = OnChange::by_map(mapped.delay_s);
             }
         }
-        let speed_delays_s = SPEEDS
+        let delays_s = DELAYED
             .map(|role| map.channels.iter().find(|mapped| mapped.role == role).map_or(0.0, |mapped| mapped.delay_s));
         let readings = Readings::new(log, map)?.of_gearbox(&car.gearbox.ratios());
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
@@ -105,7 +106,7 @@ impl<'a> CarChannels<'a> {
             steps,
             entries,
             on_change,
-            speed_delays_s,
+            delays_s,
             gears,
             lock_up_applied,
             pedal,
@@ -119,10 +120,15 @@ impl<'a> CarChannels<'a> {
         self.on_change
     }
 
-    /// Delays by the map of engine, turbine, output and wheel speed, s, each up to [`LONGEST_DELAY_S`]. They are not in the ages of the readings: the filter takes them
-    /// off ([`evaluate::logged::LoggedDrive::with_speed_delays`]).
-    pub fn speed_delays_s(&self) -> [f64; 4] {
-        self.speed_delays_s.map(|delay_s| delay_s.min(LONGEST_DELAY_S))
+    /// Delays by the map of engine, turbine, output and wheel speed and of the longitudinal acceleration, s, each up to [`LONGEST_DELAY_S`]. They are not in the ages of the readings: the filter takes them
+    /// off ([`evaluate::logged::LoggedDrive::with_delays`]).
+    pub fn delays_s(&self) -> [f64; 5] {
+        self.delays_s.map(|delay_s| delay_s.min(LONGEST_DELAY_S))
+    }
+
+    /// Whether the map has a longitudinal acceleration.
+    pub fn has_acceleration(&self) -> bool {
+        self.entries.iter().any(|entry| entry.role == Role::LongitudinalAcceleration)
     }
 
     /// The readings, with their summary and notes.
@@ -150,12 +156,12 @@ impl<'a> CarChannels<'a> {
         let Some(step) = self.steps.next() else { return Ok(None) };
         let ChannelStep { time_s, dt_s, readings } = step?;
         let (mut commands, mut pressures) = ([None; MAX_ELEMENTS], [None; MAX_ELEMENTS]);
-        let (mut of_role, mut of_car, mut oncoming) = ([None; 5], None, [None; 2]);
+        let (mut of_role, mut of_car, mut oncoming) = ([None; 6], None, [None; 2]);
         let mut changed_gear = [None; 2];
         for (Entry { role, element }, reading) in self.entries.iter().zip(&readings) {
             let Some(reading) = reading else { continue };
-            let age_s = match SPEEDS.iter().position(|speed| speed == role) {
-                Some(at) => (time_s - reading.stamp_s).max(0.0) + (self.speed_delays_s[at] - LONGEST_DELAY_S).max(0.0),
+            let age_s = match DELAYED.iter().position(|delayed| delayed == role) {
+                Some(at) => (time_s - reading.stamp_s).max(0.0) + (self.delays_s[at] - LONGEST_DELAY_S).max(0.0),
                 None => (time_s - reading.time_s).max(0.0),
             };
             let measured = Measured { value: reading.value, age_s };
@@ -165,6 +171,7 @@ impl<'a> CarChannels<'a> {
                 Role::OutputSpeed => of_role[2] = Some(measured),
                 Role::WheelSpeed => of_role[3] = Some(measured),
                 Role::EngineTorque => of_role[4] = Some(measured),
+                Role::LongitudinalAcceleration => of_role[5] = Some(measured),
                 Role::Gear => changed_gear[0] = Some(measured.value),
                 Role::TargetGear => changed_gear[1] = Some(measured.value),
                 Role::LockUpApplied => self.lock_up_applied = measured.value > 0.5,
@@ -195,7 +202,7 @@ impl<'a> CarChannels<'a> {
             let Some(number) = number else { continue };
             self.gears.take(which, self.numbers.gear(number), || format!("{number}"));
         }
-        let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, engine_n_m] = of_role;
+        let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, engine_n_m, acceleration_m_s2] = of_role;
         let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);
         let input = ShiftInput {
             dt_s,
@@ -204,6 +211,7 @@ impl<'a> CarChannels<'a> {
             output_rad_s,
             wheel_rad_s,
             engine_n_m,
+            acceleration_m_s2,
             lock_up_applied: self.lock_up_applied,
             commands,
             gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
@@ -333,6 +341,7 @@ pub fn own_map(log: &Log, car: &Car) -> Result<ChannelMap, Vec<&'static str>> {
         (Role::Throttle, signal::THROTTLE),
         (Role::VehicleSpeed, signal::VEHICLE_SPEED),
         (Role::OilTemperature, signal::OIL_TEMPERATURE),
+        (Role::LongitudinalAcceleration, signal::LONGITUDINAL_ACCELERATION),
         (Role::OncomingPressure, signal::ONCOMING_PRESSURE),
         (Role::OncomingTorque, signal::ONCOMING_TORQUE),
     ];

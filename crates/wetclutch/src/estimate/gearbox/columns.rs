@@ -5,7 +5,7 @@ use car::{Car, Gear, ShiftCommand};
 use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftInput, ShiftPhase};
 use observer::{ChannelHealth, Channels, Health, Reading, ShiftTables};
 use study::gearbox::gear_numbers::GearNumbers;
-use trace::signal::{self, OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
+use trace::signal::{self, ACCELERATION_READING, OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
 
 use crate::Error;
@@ -158,7 +158,7 @@ pub(crate) enum Value {
     Valve(usize),
     /// An end of the range of that pressure.
     Range(usize, usize),
-    /// What became of the reading of a channel, by its place in [`READINGS`].
+    /// What became of the reading of a channel, by its place in [`READINGS`]; after them that of [`ACCELERATION_READING`].
     Reading(usize),
     /// The same of the command of an element, by its place in the filter's tables.
     Command(usize),
@@ -215,11 +215,12 @@ impl Column {
 pub(crate) struct Knows {
     converter: bool,
     elements: bool,
+    acceleration: bool,
 }
 
 impl Knows {
-    pub(crate) fn of(car: &Car) -> Self {
-        Self { converter: car.converter.is_some(), elements: !car.gearbox.has_ratios_alone() }
+    pub(crate) fn of(car: &Car, acceleration: bool) -> Self {
+        Self { converter: car.converter.is_some(), elements: !car.gearbox.has_ratios_alone(), acceleration }
     }
 }
 
@@ -294,19 +295,22 @@ fn readings(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
     let command = |(place, name): &(usize, &str)| {
         words(format!("{}_{COMMAND_READING}", element_column(name)), Value::Command(*place))
     };
-    channels.chain(places.iter().map(command)).collect()
+    let acceleration =
+        knows.acceleration.then(|| words(ACCELERATION_READING.to_owned(), Value::Reading(READINGS.len())));
+    channels.chain(acceleration).chain(places.iter().map(command)).collect()
 }
 
 /// A measured channel: its column, and its reading in a row.
 type Channel = (&'static str, fn(&Row<'_>) -> Option<Reading<f64>>);
 
 /// The measured channels that an estimate may have too.
-const MEASURED: [Channel; 5] = [
+const MEASURED: [Channel; 6] = [
     (signal::ENGINE_SPEED, |row| row.input.engine_rad_s),
     (signal::TURBINE_SPEED, |row| row.input.turbine_rad_s),
     (signal::OUTPUT_SPEED, |row| row.input.output_rad_s),
     (signal::WHEEL_SPEED, |row| row.input.wheel_rad_s),
     (signal::REPORTED_ENGINE_TORQUE, |row| row.reported_n_m),
+    (signal::LONGITUDINAL_ACCELERATION, |row| row.input.acceleration_m_s2),
 ];
 
 /// The columns of the readings of a car, which an estimate has where they are asked for.
@@ -329,7 +333,7 @@ pub fn is_car_column(name: &str) -> bool {
         rest.is_some_and(|rest| rest.starts_with("element_"))
     };
     let is_one = |[converter, elements]: [bool; 2]| {
-        columns(&[], Knows { converter, elements }).iter().any(|column| column.name == name)
+        columns(&[], Knows { converter, elements, acceleration: true }).iter().any(|column| column.name == name)
     };
     [[true, true], [false, true], [true, false]].into_iter().any(is_one)
         || ELEMENT.into_iter().chain([COMMAND_READING]).any(of_element)

@@ -129,15 +129,15 @@ pub fn estimate(
     let mut opened = None;
     let reading = CarReading { car, tables, log, stop: options.follow.as_ref(), threads: options.threads };
     let mut source = CarSource::open(reading, &mut opened, say)?;
-    let mut drive = LoggedDrive::new(car, tables, options.sensors.as_ref(), options.learnt.as_ref())
-        .with_speed_delays(source.speed_delays_s());
+    let mut drive =
+        LoggedDrive::new(car, tables, options.sensors.as_ref(), options.learnt.as_ref()).with_delays(source.delays_s());
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
     let numbers = GearNumbers::of(car);
     let names = (&options.columns[..], destination.is_live());
-    let columns = chosen(columns(&places, Knows::of(car)), measured(car, tables), names)?;
+    let columns = chosen(columns(&places, Knows::of(car, source.has_acceleration())), measured(car, tables), names)?;
     let (before_readings, mut said, mut named_before) = (before_readings(&columns), None, None);
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(destination, named)?;

@@ -124,11 +124,19 @@ impl<'a> CarSource<'a> {
         Ok(Self { kind, looked_at, commands, on_change })
     }
 
-    /// Delays by the channel map of engine, turbine, output and wheel speed, s.
-    pub fn speed_delays_s(&self) -> [f64; 4] {
+    /// Delays by the channel map of engine, turbine, output and wheel speed and of the longitudinal acceleration, s.
+    pub fn delays_s(&self) -> [f64; 5] {
         match &self.kind {
-            SourceKind::Rows(_) => [0.0; 4],
-            SourceKind::Channels(channels) => channels.speed_delays_s(),
+            SourceKind::Rows(_) => [0.0; 5],
+            SourceKind::Channels(channels) => channels.delays_s(),
+        }
+    }
+
+    /// Whether the log has a longitudinal acceleration.
+    pub fn has_acceleration(&self) -> bool {
+        match &self.kind {
+            SourceKind::Rows(rows) => rows.has_acceleration(),
+            SourceKind::Channels(channels) => channels.has_acceleration(),
         }
     }
 
