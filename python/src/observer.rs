@@ -100,6 +100,7 @@ impl Observer {
     ///     output_speed_rad_s: Speed of the gearbox output, rad/s.
     ///     wheel_speed_rad_s: Speed of the driven wheels, rad/s.
     ///     engine_torque_n_m: Engine torque as its controller reports it, N m.
+    ///     acceleration_m_s2: Longitudinal acceleration by an accelerometer, positive forward, m/s^2: with the part of gravity along the road.
     ///     commands: Commands of the valves by the names of their elements: current, A, or duty cycle, %.
     ///     gear: The gear, or the gear before the shift; "N" in neutral.
     ///     target_gear: The gear after the shift, if there is one.
@@ -110,8 +111,8 @@ impl Observer {
     ///     InputError: There is no such element or gear.
     #[pyo3(signature = (
         *, dt_s, engine_speed_rad_s=None, turbine_speed_rad_s=None, output_speed_rad_s=None, wheel_speed_rad_s=None,
-        engine_torque_n_m=None, commands=None, gear=None, target_gear=None, lock_up_applied=false,
-        oil_temperature_degc=None
+        engine_torque_n_m=None, acceleration_m_s2=None, commands=None, gear=None, target_gear=None,
+        lock_up_applied=false, oil_temperature_degc=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "each is a keyword of the method in Python")]
     fn step(
@@ -123,6 +124,7 @@ impl Observer {
         output_speed_rad_s: Option<Given>,
         wheel_speed_rad_s: Option<Given>,
         engine_torque_n_m: Option<Given>,
+        acceleration_m_s2: Option<Given>,
         commands: Option<&Bound<'_, PyDict>>,
         gear: Option<&str>,
         target_gear: Option<&str>,
@@ -135,6 +137,7 @@ impl Observer {
         step.speeds.output = output_speed_rad_s.map(Reading::from);
         step.speeds.wheel = wheel_speed_rad_s.map(Reading::from);
         step.engine_torque_n_m = engine_torque_n_m.map(Reading::from);
+        step.acceleration_m_s2 = acceleration_m_s2.map(Reading::from);
         step.lock_up_applied = lock_up_applied;
         step.shift = self.shift(gear, target_gear).map_err(|error| exception(py, &error))?;
         for (name, command) in commands.into_iter().flatten() {

@@ -35,6 +35,7 @@ class Sensors:
         output: Mapping[str, float],
         wheel: Mapping[str, float],
         current: Mapping[str, float] | None = None,
+        acceleration: Mapping[str, float] | None = None,
         seed: int = 0,
         row_offset_s: float | None = None,
         missing_share: float | None = None,
@@ -51,6 +52,9 @@ class Sensors:
             current: Of the commands of the valves: ``noise_a``, ``offset_a`` and ``resolution_a``; where they are given also
                 ``sample_time_s``, ``offset_s``, ``delay_s``, ``scale``, ``missing_share``, ``burst_s``, ``frozen_s``, ``outliers`` and
                 ``outlier_a``. None for readings that are the commands.
+            acceleration: Of the longitudinal acceleration, each where it is given: ``noise_m_s2``, ``bias_m_s2``, ``resolution_m_s2``,
+                ``sample_time_s``, ``offset_s``, ``delay_s``, ``scale``, ``missing_share``, ``burst_s``, ``frozen_s``, ``outliers`` and
+                ``outlier_m_s2``. None for a car that does not measure it.
             seed: Seed of the random numbers of a simulation.
             row_offset_s: Time of the rows against the ticks of the controller, s.
             missing_share: Fraction of the readings of all channels that are lost, 0 to 1.
@@ -70,6 +74,7 @@ class Sensors:
             "output": dict(output),
             "wheel": dict(wheel),
             "current": None if current is None else dict(current),
+            "acceleration": None if acceleration is None else dict(acceleration),
         }
         self._take(toml({"sensors": {key: value for key, value in given.items() if value is not None}}))
 

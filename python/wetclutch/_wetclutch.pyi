@@ -80,6 +80,7 @@ class Observer:
         output_speed_rad_s: _Reading | None = None,
         wheel_speed_rad_s: _Reading | None = None,
         engine_torque_n_m: _Reading | None = None,
+        acceleration_m_s2: _Reading | None = None,
         commands: Mapping[str, _Reading | None] | None = None,
         gear: str | None = None,
         target_gear: str | None = None,
