@@ -3,6 +3,7 @@
 
 #![expect(clippy::print_stdout, reason = "a test may")]
 
+mod acceleration;
 mod attacks;
 mod band;
 mod beyond_bounds;
