@@ -314,7 +314,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             let unseen = square(sensor.scale_fraction * felt_m_s2);
             running.x.bias = Some(Bias::independent(square(sensor.bias_m_s2) + unseen));
         }
-        let walk = T::of(WALKS[usize::from(running.slow_n_m < T::of(DRIVES_N_M))]);
+        let [drives, coasts] = WALKS.map(T::of);
+        let walk = if running.slow_n_m < T::of(DRIVES_N_M) { coasts } else { drives };
         let grown = felt.reach_out(felt_m_s2, dt_s);
         if let Some(bias) = &mut running.x.bias {
             let unseen = acceleration.map_or(square(sensor.scale_fraction), |of| of.scale[1]);
