@@ -40,6 +40,24 @@ def test_a_shift_has_estimates_of_both_clutches(car: wc.Car, measured: wc.Table)
     assert elements <= set(car.elements)
 
 
+def test_an_acceleration_is_taken_once_it_is_stated(car: wc.Car) -> None:
+    speed = {"teeth": 58, "timer_s": 1e-6, "periods": 2, "sample_time_s": 0.01, "delay_s": 0.0, "noise_rad_s": 0.1}
+    sensors = wc.Sensors(engine=speed, turbine=speed, output=speed, wheel=speed, acceleration={"noise_m_s2": 0.05})
+    drive = wc.Drive.read(ROOT / "drives" / "city.toml").replace(repetitions=1)
+    log = wc.simulate(car, drive, sensors=sensors).measured
+    assert "longitudinal_acceleration_m_s2" in log
+    rows = steps(log, 1200)
+    acceleration = [float(log["longitudinal_acceleration_m_s2"][row]) for row in range(1, 1200)]
+    observers = [wc.Observer(car, sensors=sensors) for _ in range(2)]
+    torques: list[list[float | None]] = [[], []]
+    for step, value in zip(rows, acceleration):
+        for observer, given, torque in zip(observers, [(value, 0.0), None], torques):
+            estimate = observer.step(**step, acceleration_m_s2=given)
+            torque.append(estimate.shaft_torque_n_m)
+    assert torques[0] != torques[1]
+    assert "longitudinal_acceleration_reading" in wc.estimate(car, log, sensors=sensors).rows
+
+
 def test_a_copy_goes_on_by_itself(car: wc.Car, measured: wc.Table) -> None:
     observer = wc.Observer(car)
     rows = steps(measured, 3000)
