@@ -89,6 +89,21 @@ fn a_log_with_an_accelerometer() {
     assert!(words.iter().all(|word| word != "good"));
     let stands = changed(&folder, &log, COLUMN, |_, _| "0.0".to_owned());
     assert!(estimate(&folder, &stands, &[]).0.contains("longitudinal_acceleration is not used: most of its readings"));
+    // A channel that ends, and one wrong reading after a pause, which ends nothing.
+    let half = words.len() / 2;
+    let ends = changed(&folder, &log, COLUMN, |row, value| if row < half { value.to_string() } else { String::new() });
+    assert!(estimate(&folder, &ends, &[]).0.contains("longitudinal_acceleration has no usable reading from "));
+    let pause = changed(&folder, &log, COLUMN, |row, value| match row {
+        6000..8500 | 8501..8600 => String::new(),
+        8500 => "14.0".to_owned(),
+        _ => value.to_string(),
+    });
+    let (found, words) = estimate(&folder, &pause, &[]);
+    let refused = words[9000..].iter().filter(|word| *word == "refused").count();
+    assert!(refused < 20 && !found.contains("longitudinal"), "{refused} refused: {found}");
+    let without = changed(&folder, &log, "other", |_, value| value.to_string());
+    let (_, words) = estimate(&folder, &without, &["--columns", READING]);
+    assert!(!words.is_empty() && words.iter().all(|word| word == "unused"));
     // A log with a single shift.
     let text = std::fs::read_to_string(&log).unwrap();
     let short: String = text.lines().take(950).map(|line| format!("{line}\n")).collect();

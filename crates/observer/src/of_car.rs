@@ -287,7 +287,7 @@ pub fn gearbox_filter<'a>(
 /// \[chosen\].
 const ACCELERATION_NOISE_M_S2: f64 = 0.1;
 const ACCELERATION_DELAY_S: f64 = 0.02;
-const ACCELERATION_STATED_DELAY_S: f64 = 0.002;
+const ACCELERATION_STATED_DELAY_S: f64 = 0.01;
 /// What the model of the car leaves out, m/s^2 \[chosen\].
 const ACCELERATION_MODEL_M_S2: f64 = 0.05;
 /// Of its bias, m/s^2, and of its scale, as a fraction: with the mass of the car, of which passengers and load are a tenth \[chosen\].

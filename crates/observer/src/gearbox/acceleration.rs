@@ -27,11 +27,12 @@ use car::Reading;
 use drivetrain::Real;
 
 use super::bias::Bias;
+use super::correct::unused;
 use super::covariance::{Gaussian, Innovation};
 use super::powertrain::Rates;
 use super::{
     ChannelHealth, GATE, Gate, GearboxFilter, GearboxState, LOAD, LOST_S, Measured, N, OUTPUT, RATE, Running, SPRING,
-    ShiftInput, Verdict, WHEEL, square,
+    ShiftInput, ShiftPhase, Verdict, WHEEL, square,
 };
 
 /// Largest specific force of a car on the road, m/s^2 \[chosen\].
@@ -63,7 +64,11 @@ const SLOPES: [f64; 2] = [0.5, 2.0];
 const BESIDE: f64 = 0.02;
 const SCALE_LEFT: f64 = 0.04;
 /// Time for which a sensor may give the same reading, s \[chosen\].
-const STANDS_S: f64 = 0.5;
+const STANDS_S: f64 = 1.0;
+/// Longest time that a reading stands for in a comparison, s, and its largest distance from what the torque gives, m/s^2 \[chosen\]: a wrong one
+/// counts little.
+const COUNTS_S: f64 = 0.05;
+const DISTANCE_M_S2: f64 = 2.0;
 
 /// How the longitudinal acceleration is read, and what it shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,8 +101,8 @@ pub(super) struct Felt<T> {
     /// By the torque of the shafts: its mean over [`USUAL_S`], and the largest distance from it of late, m/s^2.
     usual_m_s2: T,
     reach_m_s2: T,
-    /// Rate of the acceleration at the step before, m/s^3.
-    rate: T,
+    /// Rate of the acceleration at the reading before, m/s^3, and the time since it, s.
+    rate: (T, T),
 }
 
 /// The changes of the readings beside those by the torque at the gearbox input, in gear and with power.
@@ -108,11 +113,14 @@ pub(super) struct ByTorque<T> {
     silent_s: T,
     /// The newest reading, m/s^2, and for how long it has been the same, s.
     same: (T, T),
-    /// Means over [`COMPARED_USUAL_S`] of the readings and by the torque, m/s^2.
+    /// Means over [`COMPARED_USUAL_S`] of the readings and by the torque, m/s^2, and the time since the last ones were compared, s.
     usual_m_s2: Option<[T; 2]>,
+    paused_s: T,
     /// Integrals of the product of both changes and of the square of those by the torque, m^2/s^3.
     product: T,
     square: T,
+    /// Whether the readings have followed the torque.
+    has_followed: bool,
 }
 
 /// A reading that can be taken, with the scale of the sensor.
@@ -154,13 +162,14 @@ impl<T: Real> Felt<T> {
             late: [zero, square(sensor.delay_std_dev_s)],
             usual_m_s2: zero,
             reach_m_s2: zero,
-            rate: zero,
+            rate: (zero, zero),
         }
     }
 
     /// Begins at this acceleration and rate; what is known of the sensor stays.
     fn begin(&mut self, felt_m_s2: T, rate: T) {
-        (self.gate, self.usual_m_s2, self.reach_m_s2, self.rate) = (Gate::new(GATE), felt_m_s2, T::zero(), rate);
+        (self.gate, self.usual_m_s2, self.reach_m_s2) = (Gate::new(GATE), felt_m_s2, T::zero());
+        self.rate = (rate, T::zero());
     }
 
     /// Follows the acceleration; by how much the square of its largest distance from its mean has grown, m^2/s^4.
@@ -173,15 +182,19 @@ impl<T: Real> Felt<T> {
         grown
     }
 
-    /// Learns noise and delay from an innovation, at this rate of the readings, m/s^3.
-    fn learn(&mut self, (innovation, rate): (&Innovation<T>, T), sensor: &AccelerationReading<T>, learning_s: T) {
+    /// Learns the noise from an innovation after this time, s.
+    fn learn_noise(&mut self, innovation: &Innovation<T>, sensor: &AccelerationReading<T>, learning_s: T) {
         let gate = T::of(f64::from(GATE));
         let squared = square(innovation.value).at_most(square(gate) * innovation.variance);
         let (noise, time_s) = &mut self.noise;
         *time_s = (*time_s + learning_s).at_most(T::of(NOISE_S));
         let stated = square(sensor.std_dev_m_s2);
-        let found = *noise + learning_s / *time_s * (squared - innovation.variance);
+        let found = *noise + (learning_s / *time_s).at_most(T::one()) * (squared - innovation.variance);
         *noise = found.at_least(stated).at_most(T::of(NOISE_MAX * NOISE_MAX) * stated);
+    }
+
+    /// Learns the delay from an innovation, at this rate of the readings, m/s^3.
+    fn learn_delay(&mut self, innovation: &Innovation<T>, rate: T, sensor: &AccelerationReading<T>) {
         let [late_s, variance] = &mut self.late;
         // A reading that is later by `d` is lower by the rate times `d`.
         let gain = -*variance * rate / innovation.variance;
@@ -195,19 +208,42 @@ impl<T: Real> Felt<T> {
 impl<T: Real> ByTorque<T> {
     fn nothing() -> Self {
         let zero = T::zero();
-        Self { silent_s: zero, same: (zero, zero), usual_m_s2: None, product: zero, square: zero }
+        Self {
+            silent_s: zero,
+            same: (zero, zero),
+            usual_m_s2: None,
+            paused_s: zero,
+            product: zero,
+            square: zero,
+            has_followed: false,
+        }
     }
 
-    /// Takes a reading and the acceleration by the torque, m/s^2, where they can be compared.
+    /// Takes a reading and the acceleration by the torque, m/s^2, where they can be compared; and the time since the reading before, s.
     fn take(&mut self, both: Option<[T; 2]>, dt_s: T) {
-        let Some(both) = both else { return };
-        let usual = self.usual_m_s2.get_or_insert(both);
-        let [reading, torque] = [both[0] - usual[0], both[1] - usual[1]];
-        let left = T::one() - (dt_s / T::of(COMPARED_S)).at_most(T::one());
-        self.product = left * self.product + dt_s * reading * torque;
-        self.square = left * self.square + dt_s * torque * torque;
+        self.paused_s = self.paused_s + dt_s;
+        let Some([reading, torque]) = both else { return };
+        if self.paused_s > T::of(COMPARED_S) {
+            // Resistances and the bias may be others.
+            self.usual_m_s2 = None;
+        }
+        self.paused_s = T::zero();
+        let dt_s = dt_s.at_most(T::of(COUNTS_S));
+        let usual = self.usual_m_s2.get_or_insert([reading, torque]);
+        let by_torque = torque - usual[1];
+        let distance = T::of(DISTANCE_M_S2);
+        let by_reading = (reading - usual[0]).at_least(by_torque - distance).at_most(by_torque + distance);
+        let left = T::one() - dt_s / T::of(COMPARED_S);
+        self.product = left * self.product + dt_s * by_reading * by_torque;
+        self.square = left * self.square + dt_s * by_torque * by_torque;
         let fraction = dt_s / (dt_s + T::of(COMPARED_USUAL_S));
-        (usual[0], usual[1]) = (usual[0] + fraction * reading, usual[1] + fraction * torque);
+        (usual[0], usual[1]) = (usual[0] + fraction * by_reading, usual[1] + fraction * by_torque);
+        self.has_followed |= self.square >= T::of(ENOUGH) && self.follows();
+    }
+
+    fn follows(&self) -> bool {
+        let [lowest, highest] = SLOPES.map(|slope| T::of(slope) * self.square);
+        self.product >= lowest && self.product <= highest
     }
 
     /// Goes on after a time that is not known.
@@ -217,6 +253,7 @@ impl<T: Real> ByTorque<T> {
 
     /// Whether a reading is new, or the sensor stands.
     fn is_new(&mut self, value: T, dt_s: T) -> bool {
+        let dt_s = dt_s.at_most(T::of(COUNTS_S));
         let same_s = if self.same.0 == value { self.same.1 + dt_s } else { T::zero() };
         self.same = (value, same_s);
         same_s <= T::of(STANDS_S)
@@ -225,9 +262,8 @@ impl<T: Real> ByTorque<T> {
     /// Scale of the readings and the part of its variance that is left, which is this one unseen; none where they do not follow the
     /// torque.
     pub(super) fn scale(&self, sensor: &AccelerationReading<T>) -> Option<[T; 2]> {
-        let [lowest, highest] = SLOPES.map(|slope| T::of(slope) * self.square);
-        let follows = self.product >= lowest && self.product <= highest;
-        if self.square < T::of(ENOUGH) && !sensor.is_stated || self.square >= T::of(ENOUGH) && !follows {
+        let is_used = if self.square < T::of(ENOUGH) { sensor.is_stated || self.has_followed } else { self.follows() };
+        if !is_used {
             return None;
         }
         let unseen = square(sensor.scale_fraction);
@@ -321,12 +357,15 @@ impl<T: Real> GearboxFilter<'_, T> {
             let unseen = acceleration.map_or(square(sensor.scale_fraction), |of| of.scale[1]);
             bias.walk(square(walk) * dt_s + unseen * grown);
         }
-        let Some(acceleration) = acceleration.filter(|_| running.phase.phase != super::ShiftPhase::BothSlip) else {
-            return health;
+        felt.rate.1 = felt.rate.1 + dt_s;
+        // While both clutches slip the speeds show the torques.
+        let both_slip = running.phase.phase == ShiftPhase::BothSlip;
+        let Some(acceleration) = acceleration.filter(|_| !both_slip) else {
+            return if both_slip { unused(health) } else { health };
         };
         // In a shift and while the driver may brake, an innovation has other causes.
-        let learning_s = if in_gear && running.slow_n_m > T::of(DRIVES_N_M) { dt_s } else { T::zero() };
-        self.correct_by_acceleration((&mut running.x, felt), acceleration, (&now, &rate), [dt_s, learning_s])
+        let is_learnt = in_gear && running.slow_n_m > T::of(DRIVES_N_M);
+        self.correct_by_acceleration((&mut running.x, felt), acceleration, (&now, &rate), is_learnt)
     }
 
     /// The acceleration but for its bias, and its rate with what is left of that beside the states.
@@ -354,13 +393,13 @@ impl<T: Real> GearboxFilter<'_, T> {
         (now, (rate, damped * (per_output * rates.rest[OUTPUT] - rates.rest[WHEEL])))
     }
 
-    /// Corrects by a reading of a step of this length, s, and finds noise and delay of the sensor; the noise by so much of the step.
+    /// Corrects by a reading, and finds noise and delay of the sensor.
     fn correct_by_acceleration(
         &self,
         (x, felt): (&mut Gaussian<T>, &mut Felt<T>),
         Acceleration { reading, scale: [scale, _] }: &Acceleration<T>,
         (now, (by_states, rest)): (&[T; N], &([T; N], T)),
-        [dt_s, learning_s]: [T; 2],
+        is_learnt: bool,
     ) -> ChannelHealth {
         let sensor = &self.acceleration;
         let [late_s, late_variance] = felt.late;
@@ -370,10 +409,10 @@ impl<T: Real> GearboxFilter<'_, T> {
         for (row, rate) in row.iter_mut().zip(by_states) {
             *row = *scale * (*row - age_s * *rate);
         }
-        // The change of the rate over the step goes on over the age.
-        let changed = rate - core::mem::replace(&mut felt.rate, rate);
-        let steps = if dt_s > T::zero() { (age_s / dt_s).at_least(T::one()) } else { T::one() };
-        let bent = T::of(0.5) * age_s * steps * changed;
+        // The rate changes over the age as since the reading before.
+        let (before, since_s) = core::mem::replace(&mut felt.rate, (rate, T::zero()));
+        let spans = if since_s > T::zero() { (age_s / since_s).at_least(T::one()) } else { T::one() };
+        let bent = T::of(0.5) * age_s * spans * (rate - before);
         let noise = felt.noise.0 + square(*scale) * (late_variance * square(rate) + square(bent));
         let bias = x.bias.as_ref().map_or(T::zero(), Bias::mean);
         let expected = *scale * (x.value(now) - age_s * rate) + bias;
@@ -383,12 +422,16 @@ impl<T: Real> GearboxFilter<'_, T> {
         if verdict == Verdict::Refused {
             return ChannelHealth::Refused;
         }
-        if learning_s > T::zero() {
-            felt.learn((&innovation, *scale * rate), sensor, learning_s);
+        if is_learnt {
+            felt.learn_noise(&innovation, sensor, since_s.at_most(T::of(LOST_S)));
         }
-        if let (Verdict::Jumped, Some(bias)) = (verdict, &mut x.bias) {
-            bias.walk(square(innovation.value));
-            innovation = x.innovation_with_bias(&measured);
+        match (verdict, &mut x.bias) {
+            (Verdict::Jumped, Some(bias)) => {
+                bias.walk(square(innovation.value));
+                innovation = x.innovation_with_bias(&measured);
+            }
+            _ if is_learnt => felt.learn_delay(&innovation, *scale * rate, sensor),
+            _ => {}
         }
         x.correct(&innovation);
         ChannelHealth::Good

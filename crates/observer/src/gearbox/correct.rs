@@ -111,6 +111,6 @@ impl<T: Real> GearboxFilter<'_, T> {
 }
 
 /// What becomes of a reading that is not taken although it could be.
-fn unused(health: ChannelHealth) -> ChannelHealth {
+pub(super) fn unused(health: ChannelHealth) -> ChannelHealth {
     if health == ChannelHealth::Good { ChannelHealth::Absent } else { health }
 }

@@ -209,13 +209,13 @@ fn without_a_statement_a_short_log_is_as_without_a_sensor() {
 #[test]
 fn an_accelerometer_in_town() {
     drives(("town", town), (&[false], 3), |columns| {
-        for (rows, (Accelerometer { name, .. }, maximum)) in columns.iter().zip(ALL) {
-            for (phase, maximum) in maximum.into_iter().enumerate() {
+        for (rows, (Accelerometer { name, .. }, at_most)) in columns.iter().zip(ALL) {
+            for (phase, maximum) in at_most.into_iter().enumerate() {
                 let [found, none] = [rows, &columns[0]].map(|rows| ratio(rows, None, phase));
                 assert!(found <= maximum * none + 1e-12, "{name}, {} phase: {found} {none}", PHASES[phase]);
             }
             let [coast, none] = [rows, &columns[0]].map(|rows| ratio(rows, Some(ShiftKind::CoastDown), 0));
-            assert!(coast <= 1.1 * none, "{name}: {coast} {none}");
+            assert!(coast <= at_most[0].max(1.1) * none, "{name}: {coast} {none}");
         }
     });
 }
@@ -280,7 +280,7 @@ fn delay_and_scale_of_the_sensor_are_learnt() {
     assert_eq!(of("other sign")[1], None);
 }
 
-/// A sensor that stands is refused after half a second, whatever it reads, and one that gives no number or the weight of the car in each row.
+/// A sensor that stands is refused after a second, whatever it reads, and one that gives no number or the weight of the car in each row.
 #[test]
 fn a_dead_sensor_is_refused() {
     let known = &cars()[0];
@@ -296,7 +296,7 @@ fn a_dead_sensor_is_refused() {
             let estimate = filter.step(&mut state, &given);
             let other = filter.step(&mut without, input);
             let health = estimate.channels.acceleration;
-            assert!(health == ChannelHealth::Refused || at <= 60, "{value} in row {at}: {health:?}");
+            assert!(health == ChannelHealth::Refused || at <= 110, "{value} in row {at}: {health:?}");
             assert_eq!(other.channels.acceleration, ChannelHealth::Unused);
             if at > 1000 {
                 let both = [&estimate, &other].map(|estimate| estimate.clutches.map(|of| of.map(|of| of.torque_n_m)));

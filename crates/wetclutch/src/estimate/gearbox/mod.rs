@@ -16,6 +16,7 @@ use evaluate::logged::LoggedDrive;
 use observer::ShiftTables;
 use report::drive_page::{DrivePage, MAX_DRAWN, findings, shift_words};
 use study::gearbox::gear_numbers::GearNumbers;
+use trace::signal::ACCELERATION_READING;
 use trace::{Cell, ShownPath as _};
 
 use self::checks::{RowTimes, refused};
@@ -137,7 +138,9 @@ pub fn estimate(
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
     let numbers = GearNumbers::of(car);
     let names = (&options.columns[..], destination.is_live());
-    let columns = chosen(columns(&places, Knows::of(car, source.has_acceleration())), measured(car, tables), names)?;
+    let is_named = options.columns.iter().any(|name| name.trim() == ACCELERATION_READING);
+    let knows = Knows::of(car, is_named || source.has_acceleration());
+    let columns = chosen(columns(&places, knows), measured(car, tables), names)?;
     let (before_readings, mut said, mut named_before) = (before_readings(&columns), None, None);
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(destination, named)?;
