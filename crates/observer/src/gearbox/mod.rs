@@ -22,6 +22,8 @@
 //! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; the
 //! time is estimated by ten piston models for each element, each with its probability.
 //!
+//! A longitudinal acceleration, where one is read, has its bias beside these states (`acceleration.rs`, `bias.rs`).
+//!
 //! Torque is estimated, and pressure follows: it is the valve model's, with the gain of the valve that `f` and `k` speak for.
 //!
 //! `s`, `c`, `f`, `k` and `m` last longer than a shift. What a shift or the time in a gear has shown of them is kept in [`Learnt`], which can be saved
