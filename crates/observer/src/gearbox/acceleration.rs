@@ -39,8 +39,9 @@ use super::{
 const LARGEST_M_S2: f64 = 15.0;
 /// Turbine torque from which on the driver does not brake, N m \[chosen\].
 const DRIVES_N_M: f64 = 10.0;
-/// Random walk of the bias, m/s^2 per root second, while the engine drives the car and while it coasts \[chosen\].
-const WALKS: [f64; 2] = [0.05, 1.0];
+/// Random walk of the bias, m/s^2 per root second, while the engine drives the car, whose body pitches, and while it coasts, and the driver may
+/// brake \[chosen\].
+const WALKS: [f64; 2] = [0.1, 1.0];
 /// Time over which the acceleration is averaged; its changes are distances from this mean, s \[chosen\].
 const USUAL_S: f64 = 1.0;
 /// Time over which the noise is found, s, what counts of it at the start, and the largest noise, in standard deviations of the stated one
