@@ -4,11 +4,13 @@ use observer::ChannelHealth;
 
 use super::check::{Check, CheckedRow};
 
-/// Readings from which on it is said, and time without a usable one, s \[chosen\].
+/// Readings from which on it is said, time without a usable one, s, and speed of the output from which on the car moves, rad/s \[chosen\]:
+/// while it stands, a coarse sensor may give the same reading.
 const ENOUGH: u64 = 50;
 const LASTS_S: f64 = 5.0;
+const MOVES_RAD_S: f64 = 5.0;
 
-/// What became of the readings so far.
+/// What became of the readings so far, while the car moved.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct UnusedAcceleration {
     came: u64,
@@ -22,6 +24,10 @@ pub(super) struct UnusedAcceleration {
 impl Check for UnusedAcceleration {
     fn row(&mut self, row: &CheckedRow<'_>) {
         let health = row.estimate.channels.acceleration;
+        let [_, _, output] = row.used_rad_s;
+        if output.is_nan() || output.abs() < MOVES_RAD_S {
+            return;
+        }
         match health {
             ChannelHealth::Good => {
                 self.used += 1;
