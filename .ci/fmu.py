@@ -14,7 +14,7 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
-CHANNELS = ["engine_rad_s", "turbine_rad_s", "output_rad_s", "wheel_rad_s", "engine_n_m", "oil_degc"]
+CHANNELS = ["engine_rad_s", "turbine_rad_s", "output_rad_s", "wheel_rad_s", "engine_n_m", "acceleration_m_s2", "oil_degc"]
 COMPARED = [
     "offgoing_pressure_pa",
     "offgoing_torque_n_m",
