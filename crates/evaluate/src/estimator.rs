@@ -174,28 +174,7 @@ impl Estimator {
 
 /// The filter without its gearbox.
 fn without_tables(filter: &GearboxFilter<'_, f64>) -> GearboxFilter<'static, f64> {
-    let GearboxFilter {
-        tables: _,
-        driveline,
-        wheels_kg_m2,
-        turbine,
-        uncertainty,
-        readings,
-        engine,
-        acceleration,
-        limits,
-    } = *filter;
-    GearboxFilter {
-        tables: NO_TABLES,
-        driveline,
-        wheels_kg_m2,
-        turbine,
-        uncertainty,
-        readings,
-        engine,
-        acceleration,
-        limits,
-    }
+    filter.cast(NO_TABLES)
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub(crate) fn warnings(late_s: [f64; 3], longest_s: [f64; 3]) -> impl Iterator<I
     })
 }
 
-/// Standard deviation of the delay of the acceleration from which on it is not known, s \[chosen\].
+/// Standard deviation above which the delay of the acceleration is not known, s \[chosen\].
 const UNKNOWN_S: f64 = 0.005;
 
 /// The same of the longitudinal acceleration, with its standard deviation. It is a lower limit: the estimate follows late readings.

@@ -4,7 +4,7 @@ use observer::ChannelHealth;
 
 use super::check::{Check, CheckedRow};
 
-/// Readings from which on it is said, time without a usable one, s, and speed of the output from which on the car moves, rad/s \[chosen\]:
+/// Readings that a warning needs, time without a usable one, s, and speed of the output from which on the car moves, rad/s \[chosen\]:
 /// while it stands, a coarse sensor may give the same reading.
 const ENOUGH: u64 = 50;
 const LASTS_S: f64 = 5.0;

@@ -8,8 +8,8 @@
 //! a = R_w/J q + I_w/(J m R_w) T_L + bias                                J = m R_w^2 + I_w
 //! ```
 //!
-//! The bias is that of the sensor, the resistances and the brakes. It stands beside the states of the filter, so that a car without this sensor
-//! pays nothing for it. While the car coasts the driver may brake, and the readings show little.
+//! The bias is that of the sensor, the resistances and the brakes. It is apart from the states of the filter, of which a car without this sensor
+//! has no more. While the car coasts the driver may brake, and the readings show little.
 //!
 //! What is learnt of the sensor in a drive:
 //!
@@ -21,7 +21,7 @@
 //!
 //! An error of the scale shows as one of the bias when the acceleration changes: the variance of the bias grows by the square of the change. A
 //! sensor that is not stated is used once its readings have followed the torque; one that does not follow it, as with the other sign, or that
-//! stands, is not used.
+//! gives the same value all the time, is not used.
 
 use car::Reading;
 use drivetrain::Real;
@@ -60,7 +60,7 @@ const COMPARED_USUAL_S: f64 = 5.0;
 /// these changes between which they are those of this car \[chosen\].
 const ENOUGH: f64 = 0.25;
 const SLOPES: [f64; 2] = [0.5, 2.0];
-/// Density of what the changes of the readings have beside, m^2/s^3: 0.2 m/s^2 that last half a second; and the standard deviation of the scale that
+/// Density of the changes of the readings that the torque does not explain, m^2/s^3: 0.2 m/s^2 that last half a second; and the standard deviation of the scale that
 /// is left however much has been seen, as a fraction \[chosen\].
 const BESIDE: f64 = 0.02;
 const SCALE_LEFT: f64 = 0.04;
@@ -80,7 +80,7 @@ pub struct AccelerationReading<T> {
     pub bias_m_s2: T,
     /// Of the scale, as a fraction: of the sensor, the mass of the car and the pitch of its body.
     pub scale_fraction: T,
-    /// Time by which all readings are late beside their age, s.
+    /// Time by which all readings are later than their age, s.
     pub delay_s: T,
     /// Its standard deviation, s.
     pub delay_std_dev_s: T,
@@ -106,7 +106,7 @@ pub(super) struct Felt<T> {
     rate: (T, T),
 }
 
-/// The changes of the readings beside those by the torque at the gearbox input, in gear and with power.
+/// The changes of the readings against those by the torque at the gearbox input, in gear and with power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ByTorque<T> {
@@ -252,7 +252,7 @@ impl<T: Real> ByTorque<T> {
         self.usual_m_s2 = None;
     }
 
-    /// Whether a reading is new, or the sensor stands.
+    /// Whether the sensor still gives new values.
     fn is_new(&mut self, value: T, dt_s: T) -> bool {
         let dt_s = dt_s.at_most(T::of(COUNTS_S));
         let same_s = if self.same.0 == value { self.same.1 + dt_s } else { T::zero() };
@@ -262,7 +262,7 @@ impl<T: Real> ByTorque<T> {
 
     /// Scale of the readings and the part of its variance that is left, which is this one unseen; none where they do not follow the
     /// torque.
-    pub(super) fn scale(&self, sensor: &AccelerationReading<T>) -> Option<[T; 2]> {
+    fn scale(&self, sensor: &AccelerationReading<T>) -> Option<[T; 2]> {
         let is_used = if self.square < T::of(ENOUGH) { sensor.is_stated || self.has_followed } else { self.follows() };
         if !is_used {
             return None;
@@ -369,7 +369,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         self.correct_by_acceleration((&mut running.x, felt), acceleration, (&now, &rate), is_learnt)
     }
 
-    /// The acceleration but for its bias, and its rate with what is left of that beside the states.
+    /// The acceleration but for its bias, and its rate with the part of it that depends on no state.
     fn specific_force(&self, rates: &Rates<T>) -> ([T; N], ([T; N], T)) {
         let [per_torque, per_load] = self.acceleration.per_torque;
         let line = &self.driveline;
@@ -436,5 +436,60 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         x.correct(&innovation);
         ChannelHealth::Good
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensor(is_stated: bool) -> AccelerationReading<f64> {
+        AccelerationReading {
+            std_dev_m_s2: 0.1,
+            bias_m_s2: 0.5,
+            scale_fraction: 0.1,
+            delay_s: 0.0,
+            delay_std_dev_s: 0.02,
+            is_stated,
+            per_torque: [6e-4, 1e-5],
+        }
+    }
+
+    /// A minute in which the acceleration by the torque swings by 1 m/s^2, read so at each time, s.
+    fn compared(read: impl Fn(f64, f64) -> f64) -> ByTorque<f64> {
+        let mut by_torque = ByTorque::nothing();
+        for step in 0..6000 {
+            let time_s = 0.01 * f64::from(step);
+            let torque = 1.5 + time_s.sin();
+            by_torque.take(Some([read(time_s, torque), torque]), 0.01);
+        }
+        by_torque
+    }
+
+    #[test]
+    fn the_scale_is_the_slope_of_the_readings_over_the_torque() {
+        for scale in [0.8, 1.0, 1.2] {
+            let [found, variance] = compared(|_, torque| scale * torque + 0.3).scale(&sensor(false)).unwrap();
+            assert!((found - scale).abs() < 0.02 && variance <= SCALE_LEFT * SCALE_LEFT, "{scale}: {found} {variance}");
+        }
+        for wrong in [-1.0, 0.0, 0.1, 3.0] {
+            assert_eq!(compared(|_, torque| wrong * torque).scale(&sensor(true)), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn one_wrong_reading_after_a_pause_counts_little() {
+        let mut by_torque = compared(|_, torque| torque);
+        by_torque.take(Some([14.0, 2.0]), 25.0);
+        assert!(by_torque.scale(&sensor(false)).is_some_and(|[scale, _]| (scale - 1.0).abs() < 0.05));
+    }
+
+    #[test]
+    fn a_sensor_is_used_once_it_is_stated_or_has_followed_and_goes_on_in_steady_driving() {
+        let nothing = ByTorque::nothing();
+        assert!(nothing.scale(&sensor(false)).is_none() && nothing.scale(&sensor(true)).is_some());
+        let mut by_torque = compared(|_, torque| torque);
+        (0..100_000).for_each(|_| by_torque.take(Some([1.5, 1.5]), 0.01));
+        assert!(by_torque.square < ENOUGH && by_torque.scale(&sensor(false)).is_some());
     }
 }

@@ -1,4 +1,4 @@
-//! The bias of a sensor beside the states: one state more, that moves by nothing but a random walk.
+//! The bias of a sensor: one more state, that moves by a random walk alone.
 
 use drivetrain::Real;
 
@@ -108,18 +108,18 @@ mod tests {
     use super::super::{FRACTION, SLOW_FRACTION, SPRING};
     use super::*;
 
-    /// A bias beside the states is what a state would be: here the last one, which nothing else moves.
+    /// A bias is what a state would be: here the last one, which nothing else moves.
     #[test]
     fn a_bias_is_one_state_more() {
         const LAST: usize = N - 1;
         let number = |seed: usize| (seed as f64 * 12.9898).sin();
         let mut whole = Gaussian::of([0.0; N], core::array::from_fn(|k| 1.0 + 0.1 * k as f64));
-        let mut beside = whole;
-        beside.bias = Some(Bias::independent(whole.covariance[LAST][LAST]));
+        let mut apart = whole;
+        apart.bias = Some(Bias::independent(whole.covariance[LAST][LAST]));
         let row = |seed: usize| core::array::from_fn(|k| if k < LAST { number(seed + k) } else { 0.0 });
         let rows = [row(100), row(200), row(300), row(400)];
         for step in 0..5 {
-            for x in [&mut whole, &mut beside] {
+            for x in [&mut whole, &mut apart] {
                 x.pass(&rows, &[0.1; CORE]);
                 x.fade(FRACTION, 0.9);
                 x.tie(1.7, [0.3, 0.7]);
@@ -128,34 +128,34 @@ mod tests {
             let mut with_last = Measured { row: row(50 * step), innovation, noise: 0.2 };
             let of_states = Measured { ..with_last };
             with_last.row[LAST] = 1.0;
-            let (one, other) = (whole.innovation(&with_last), beside.innovation_with_bias(&of_states));
+            let (one, other) = (whole.innovation(&with_last), apart.innovation_with_bias(&of_states));
             assert!((one.variance - other.variance).abs() < 1e-12);
             whole.correct(&one);
-            beside.correct(&other);
+            apart.correct(&other);
             let plain = Measured { row: row(70 * step), innovation: 0.1, noise: 0.5 };
-            for x in [&mut whole, &mut beside] {
+            for x in [&mut whole, &mut apart] {
                 let innovation = x.innovation(&plain);
                 x.correct(&innovation);
                 x.swap(FRACTION, SLOW_FRACTION);
             }
             whole.replace(SPRING, 0.2, 0.7);
-            beside.replace(SPRING, 0.2, 0.7);
+            apart.replace(SPRING, 0.2, 0.7);
             whole.add(LAST, LAST, 0.05);
-            beside.bias.as_mut().unwrap().walk(0.05);
+            apart.bias.as_mut().unwrap().walk(0.05);
         }
-        let bias = beside.bias.unwrap();
+        let bias = apart.bias.unwrap();
         assert!((bias.mean - whole.mean[LAST]).abs() < 1e-12 && bias.mean.abs() > 1e-3);
         assert!((bias.variance - whole.covariance[LAST][LAST]).abs() < 1e-12);
         for k in 0..LAST {
-            assert!((beside.mean[k] - whole.mean[k]).abs() < 1e-12, "{k}");
+            assert!((apart.mean[k] - whole.mean[k]).abs() < 1e-12, "{k}");
             assert!((bias.with[k] - whole.covariance[k][LAST]).abs() < 1e-12, "{k}");
             for other in 0..LAST {
-                assert!((beside.covariance[k][other] - whole.covariance[k][other]).abs() < 1e-12);
+                assert!((apart.covariance[k][other] - whole.covariance[k][other]).abs() < 1e-12);
             }
         }
-        beside.renew(SPRING, 0.0, 1.0);
-        assert_eq!(beside.bias.unwrap().with[SPRING], 0.0);
-        beside.bias = Some(Bias { mean: f64::NAN, ..bias });
-        assert!(!beside.is_sound());
+        apart.renew(SPRING, 0.0, 1.0);
+        assert_eq!(apart.bias.unwrap().with[SPRING], 0.0);
+        apart.bias = Some(Bias { mean: f64::NAN, ..bias });
+        assert!(!apart.is_sound());
     }
 }

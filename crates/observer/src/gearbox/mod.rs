@@ -22,7 +22,7 @@
 //! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; the
 //! time is estimated by ten piston models for each element, each with its probability.
 //!
-//! A longitudinal acceleration, where one is read, has its bias beside these states (`acceleration.rs`, `bias.rs`).
+//! A longitudinal acceleration, where one is read, has a bias apart from these states (`acceleration.rs`, `bias.rs`).
 //!
 //! Torque is estimated, and pressure follows: it is the valve model's, with the gain of the valve that `f` and `k` speak for.
 //!
@@ -552,12 +552,6 @@ impl<T: Real> GearboxState<T> {
         let felt = self.running.as_ref().and_then(|running| running.felt).or(self.felt)?;
         let [late_s, variance] = felt.late;
         Some([late_s, variance.sqrt()])
-    }
-
-    /// Scale of these readings, with the mass of the car, over that by the vehicle file, with its standard deviation; `None` if it is not known.
-    pub fn acceleration_scale(&self, filter: &GearboxFilter<'_, T>) -> Option<[T; 2]> {
-        let [scale, variance] = self.by_torque.as_ref()?.scale(&filter.acceleration)?;
-        Some([scale, variance.sqrt()])
     }
 
     /// Whether it can be the memory of the filter of a gearbox with these tables.
