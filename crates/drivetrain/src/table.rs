@@ -110,8 +110,9 @@ impl<T: Real, const N: usize> Axis<T, N> {
             bins_per_unit: T::of(BINS as f64) / span,
         };
         for (bin, segment) in axis.first_segment.iter_mut().enumerate() {
-            // A value that is rounded into this bin may be that much below its edge.
-            let edge = first + span * T::of(bin as f64 / BINS as f64 - BIN_ROUNDING);
+            // A value that is rounded into this bin may be that much below its edge. In the precision of the table: a controller has no other.
+            let fraction = T::of(bin as f64) / T::of(BINS as f64) - T::of(BIN_ROUNDING);
+            let edge = first + span * fraction;
             let below = points[1..len - 1].iter().filter(|&&point| point <= edge).count();
             *segment = u8::try_from(below).unwrap_or(0);
         }

@@ -130,9 +130,9 @@ fn directions<T: Real>(mut of: Matrix<T>) -> ([T; ACTING], Matrix<T>) {
                     continue;
                 }
                 let half = (of[q][q] - of[p][p]) / (of[p][q] + of[p][q]);
-                let size = (half.abs() + half.hypot(T::one())).recip();
+                let size = (half.abs() + (half * half + T::one()).sqrt()).recip();
                 let tangent = if half < T::zero() { -size } else { size };
-                let cosine = tangent.hypot(T::one()).recip();
+                let cosine = (tangent * tangent + T::one()).sqrt().recip();
                 let sine = tangent * cosine;
                 let turn = |p: T, q: T| (cosine * p - sine * q, sine * p + cosine * q);
                 for row in &mut of {
