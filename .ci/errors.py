@@ -15,8 +15,8 @@ TOKEN = re.compile(r"""//[^\n]*|'(?:\\.|[^'\\])'|r#"(?P<raw>.*?)"#|"(?P<text>(?:
 MAKES = re.compile(r"#\[error\(|\bErr\(|\w*[eE]rror(::\w+)?[({]|Failure::|\bmeaning\(|\bmessage(:| =) |\bwrong\(|\bdamaged\(")
 # What makes a hint of it.
 HINTS = re.compile(r"\bhint(: &str)?( =|:)\s*(Some\(\s*)?(&?format!\(\s*)?$|\bSome\(\s*(&?format!\(\s*)?$")
-# Crates without messages: pages, broken files for tests, a library behind a solver.
-OTHER = {"report", "fuzz", "lapack"}
+# Crates without messages of the program: pages, broken files for tests, a library behind a solver, a tool that makes wetclutch.c.
+OTHER = {"c99", "report", "fuzz", "lapack"}
 # Crates in which the text of a bare `Err` is not an error, but the reason why a shift or a drive is left out.
 REASONS = {"fit"}
 # Messages of what no test can bring about, and why.

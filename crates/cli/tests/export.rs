@@ -34,6 +34,30 @@ fn export_writes_all_files_of_a_car_and_lists_them() {
     assert!(certificate.contains("Shifts: 1-2.") && certificate.contains("0x1"), "{certificate}");
 }
 
+/// The file is written beside the others, the header has memory for it, and it is not replaced where it is read from.
+#[test]
+fn export_puts_the_c_of_the_observer_beside_the_other_files() {
+    let folder = Folder::new("export-c");
+    let out = folder.path("out");
+    let memory = |arguments: &[&str]| {
+        printed(&wetclutch(&[&["export", &car(), "--shift", "1-2", "-o", &out], arguments].concat()));
+        let header = std::fs::read_to_string(Path::new(&out).join("wetclutch_eight_speed.h")).unwrap();
+        let line = header.lines().find_map(|line| line.strip_prefix("#define WETCLUTCH_EIGHT_SPEED_MEMORY_BYTES "));
+        line.unwrap().trim_end_matches('u').parse::<u32>().unwrap()
+    };
+    let of_library = memory(&[]);
+    let image = std::fs::read(Path::new(&out).join("wetclutch_eight_speed_parameters.bin")).unwrap();
+    let source =
+        format!("/* The observer of wetclutch. */\n#define IMAGE_VERSION {}u\n#define HEAP 500000u\n", image[4]);
+    let source = folder.write("wetclutch.c", source);
+    assert!(!Path::new(&out).join("wetclutch.c").exists());
+    let of_c = memory(&["--c", &source]);
+    assert!(of_c > of_library + 500_000 && of_c.is_multiple_of(8), "{of_library} {of_c}");
+    assert_eq!(std::fs::read(Path::new(&out).join("wetclutch.c")).unwrap(), std::fs::read(&source).unwrap());
+    let said = refused(&wetclutch(&["export", &car(), "--c", &source, "-o", &folder.path("")]));
+    assert!(said.contains("the output would replace this input"), "{said}");
+}
+
 #[test]
 fn export_names_what_is_wrong_and_writes_nothing() {
     let folder = Folder::new("export-wrong");

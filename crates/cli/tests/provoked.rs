@@ -106,6 +106,14 @@ fn options_for_other_files_are_named() {
     let program = env!("CARGO_BIN_EXE_wetclutch");
     provokes(&["export", &car, "--check-elf", program, "-o", &out], "is not in the program");
     provokes(&["fit", "-", "--vehicle", VEHICLE, "-o", &folder.path("f.toml")], "a fit reads a log twice");
+    provokes(
+        &["export", &car, "--c", &city, "-o", &out],
+        "not the C of the observer: it defines neither HEAP nor IMAGE_VERSION",
+    );
+    provokes(&["export", &car, "--c", program, "-o", &out], "not the C of the observer: it is not text");
+    let old = folder.write("wetclutch.c", "#define IMAGE_VERSION 1u\n#define HEAP 80u\n");
+    provokes(&["export", &car, "--c", &old, "-o", &out], "not the C of the observer: it takes images of version 1");
+    provokes(&["export", &car, "--c", &folder.path(""), "-o", &out], "no wetclutch.c: it is a regular file");
     let library = ["export", &car, "--shift", "1-2", "--fmu", program, "-o", &out];
     provokes(&library, "not a shared library of a model: it lacks the functions of FMI 2.0 and 3.0");
     provokes(&["design", &car, "--observer", "sliding"], "`--observer sliding` has no certificate");

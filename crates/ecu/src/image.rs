@@ -63,23 +63,33 @@ impl Header {
     pub fn of(image: &[u32]) -> Result<(Self, Words<'_>), u32> {
         let mut words = Words::new(image);
         let header = Self::take(&mut words).ok_or(status::IMAGE_SIZE)?;
-        if header.magic != MAGIC {
+        header.check(size_of_val(image), |of| of == checksum(image))?;
+        Ok((header, words))
+    }
+
+    /// Checks the header of an image of so many bytes, whose checksum the caller knows.
+    ///
+    /// # Errors
+    /// A bit of the [`status`].
+    #[inline]
+    pub fn check(&self, image_bytes: usize, is_checksum: impl FnOnce(u32) -> bool) -> Result<(), u32> {
+        if self.magic != MAGIC {
             return Err(status::IMAGE_MAGIC);
         }
-        if header.format_version != FORMAT_VERSION {
+        if self.format_version != FORMAT_VERSION {
             return Err(status::IMAGE_VERSION);
         }
-        if header.size_bytes as usize != size_of_val(image) {
+        if self.size_bytes as usize != image_bytes {
             return Err(status::IMAGE_SIZE);
         }
-        if header.checksum != checksum(image) {
+        if !is_checksum(self.checksum) {
             return Err(status::IMAGE_CHECKSUM);
         }
-        let is_possible = header.elements <= MAX_ELEMENTS as u32 && header.gears <= MAX_GEARS;
-        if !is_possible || header.shifts > MAX_SHIFTS {
+        let is_possible = self.elements <= MAX_ELEMENTS as u32 && self.gears <= MAX_GEARS;
+        if !is_possible || self.shifts > MAX_SHIFTS {
             return Err(status::IMAGE_CONTENT);
         }
-        Ok((header, words))
+        Ok(())
     }
 
     fn take(words: &mut Words<'_>) -> Option<Self> {

@@ -46,6 +46,7 @@ struct Places {
 
 impl Places {
     /// For a header whose counts were checked.
+    #[inline]
     fn of(header: &Header) -> Self {
         let aligned = |bytes: usize| bytes.next_multiple_of(ALIGNMENT);
         let elements = aligned(size_of::<Head>());
@@ -61,7 +62,13 @@ impl Places {
 /// # Errors
 /// A bit of the [`status`]: the image cannot be used.
 pub fn size(image: &[u32]) -> Result<usize, u32> {
-    Header::of(image).map(|(header, _)| Places::of(&header).end)
+    Header::of(image).map(|(header, _)| size_by(&header))
+}
+
+/// Memory that the observer of an image with this header needs, bytes. The header was checked.
+#[inline]
+pub fn size_by(header: &Header) -> usize {
+    Places::of(header).end
 }
 
 /// An observer in its memory.

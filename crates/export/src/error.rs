@@ -42,6 +42,11 @@ pub enum ExportError {
         "`{0}` of the program is of another car or version: the first difference is `{1}`\nhint: export again into the folder that the program is built from"
     )]
     OtherParameters(String, String),
+    /// A file is not the C of the observer, or that of another version.
+    #[error(
+        "not the C of the observer: {0}\nhint: wetclutch.c is in the archive of each release, and embedded/portable/build makes it from the sources of this version"
+    )]
+    CSource(String),
     /// A file is no library of a model.
     #[error(
         "not a shared library of a model: {0}\nhint: it is built from the sources of wetclutch: cargo build --release --locked --manifest-path embedded/fmu/Cargo.toml --target-dir target; that of the car by embedded/car_fmu/Cargo.toml"

@@ -25,7 +25,7 @@ pub(crate) fn library() -> String {
 }
 
 /// The header of a car.
-pub(crate) fn of_car(filter: &ExportedFilter, image: &Image) -> String {
+pub(crate) fn of_car(filter: &ExportedFilter, image: &Image, memory_bytes: usize) -> String {
     let (name, macros) = (&filter.name, upper(&filter.name));
     let mut places = String::new();
     for (at, element) in filter.elements().iter().enumerate() {
@@ -67,7 +67,7 @@ pub(crate) fn of_car(filter: &ExportedFilter, image: &Image) -> String {
         comment(&shifts.join(", ")),
         env!("CARGO_PKG_VERSION"),
         filter.vehicle_sha256,
-        image.memory_bytes,
+        memory_bytes,
         image.members(filter),
         4 * image.words.len(),
     );

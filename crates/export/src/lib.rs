@@ -1,8 +1,8 @@
 //! A car's observer for a transmission controller, as files: parameters as C and as an image, header, description for calibration tools,
 //! example, self-test, certificate.
 //!
-//! The code is `libwetclutch.a` (`embedded/library`), the same for all cars; what is written here is of one car. Nothing here writes to the
-//! disk: a caller gets names and bytes.
+//! The code is `libwetclutch.a` (`embedded/library`) or `wetclutch.c` (`embedded/portable`), the same for all cars; what is written here is
+//! of one car. Nothing here writes to the disk: a caller gets names and bytes.
 
 mod a2l;
 mod c_text;
@@ -16,12 +16,15 @@ mod fmu;
 mod header;
 mod input_members;
 mod parameters;
+mod portable;
 mod readme;
 mod self_test;
 mod shift_inputs;
 mod units;
 
 use config::CarFile;
+
+use crate::portable::Portable;
 
 pub use a2l::{Addresses, a2l};
 pub use elf::addresses;
@@ -38,6 +41,8 @@ pub use shift_inputs::shift_inputs;
 pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFile>, ExportError> {
     let filter = ExportedFilter::new(file, options)?;
     let image = Image::of(&filter)?;
+    let portable = options.c_source.as_deref().map(Portable::new).transpose()?;
+    let memory_bytes = portable.as_ref().map_or(image.memory_bytes, |of| of.memory_bytes(&image));
     let addresses = match &options.program {
         Some(program) => addresses(program, &filter, &image)?,
         None => Addresses::default(),
@@ -46,17 +51,18 @@ pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFil
     let name = &filter.name;
     let texts = [
         ("wetclutch.h".to_owned(), header::library()),
-        (format!("wetclutch_{name}.h"), header::of_car(&filter, &image)),
+        (format!("wetclutch_{name}.h"), header::of_car(&filter, &image, memory_bytes)),
         (format!("wetclutch_{name}_parameters.c"), image.c_source(&filter)),
         (format!("wetclutch_{name}_selftest.c"), test.c_source(&filter)),
         (format!("wetclutch_{name}.a2l"), a2l(&filter, &image, &addresses)),
         ("example.c".to_owned(), readme::example(name)),
         ("certificate.md".to_owned(), certificate::certificate(&filter)),
-        ("report.md".to_owned(), readme::report(&filter, &image, &test)),
+        ("report.md".to_owned(), readme::report(&filter, &image, &test, memory_bytes)),
         ("README.md".to_owned(), readme::readme(&filter)),
     ];
     let mut files: Vec<_> = texts.into_iter().map(|(name, text)| ExportedFile::text(name, text)).collect();
     files.push(ExportedFile { name: format!("wetclutch_{name}_parameters.bin"), bytes: image.bytes() });
+    files.extend(portable.map(|of| ExportedFile { name: "wetclutch.c".to_owned(), bytes: of.source.to_vec() }));
     if !options.fmu_libraries.is_empty() {
         files.extend(fmu::models(&fmu::of_observer(&filter, &image), &options.fmu_libraries)?);
     }

@@ -15,7 +15,7 @@ pub(crate) fn readme(filter: &ExportedFilter) -> String {
 }
 
 /// `report.md`: sizes, and what is compared.
-pub(crate) fn report(filter: &ExportedFilter, image: &Image, test: &SelfTest) -> String {
+pub(crate) fn report(filter: &ExportedFilter, image: &Image, test: &SelfTest, memory_bytes: usize) -> String {
     let name = &filter.name;
     let tables = filter.filter().tables;
     format!(
@@ -33,7 +33,7 @@ pub(crate) fn report(filter: &ExportedFilter, image: &Image, test: &SelfTest) ->
         elements = tables.elements.len(),
         gears = tables.gears.len(),
         shifts = tables.shifts.len(),
-        memory = image.memory_bytes,
+        memory = memory_bytes,
         learnt = 4 * ecu::LEARNT_WORDS,
         input = size_of::<ecu::Input>(),
         estimate = size_of::<ecu::Estimate>(),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use export::{Addresses, ExportError, ExportOptions, ExportedFilter, Image, a2l, addresses};
 
-use crate::c_program::{Folder, build, exported, run_in};
+use crate::c_program::{Code, Folder, build, exported, run_in};
 use crate::readings::{car_file, filter_of};
 
 /// Lines with this keyword, as their words after it.
@@ -54,7 +54,7 @@ fn addresses_are_those_of_the_program_and_another_car_is_named() {
     let folder = Folder::new("elf");
     exported(&folder, "six_speed.toml");
     std::fs::write(folder.0.join("main.c"), MAIN).unwrap();
-    build(&folder.0, "cc", &["-O1", "-no-pie"], "main.c", "six_speed");
+    build(&folder.0, Code::Library, "cc", &["-O1", "-no-pie"], "main.c", "six_speed");
     let program = std::fs::read(folder.0.join("program")).unwrap();
     let filter = filter_of("six_speed.toml");
     let image = Image::of(&filter).unwrap();

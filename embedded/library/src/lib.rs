@@ -60,6 +60,7 @@ unsafe fn observer<'m>(memory: *mut u64) -> Result<Observer<'m>, u32> {
 ///
 /// # Safety
 /// As the header `wetclutch.h` says (`crates/export/src/wetclutch.h`).
+#[cfg(not(target_family = "wasm"))]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wetclutch_memory_size(image: *const u32, image_bytes: u32) -> u32 {
     // SAFETY: by the contract of the caller.
@@ -164,6 +165,7 @@ pub unsafe extern "C" fn wetclutch_learnt_set(memory: *mut u64, learnt: *const L
 ///
 /// # Safety
 /// As the header `wetclutch.h` says (`crates/export/src/wetclutch.h`).
+#[cfg(not(target_family = "wasm"))]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wetclutch_seal(image: *mut u32, image_bytes: u32) -> u32 {
     if !is_usable(image) {
@@ -172,6 +174,29 @@ pub unsafe extern "C" fn wetclutch_seal(image: *mut u32, image_bytes: u32) -> u3
     // SAFETY: by the contract of the caller.
     let image = unsafe { core::slice::from_raw_parts_mut(image, image_bytes as usize / 4) };
     if image_bytes.is_multiple_of(4) && ecu::image::seal(image) { 0 } else { status::IMAGE_SIZE }
+}
+
+/// The status of the header of an image in the upper word; if it is zero, the memory of its observer in bytes in the lower one.
+///
+/// `wetclutch.c` has no memory for the observer yet where it asks for its size.
+#[cfg(target_family = "wasm")]
+#[unsafe(no_mangle)]
+pub extern "C" fn wetclutch_check(
+    magic: u32,
+    format_version: u32,
+    size_bytes: u32,
+    is_checksum: u32,
+    elements: u32,
+    gears: u32,
+    shifts: u32,
+    image_bytes: u32,
+) -> u64 {
+    let header =
+        Header { magic, format_version, size_bytes, checksum: 0, elements, gears, shifts, vehicle_sha256: [0; 8] };
+    match header.check(image_bytes as usize, |_| is_checksum != 0) {
+        Ok(()) => memory::size_by(&header) as u64,
+        Err(status) => u64::from(status) << 32,
+    }
 }
 
 const _: () = assert!(size_of::<Header>() == 15 * 4 && LEARNT_WORDS * 4 == size_of::<LearntWords>());

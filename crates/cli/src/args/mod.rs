@@ -344,7 +344,7 @@ pub(crate) enum Command {
     /// Write the observer of a car for a transmission controller
     ///
     /// Writes the gearbox filter of a car in single precision into a folder, for a controller that links the static library
-    /// libwetclutch.a with C code:
+    /// libwetclutch.a with C code, or compiles wetclutch.c:
     ///
     ///   wetclutch.h                     functions, input, estimate and status, with units
     ///   wetclutch_CAR.h                 places of elements and gears, memory, the parameters as a struct
@@ -354,10 +354,11 @@ pub(crate) enum Command {
     ///   wetclutch_CAR_selftest.c        a simulated shift and its estimates to the last bit
     ///   example.c, README.md            the observer in a task, and how it is built
     ///   certificate.md, report.md       what the ranges assume; sizes
+    ///   wetclutch.c                     with --c: the observer itself in C99, instead of the library
     ///   wetclutch_CAR_fmi2.fmu, ...fmi3.fmu    with --fmu: the observer for co-simulation (FMI 2.0, FMI 3.0)
     ///   wetclutch_CAR_car_fmi2.fmu, ...    with --car-fmu: the car itself, which shifts
     ///
-    /// The same car gives the same bytes. The library is built from the sources, once for each controller; README.md has the commands.
+    /// The same car gives the same bytes. Library and wetclutch.c are the same for all cars; README.md says how they are built.
     ///
     ///   wetclutch export vehicles/eight_speed.toml -o out
     ///   wetclutch export vehicles/eight_speed.toml --shift 1-2 -o out
@@ -478,6 +479,9 @@ pub(crate) struct Export {
     /// Linked program of the controller: its addresses go into the .a2l. Fails if it has the parameters of another car or version
     #[arg(long, value_name = "FIRMWARE.elf")]
     pub(crate) check_elf: Option<PathBuf>,
+    /// Also write the C99 of the observer, this wetclutch.c, for a compiler that Rust has no target for: no library is needed then
+    #[arg(long, value_name = "wetclutch.c")]
+    pub(crate) c: Option<PathBuf>,
     /// Also write the filter for co-simulation (FMI 2.0 and 3.0), with this shared library of embedded/fmu; repeat it for another platform
     #[arg(long, value_name = "LIBRARY")]
     pub(crate) fmu: Vec<PathBuf>,

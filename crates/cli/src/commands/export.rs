@@ -21,12 +21,17 @@ pub(crate) fn export(options: &Export) -> Result<(), Failure> {
     let program = options.check_elf.as_deref().map(read_program).transpose()?;
     let libraries = |paths: &[PathBuf]| paths.iter().map(|path| read_library(path)).collect::<Result<Vec<_>, _>>();
     let (fmu_libraries, car_fmu_libraries) = (libraries(&options.fmu)?, libraries(&options.car_fmu)?);
-    let exported = ExportOptions { shift: options.shift.clone(), sensors, program, fmu_libraries, car_fmu_libraries };
+    let c_source = options.c.as_deref().map(read_c).transpose()?;
+    let shift = options.shift.clone();
+    let exported = ExportOptions { shift, sensors, program, c_source, fmu_libraries, car_fmu_libraries };
     let files = wetclutch::export(&vehicle, &exported).map_err(|error| named(&options.vehicle, error))?;
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     replaceable(&options.output, &names)?;
     for file in &files {
-        not_an_input(Some(&options.output.join(&file.name)), [&options.vehicle])?;
+        not_an_input(
+            Some(&options.output.join(&file.name)),
+            [Some(&options.vehicle), options.c.as_ref()].into_iter().flatten(),
+        )?;
     }
     write_all(&options.output, &files)?;
     if options.json {
@@ -52,13 +57,22 @@ const MOST_BYTES: u64 = 1 << 28;
 
 /// The linked program of a controller.
 fn read_program(path: &Path) -> Result<Vec<u8>, Failure> {
-    read_linked(path, "program", "give the ELF file that the linker wrote")
+    read_linked(path, "linked program", "give the ELF file that the linker wrote")
 }
 
 /// The shared library of models for co-simulation.
 fn read_library(path: &Path) -> Result<Vec<u8>, Failure> {
     let build = "cargo build --release --locked --manifest-path embedded/fmu/Cargo.toml --target-dir target";
-    read_linked(path, "shared library", &format!("it is built from the sources of wetclutch: {build}"))
+    read_linked(path, "linked shared library", &format!("it is built from the sources of wetclutch: {build}"))
+}
+
+/// The C of the observer.
+fn read_c(path: &Path) -> Result<Vec<u8>, Failure> {
+    read_linked(
+        path,
+        "wetclutch.c",
+        "it is in the archive of each release; embedded/portable/build makes it from the sources",
+    )
 }
 
 /// What a linker wrote.
@@ -67,7 +81,7 @@ fn read_linked(path: &Path, what: &str, hint: &str) -> Result<Vec<u8>, Failure> 
     let there = std::fs::metadata(path).map_err(|error| failure(format!("{error}\nhint: {hint}")))?;
     if !there.is_file() || there.len() > MOST_BYTES {
         return Err(failure(format!(
-            "no linked {what}: it is a regular file of at most {} MB\nhint: {hint}",
+            "no {what}: it is a regular file of at most {} MB\nhint: {hint}",
             MOST_BYTES >> 20
         )));
     }

@@ -1,0 +1,93 @@
+//! What each function needs, by itself and by those that it calls.
+
+use wasmparser::Operator;
+
+use crate::error::Error;
+use crate::module::{Function, Module, STACK_POINTER};
+
+/// What a function needs.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Needs {
+    /// The linear memory.
+    pub(crate) memory: bool,
+    /// The stack pointer.
+    pub(crate) stack: bool,
+    /// Most stack that it and those that it calls use, bytes.
+    pub(crate) stack_bytes: u32,
+}
+
+/// The needs of all functions, and the order in which each comes behind those that it calls.
+pub(crate) struct Calls {
+    pub(crate) needs: Vec<Needs>,
+    pub(crate) order: Vec<usize>,
+}
+
+impl Calls {
+    /// Follows the calls of a module.
+    pub(crate) fn of(module: &Module<'_>) -> Result<Self, Error> {
+        let mut walk = Walk { module, needs: vec![None; module.functions.len()], open: vec![], order: vec![] };
+        for index in 0..module.functions.len() {
+            walk.follow(index)?;
+        }
+        Ok(Self { needs: walk.needs.into_iter().flatten().collect(), order: walk.order })
+    }
+}
+
+struct Walk<'m, 'a> {
+    module: &'m Module<'a>,
+    needs: Vec<Option<Needs>>,
+    /// The functions on the way to this one.
+    open: Vec<usize>,
+    order: Vec<usize>,
+}
+
+impl Walk<'_, '_> {
+    fn follow(&mut self, index: usize) -> Result<Needs, Error> {
+        if let Some(needs) = self.needs[index] {
+            return Ok(needs);
+        }
+        let function = &self.module.functions[index];
+        if self.open.contains(&index) {
+            return Err(Error::Recursion(function.symbol.clone()));
+        }
+        self.open.push(index);
+        let mut needs = own(function);
+        let mut below = 0;
+        for operator in &function.body {
+            if let Operator::Call { function_index } = operator {
+                let called = self.follow(*function_index as usize)?;
+                needs.memory |= called.memory;
+                needs.stack |= called.stack;
+                below = below.max(called.stack_bytes);
+            }
+        }
+        needs.stack_bytes += below;
+        self.open.pop();
+        self.needs[index] = Some(needs);
+        self.order.push(index);
+        Ok(needs)
+    }
+}
+
+/// What a function needs by itself. It takes its part of the stack by one subtraction from the stack pointer.
+fn own(function: &Function<'_>) -> Needs {
+    let mut needs = Needs::default();
+    for (at, operator) in function.body.iter().enumerate() {
+        match operator {
+            Operator::GlobalGet { global_index: STACK_POINTER } => {
+                needs.stack = true;
+                if let Some([Operator::I32Const { value }, Operator::I32Sub]) = function.body.get(at + 1..at + 3) {
+                    needs.stack_bytes = needs.stack_bytes.max(value.cast_unsigned());
+                }
+            }
+            Operator::GlobalSet { .. } => needs.stack = true,
+            _ => needs.memory |= touches_memory(operator),
+        }
+    }
+    needs
+}
+
+fn touches_memory(operator: &Operator<'_>) -> bool {
+    let name = format!("{operator:?}");
+    name.contains("Load") || name.contains("Store") || name.starts_with("Memory")
+}
