@@ -8,6 +8,7 @@ mod contents;
 mod design;
 mod error;
 mod estimate;
+mod export;
 mod file;
 mod fit;
 mod hidden;
@@ -41,6 +42,7 @@ fn _wetclutch(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(contents::log_map, module)?)?;
     module.add_function(wrap_pyfunction!(contents::shifts_of_log, module)?)?;
     module.add_function(wrap_pyfunction!(design::design, module)?)?;
+    module.add_function(wrap_pyfunction!(export::export, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::estimate, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit, module)?)?;
     module.add_function(wrap_pyfunction!(simulate::simulate, module)?)?;

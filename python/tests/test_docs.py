@@ -14,6 +14,7 @@ import wetclutch._car
 import wetclutch._design
 import wetclutch._drive
 import wetclutch._estimate
+import wetclutch._export
 import wetclutch._sensors
 import wetclutch._table
 
@@ -26,6 +27,7 @@ MODULES = [
     wetclutch._design,
     wetclutch._drive,
     wetclutch._estimate,
+    wetclutch._export,
     wetclutch._sensors,
     wetclutch._table,
 ]

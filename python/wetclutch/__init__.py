@@ -16,6 +16,7 @@ from ._design import Certificate, ErrorSystem, Gains, PhaseCertificate, design
 from ._drive import Drive
 from ._errors import InputError, InputErrors, WetclutchError, WorkError
 from ._estimate import Estimates, Log, estimate, read
+from ._export import export
 from ._fit import Fit, fit
 from ._sensors import Sensors
 from ._simulate import Simulation, simulate
@@ -48,6 +49,7 @@ __all__ = [
     "check",
     "design",
     "estimate",
+    "export",
     "fit",
     "gearboxes",
     "read",

@@ -21,6 +21,7 @@ __all__ = [
     "errors_of_file",
     "errors_of_texts",
     "estimate",
+    "export",
     "fit",
     "gearboxes",
     "log_channels",
@@ -174,6 +175,15 @@ def simulate(
 def design(
     car: tuple[str, str, str | None], shift: str | None, given: Mapping[str, Any]
 ) -> tuple[str, list[str], str]: ...
+def export(
+    car: tuple[str, str, str | None],
+    shift: str | None,
+    sensors: Sensors | str | None,
+    program: bytes | None,
+    c_source: bytes | None,
+    fmu_libraries: Sequence[bytes],
+    car_fmu_libraries: Sequence[bytes],
+) -> list[tuple[str, bytes]]: ...
 def estimate(
     car: tuple[str, str, str | None],
     path: str,

@@ -87,7 +87,29 @@ fn own(function: &Function<'_>) -> Needs {
     needs
 }
 
+/// Whether an instruction that is translated reads or writes the memory.
 fn touches_memory(operator: &Operator<'_>) -> bool {
-    let name = format!("{operator:?}");
-    name.contains("Load") || name.contains("Store") || name.starts_with("Memory")
+    use Operator as O;
+    matches!(
+        operator,
+        O::I32Load { .. }
+            | O::F32Load { .. }
+            | O::I64Load { .. }
+            | O::I32Load8U { .. }
+            | O::I32Load8S { .. }
+            | O::I32Load16U { .. }
+            | O::I64Load8U { .. }
+            | O::I64Load16U { .. }
+            | O::I64Load32U { .. }
+            | O::I32Store { .. }
+            | O::F32Store { .. }
+            | O::I64Store { .. }
+            | O::I32Store8 { .. }
+            | O::I32Store16 { .. }
+            | O::I64Store8 { .. }
+            | O::I64Store16 { .. }
+            | O::I64Store32 { .. }
+            | O::MemoryCopy { .. }
+            | O::MemoryFill { .. }
+    )
 }

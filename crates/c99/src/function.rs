@@ -156,7 +156,7 @@ impl Writer<'_, '_> {
         }
     }
 
-    /// The value in a variable of its own.
+    /// Puts a value into a variable of its own.
     fn in_variable(&mut self, value: &Value) -> Value {
         let value = value.number();
         self.temporaries += 1;
@@ -185,6 +185,7 @@ impl Writer<'_, '_> {
         Value::local(index, &self.names[index as usize], self.types[index as usize])
     }
 
+    /// Assigns a value to a local variable, unless a call has just done so.
     fn assign(&mut self, index: u32, value: &Value) {
         self.used.insert(index);
         self.settle(|other| other.reads(index));
@@ -239,7 +240,6 @@ impl Writer<'_, '_> {
             }
             Operator::LocalSet { local_index } => {
                 let value = self.pop()?;
-                // What a call has just assigned.
                 self.assign(*local_index, &value);
             }
             Operator::LocalTee { local_index } => {

@@ -42,6 +42,11 @@ impl RustPath {
         Self { module: module.join("::"), of, name: without_arguments(&name), is_closure }
     }
 
+    /// Whether it is the square root in software, which gives the bits of the standard, as processors do.
+    pub(crate) fn is_square_root(&self) -> bool {
+        self.module.starts_with("libm::") && self.name == "sqrtf"
+    }
+
     /// The name of the C function.
     pub(crate) fn c_name(&self) -> String {
         let of = self.of.as_deref().or_else(|| self.module.rsplit("::").next()).unwrap_or_default();

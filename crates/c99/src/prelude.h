@@ -109,6 +109,27 @@ SMALL float single(uint32_t value)
   return word.f;
 }
 
+/* The square root of the processor, where it is known to have a correctly rounded one. */
+#if defined(__GNUC__) && defined(__arm__) && defined(__ARM_FP)
+#if (__ARM_FP & 4) != 0
+#define SQUARE_ROOT 1
+SMALL float square_root(float value)
+{
+  float root;
+  __asm__("vsqrt.f32 %0, %1" : "=t"(root) : "t"(value));
+  return root;
+}
+#endif
+#elif defined(__GNUC__) && defined(__SSE2__)
+#define SQUARE_ROOT 1
+SMALL float square_root(float value)
+{
+  float root;
+  __asm__("sqrtss %1, %0" : "=x"(root) : "x"(value));
+  return root;
+}
+#endif
+
 /* Words at addresses that are no multiple of four. */
 SMALL uint32_t u32_of_bytes(const uint8_t *m, uint32_t address, uint32_t offset)
 {

@@ -84,7 +84,17 @@ pub fn translate(module: &[u8], before: &str, after: &str, documentation: &Docum
             // A comment of C does not end in the middle of one.
             let _ = write!(text, "\n * {}", line.replace("*/", "* /"));
         }
-        let _ = writeln!(text, " */\n{}", function(index, &known)?);
+        let function = function(index, &known)?;
+        if path.is_square_root() {
+            let signature = function.lines().next().unwrap_or_default();
+            let unused = if signature.contains("*m") { "  (void)m;\n" } else { "" };
+            let _ = writeln!(
+                text,
+                " */\n#if defined(SQUARE_ROOT)\n{signature}\n{{\n{unused}  return square_root(f0);\n}}\n#else\n{function}#endif"
+            );
+        } else {
+            let _ = writeln!(text, " */\n{function}");
+        }
     }
     text.push_str(after);
     Ok(text)

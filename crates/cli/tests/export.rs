@@ -20,6 +20,7 @@ fn export_writes_all_files_of_a_car_and_lists_them() {
         "wetclutch_eight_speed_parameters.bin",
         "wetclutch_eight_speed_selftest.c",
         "wetclutch_eight_speed.a2l",
+        "wetclutch_eight_speed_sfunction.c",
         "example.c",
         "certificate.md",
         "report.md",

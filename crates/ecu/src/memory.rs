@@ -108,19 +108,17 @@ impl<'m> Observer<'m> {
         if !words.is_empty() {
             return Err(status::IMAGE_CONTENT);
         }
-        let head = Head {
-            seal: SEAL,
-            header,
-            parameters,
-            state: parameters.filter(tables).start(),
-            estimate: Estimate::default(),
-            gear: ShiftCommand::NEUTRAL,
-            has_stepped: false,
-        };
         let place = memory.cast::<Head>();
-        // SAFETY: the head is at the beginning of the memory, which is aligned and large enough.
+        // SAFETY: the head is at the beginning of the memory, which is aligned and large enough. Each member is written in its place, as the
+        // stack of a controller may have no room for all of them; the seal is the last one.
         unsafe {
-            place.write(head);
+            (&raw mut (*place).header).write(header);
+            (&raw mut (*place).parameters).write(parameters);
+            (&raw mut (*place).state).write(parameters.filter(tables).start());
+            (&raw mut (*place).estimate).write(Estimate::default());
+            (&raw mut (*place).gear).write(ShiftCommand::NEUTRAL);
+            (&raw mut (*place).has_stepped).write(false);
+            (&raw mut (*place).seal).write(SEAL);
             Ok(Self { head: &mut *place, tables })
         }
     }

@@ -56,13 +56,17 @@ pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFil
         (format!("wetclutch_{name}_selftest.c"), test.c_source(&filter)),
         (format!("wetclutch_{name}.a2l"), a2l(&filter, &image, &addresses)),
         ("example.c".to_owned(), readme::example(name)),
+        (format!("wetclutch_{name}_sfunction.c"), readme::sfunction(&filter)),
         ("certificate.md".to_owned(), certificate::certificate(&filter)),
         ("report.md".to_owned(), readme::report(&filter, &image, &test, memory_bytes)),
         ("README.md".to_owned(), readme::readme(&filter)),
     ];
     let mut files: Vec<_> = texts.into_iter().map(|(name, text)| ExportedFile::text(name, text)).collect();
     files.push(ExportedFile { name: format!("wetclutch_{name}_parameters.bin"), bytes: image.bytes() });
-    files.extend(portable.map(|of| ExportedFile { name: "wetclutch.c".to_owned(), bytes: of.source.to_vec() }));
+    if let Some(portable) = portable {
+        files.push(ExportedFile { name: "wetclutch.c".to_owned(), bytes: portable.source.to_vec() });
+        files.push(ExportedFile::text("CMakeLists.txt".to_owned(), readme::cmake(name)));
+    }
     if !options.fmu_libraries.is_empty() {
         files.extend(fmu::models(&fmu::of_observer(&filter, &image), &options.fmu_libraries)?);
     }

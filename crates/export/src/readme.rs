@@ -9,6 +9,18 @@ pub(crate) fn example(name: &str) -> String {
     include_str!("example.c").replace("@CAR@", name).replace("@CAR_UPPER@", &upper(name))
 }
 
+/// The S-function of Simulink.
+pub(crate) fn sfunction(filter: &ExportedFilter) -> String {
+    let (name, elements) = (&filter.name, filter.filter().tables.elements.len());
+    let text = include_str!("sfunction.c").replace("@CAR@", name).replace("@CAR_UPPER@", &upper(name));
+    text.replace("@ELEMENTS@", &elements.to_string())
+}
+
+/// `CMakeLists.txt`, of the files with `wetclutch.c`.
+pub(crate) fn cmake(name: &str) -> String {
+    include_str!("cmake.txt").replace("@CAR@", name)
+}
+
 /// `README.md`.
 pub(crate) fn readme(filter: &ExportedFilter) -> String {
     include_str!("readme.md").replace("@CAR@", &filter.name).replace("@NAME@", &filter.car.name)

@@ -213,6 +213,29 @@ fn c_has_the_bits_of_the_filter_over_a_drive_and_sampled_shifts() {
     c_has_the_bits("eight_speed.toml", "eight_speed", &inputs);
 }
 
+/// Simulink is not there: a stand-in of its header has what the block calls.
+#[test]
+fn the_block_of_simulink_has_the_estimates_of_the_step() {
+    let folder = Folder::new("simulink");
+    exported(&folder, "eight_speed.toml");
+    let filter = filter_of("eight_speed.toml");
+    let inputs: Vec<Input> = sampled_shifts(&filter, 4).iter().map(Input::of).collect();
+    std::fs::write(folder.0.join("inputs"), inputs.iter().flat_map(input_bytes).collect::<Vec<u8>>()).unwrap();
+    for (name, text) in [
+        ("simstruc.h", include_str!("simulink/simstruc.h")),
+        ("cg_sfun.h", include_str!("simulink/cg_sfun.h")),
+        ("main.c", include_str!("simulink/main.c")),
+    ] {
+        write_for(&folder, name, text, "eight_speed");
+    }
+    build(&folder.0, Code::Library, "cc", &["-O1"], "main.c", "eight_speed");
+    let said = run(Command::new("./program").arg("inputs").current_dir(&folder.0));
+    let numbers: Vec<usize> =
+        said.split(|c: char| !c.is_ascii_digit()).filter_map(|number| number.parse().ok()).collect();
+    let [steps, clutches, ranges, different] = numbers[..] else { panic!("{said}") };
+    assert!(steps == inputs.len() && clutches > steps / 20 && ranges > clutches / 2 && different == 0, "{said}");
+}
+
 #[test]
 fn the_example_of_every_gearbox_compiles_and_runs() {
     for name in ["dual_clutch", "four_speed_one_way", "ten_speed"] {

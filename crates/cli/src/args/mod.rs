@@ -352,9 +352,10 @@ pub(crate) enum Command {
     ///   wetclutch_CAR_parameters.bin    the same bytes as an image, with version, size and checksum
     ///   wetclutch_CAR.a2l               parameters and estimate for calibration tools (ASAP2 1.61)
     ///   wetclutch_CAR_selftest.c        a simulated shift and its estimates to the last bit
+    ///   wetclutch_CAR_sfunction.c       the observer as a block of Simulink
     ///   example.c, README.md            the observer in a task, and how it is built
     ///   certificate.md, report.md       what the ranges assume; sizes
-    ///   wetclutch.c                     with --c: the observer itself in C99, instead of the library
+    ///   wetclutch.c, CMakeLists.txt     with --c: the observer itself in C99, instead of the library
     ///   wetclutch_CAR_fmi2.fmu, ...fmi3.fmu    with --fmu: the observer for co-simulation (FMI 2.0, FMI 3.0)
     ///   wetclutch_CAR_car_fmi2.fmu, ...    with --car-fmu: the car itself, which shifts
     ///

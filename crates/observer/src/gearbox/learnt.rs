@@ -247,13 +247,23 @@ impl<T: Real> Acting<T> {
 impl<T: Real> Learnt<T> {
     /// Nothing is learnt yet.
     pub(super) fn nothing(correlations: &Correlations<T>) -> Self {
-        let mut covariance = [[T::zero(); LEARNT]; LEARNT];
-        for (k, row) in covariance.iter_mut().enumerate() {
+        let zero = T::zero();
+        let (mean, covariance) = ([zero; LEARNT], [[zero; LEARNT]; LEARNT]);
+        let mut learnt = Self { mean, covariance, shifts: 0, refused: 0, odds: zero, oil_degc: None };
+        learnt.forget(correlations);
+        learnt
+    }
+
+    /// Forgets all, in its place: on a controller the stack has no room for another one.
+    #[inline(never)]
+    fn forget(&mut self, correlations: &Correlations<T>) {
+        self.mean = [T::zero(); LEARNT];
+        for (k, row) in self.covariance.iter_mut().enumerate() {
             for (j, value) in row.iter_mut().enumerate() {
                 *value = unlearnt(correlations, k, j);
             }
         }
-        Self { mean: [T::zero(); LEARNT], covariance, shifts: 0, refused: 0, odds: T::of(ODDS_MAX), oil_degc: None }
+        (self.shifts, self.refused, self.odds, self.oil_degc) = (0, 0, T::of(ODDS_MAX), None);
     }
 
     /// Mean and covariance of torque factor and kiss point of an element.
@@ -384,11 +394,11 @@ impl<T: Real> Learnt<T> {
     /// What a new drive begins with. What was learnt may be of another car, or of a bad log: it is the mean and covariance of it
     /// and of the budget together, with even odds, and each shift of the drive is held against both anew.
     pub(super) fn doubted(&self, correlations: &Correlations<T>) -> Self {
-        let (half, budget) = (T::of(0.5), Self::nothing(correlations));
+        let half = T::of(0.5);
         let mut doubted = Self { mean: self.mean.map(|mean| half * mean), odds: T::zero(), ..*self };
         for (i, row) in doubted.covariance.iter_mut().enumerate() {
             for (j, value) in row.iter_mut().enumerate() {
-                *value = half * (*value + budget.covariance[i][j] + half * self.mean[i] * self.mean[j]);
+                *value = half * (*value + unlearnt(correlations, i, j) + half * self.mean[i] * self.mean[j]);
             }
         }
         doubted
@@ -410,7 +420,8 @@ impl<T: Real> Learnt<T> {
     pub(super) fn take_shown(&mut self, acting: &Acting<T>, shown: Shown<T>, correlations: &Correlations<T>) -> bool {
         let Shown { gain, by_budget } = shown;
         let by_car = Innovation::of(|k| self.mean[k], |i, j| self.covariance[i][j], acting, &gain);
-        let Some(mut by_car) = by_car else { return false };
+        let Some(by_car) = by_car else { return false };
+        let mut by = &by_car;
         // What no car of the budget shows speaks for none.
         if !by_budget.is_possible() {
             return false;
@@ -419,12 +430,13 @@ impl<T: Real> Learnt<T> {
         self.odds = self.odds + (by_car.likelihood - by_budget.likelihood).max(-of_shift).min(of_shift);
         self.odds = self.odds.min(maximum);
         if self.odds < -maximum {
-            (*self, by_car) = (Self::nothing(correlations), by_budget);
+            self.forget(correlations);
+            by = &by_budget;
         }
-        if !by_car.is_possible() {
+        if !by.is_possible() {
             return false;
         }
-        self.correct(&by_car, acting.in_shift);
+        self.correct(by, acting.in_shift);
         true
     }
 
@@ -466,7 +478,7 @@ impl<T: Real> Learnt<T> {
             self.refused = self.refused.saturating_add(1);
         }
         if self.refused >= REFUSED_MAX {
-            *self = Self::nothing(correlations);
+            self.forget(correlations);
         }
     }
 

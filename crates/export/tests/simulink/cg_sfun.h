@@ -1,0 +1,1 @@
+/* Empty: Simulink's own registers the functions of the block. */

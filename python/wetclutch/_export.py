@@ -1,0 +1,71 @@
+"""The observer of a car for a controller."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from . import _wetclutch as native
+from ._car import Car
+from ._errors import of_files
+from ._sensors import Sensors, file_or_sensors
+
+
+def export(
+    car: Car,
+    folder: str | os.PathLike[str],
+    *,
+    shift: str | None = None,
+    sensors: Sensors | str | os.PathLike[str] | None = None,
+    program: str | os.PathLike[str] | None = None,
+    c: str | os.PathLike[str] | None = None,
+    fmu: Iterable[str | os.PathLike[str]] = (),
+    car_fmu: Iterable[str | os.PathLike[str]] = (),
+) -> list[Path]:
+    """Writes the gearbox filter of a car for a controller into a folder. The files are those of ``wetclutch export``; files with their names are replaced.
+
+    Args:
+        car: A car with a gearbox.
+        folder: Folder for the files; it is made if it is not there.
+        shift: One shift by its gears, such as ``"1-2"``; without it all shifts of the car.
+        sensors: The sensors of the car: :class:`Sensors`, or a file whose table ``sensors`` describes them.
+        program: Linked program of the controller, whose addresses go into the description for calibration tools.
+        c: ``wetclutch.c``, the observer itself in C99, which is written as well: no library is needed then.
+        fmu: Shared libraries of ``embedded/fmu``, each for another platform: the filter for co-simulation is written too.
+        car_fmu: The same of ``embedded/car_fmu``: the simulated car with its shift controller.
+
+    Returns:
+        The paths of the files.
+
+    Raises:
+        InputError: The car has one shift only, there is no such shift, or a file is not what it should be.
+        OSError: A file cannot be read or written.
+
+    >>> import tempfile
+    >>> files = export(Car.template("8hp", mass_kg=1900.0), tempfile.mkdtemp(), shift="1-2")
+    >>> [file.name for file in files][:2]
+    ['wetclutch.h', 'wetclutch_car.h']
+    """
+
+    def content(path: str | os.PathLike[str] | None) -> bytes | None:
+        return None if path is None else Path(path).read_bytes()
+
+    with of_files(sensors):
+        files = native.export(
+            car._native,
+            shift,
+            file_or_sensors(sensors),
+            content(program),
+            content(c),
+            [Path(path).read_bytes() for path in fmu],
+            [Path(path).read_bytes() for path in car_fmu],
+        )
+    into = Path(folder)
+    into.mkdir(parents=True, exist_ok=True)
+    # All of them, or none.
+    with tempfile.TemporaryDirectory(dir=into, prefix=".wetclutch-") as staging:
+        for name, data in files:
+            (Path(staging) / name).write_bytes(data)
+        return [(Path(staging) / name).replace(into / name) for name, _ in files]
