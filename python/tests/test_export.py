@@ -10,6 +10,7 @@ import wetclutch as wc
 
 from conftest import ROOT
 
+SPEED = {"teeth": 58, "timer_s": 1e-6, "periods": 2, "sample_time_s": 0.01, "delay_s": 0.02, "noise_rad_s": 0.4}
 EIGHT_SPEED = ROOT / "vehicles" / "eight_speed.toml"
 
 
@@ -30,7 +31,7 @@ def test_the_command_writes_the_same_files(tmp_path: Path, c_source: Path) -> No
     command = os.environ.get("WETCLUTCH")
     if not command:
         pytest.skip("WETCLUTCH names no binary")
-    files = wc.export(wc.Car.read(EIGHT_SPEED), tmp_path / "here" / "deep", shift="1-2", c=c_source)
+    files = wc.export(wc.Car.read(EIGHT_SPEED), tmp_path / "here" / "deep", name="eight_speed", shift="1-2", c=c_source)
     options = ["--shift", "1-2", "--c", c_source, "-o", tmp_path / "there"]
     subprocess.run([command, "export", EIGHT_SPEED, *options], capture_output=True, check=True)
     here = content(tmp_path / "here" / "deep")
@@ -42,12 +43,14 @@ def test_files_are_replaced_whole_and_others_stay(tmp_path: Path) -> None:
     car = wc.Car.read(EIGHT_SPEED)
     (tmp_path / "main.c").write_text("int main(void) { return 0; }")
     one = {file.name for file in wc.export(car, tmp_path, shift="1-2")}
+    assert "wetclutch_eight_speed_automatic__2_0_l.h" in one
     before = content(tmp_path)
     assert before.keys() == one | {"main.c"}
-    wc.export(car, tmp_path, sensors=wc.Sensors(turbine={"noise_rad_s": 0.4}))
+    wc.export(car, tmp_path, sensors=wc.Sensors(engine=SPEED, turbine=SPEED, output=SPEED, wheel=SPEED))
     after = content(tmp_path)
     assert after.keys() == before.keys() and after["main.c"] == before["main.c"]
-    assert after["wetclutch_eight_speed_parameters.bin"] != before["wetclutch_eight_speed_parameters.bin"]
+    name = "wetclutch_eight_speed_automatic__2_0_l_parameters.bin"
+    assert after[name] != before[name]
 
 
 def test_what_cannot_be_exported_is_refused_and_nothing_is_written(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ def export(
     car: Car,
     folder: str | os.PathLike[str],
     *,
+    name: str | None = None,
     shift: str | None = None,
     sensors: Sensors | str | os.PathLike[str] | None = None,
     program: str | os.PathLike[str] | None = None,
@@ -29,6 +30,7 @@ def export(
     Args:
         car: A car with a gearbox.
         folder: Folder for the files; it is made if it is not there.
+        name: Name of the car in C and in the names of the files, such as ``"eight_speed"``; the command takes that of the vehicle file. Without it that of the car.
         shift: One shift by its gears, such as ``"1-2"``; without it all shifts of the car.
         sensors: The sensors of the car: :class:`Sensors`, or a file whose table ``sensors`` describes them.
         program: Linked program of the controller, whose addresses go into the description for calibration tools.
@@ -46,15 +48,16 @@ def export(
     >>> import tempfile
     >>> files = export(Car.template("8hp", mass_kg=1900.0), tempfile.mkdtemp(), shift="1-2")
     >>> [file.name for file in files][:2]
-    ['wetclutch.h', 'wetclutch_car.h']
+    ['wetclutch.h', 'wetclutch_my_car.h']
     """
 
     def content(path: str | os.PathLike[str] | None) -> bytes | None:
         return None if path is None else Path(path).read_bytes()
 
+    own_name, text, gearbox = car._native
     with of_files(sensors):
         files = native.export(
-            car._native,
+            (f"{name or own_name}.toml", text, gearbox),
             shift,
             file_or_sensors(sensors),
             content(program),
