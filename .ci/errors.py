@@ -71,6 +71,12 @@ NOT_PROVOKED = {
 NAMES = {"the vehicle file", "date or time", "the frames of its bus"}
 # What to do about messages whose hint the sources hold elsewhere, or which say in themselves what is expected.
 CURES = {
+    "wetclutch.c is in the archive of each release, and embedded/portable/build makes it from the sources of this version": [
+        "it is not text",
+        "it does not define HEAP, STACK_BYTES and IMAGE_VERSION",
+        "it is not whole",
+        "it takes images of version …",
+    ],
     "an error in wetclutch: report it with the file that brings it about": [
         *NOT_PROVOKED["one part of the program that uses another wrongly"],
         "a cell repeats that of the row before",

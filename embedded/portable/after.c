@@ -1,7 +1,7 @@
 
 /* The memory behind the constants: what is passed, then the observer, then the image or what was learnt. The first word is SEAL when there is
- * an observer, the second one the address behind it. */
-#define SEAL 0x43434c57u
+ * an observer of this build, the second one the address behind it. */
+#define SEAL (0x43434c57u ^ MODULE_HASH)
 #define AT_INPUT HEAP
 #define AT_ESTIMATE (AT_INPUT + (uint32_t)sizeof(wetclutch_input))
 #define AT_OBSERVER ((AT_ESTIMATE + (uint32_t)sizeof(wetclutch_estimate) + 7u) & ~7u)
@@ -34,7 +34,9 @@ static uint32_t checksum_of(const uint32_t *image, uint32_t words)
   for (at = 0u; at < words; at++) {
     if (at != CHECKSUM_AT) {
       uint32_t bit;
-      crc ^= image[at];
+      uint32_t word;
+      (void)memcpy(&word, &image[at], sizeof word);
+      crc ^= word;
       for (bit = 0u; bit < 32u; bit++) {
         crc = (crc >> 1) ^ (((crc & 1u) != 0u) ? 0xedb88320u : 0u);
       }
@@ -149,22 +151,22 @@ uint32_t wetclutch_reset(uint64_t *memory)
   return (status == 0u) ? inner_wetclutch_reset((uint8_t *)memory, STACK_BYTES, AT_OBSERVER) : status;
 }
 
+/* The same, or that what is passed is no place for words. */
+static uint32_t status_with(const uint64_t *memory, const void *passed)
+{
+  return is_usable(passed, sizeof(uint32_t)) ? status_of(memory) : WETCLUTCH_STATUS_BAD_POINTER;
+}
+
 uint32_t wetclutch_learnt_get(uint64_t *memory, wetclutch_learnt *learnt)
 {
   uint8_t *const m = (uint8_t *)memory;
-  uint32_t status;
-  uint32_t at;
-  if (!is_usable(learnt, sizeof(uint32_t))) {
-    return WETCLUTCH_STATUS_BAD_POINTER;
-  }
-  status = status_of(memory);
-  if (status != 0u) {
-    return status;
-  }
-  at = u32_at(m, 0u, 4u);
-  status = inner_wetclutch_learnt_get(m, STACK_BYTES, AT_OBSERVER, at);
+  uint32_t status = status_with(memory, learnt);
   if (status == 0u) {
-    (void)memcpy(learnt, m + at, sizeof *learnt);
+    const uint32_t at = u32_at(m, 0u, 4u);
+    status = inner_wetclutch_learnt_get(m, STACK_BYTES, AT_OBSERVER, at);
+    if (status == 0u) {
+      (void)memcpy(learnt, m + at, sizeof *learnt);
+    }
   }
   return status;
 }
@@ -172,18 +174,13 @@ uint32_t wetclutch_learnt_get(uint64_t *memory, wetclutch_learnt *learnt)
 uint32_t wetclutch_learnt_set(uint64_t *memory, const wetclutch_learnt *learnt)
 {
   uint8_t *const m = (uint8_t *)memory;
-  uint32_t status;
-  uint32_t at;
-  if (!is_usable(learnt, sizeof(uint32_t))) {
-    return WETCLUTCH_STATUS_BAD_POINTER;
+  uint32_t status = status_with(memory, learnt);
+  if (status == 0u) {
+    const uint32_t at = u32_at(m, 0u, 4u);
+    (void)memcpy(m + at, learnt, sizeof *learnt);
+    status = inner_wetclutch_learnt_set(m, STACK_BYTES, AT_OBSERVER, at);
   }
-  status = status_of(memory);
-  if (status != 0u) {
-    return status;
-  }
-  at = u32_at(m, 0u, 4u);
-  (void)memcpy(m + at, learnt, sizeof *learnt);
-  return inner_wetclutch_learnt_set(m, STACK_BYTES, AT_OBSERVER, at);
+  return status;
 }
 
 uint32_t wetclutch_seal(uint32_t *image, uint32_t image_bytes)
@@ -198,3 +195,5 @@ uint32_t wetclutch_seal(uint32_t *image, uint32_t image_bytes)
   image[CHECKSUM_AT] = checksum_of(image, image_bytes / 4u);
   return 0u;
 }
+
+/* The end of wetclutch.c. */

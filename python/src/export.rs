@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use wetclutch::ExportOptions;
+use wetclutch::{CSource, Error, ExportOptions};
 
 use crate::car::parsed;
 use crate::file::GivenFile;
@@ -29,6 +29,7 @@ pub(crate) fn export<'py>(
     let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
     let files = work::done(py, None, move |_| {
         let sensors = sensors.map(|sensors| wetclutch::sensors_of(&sensors.source()?)).transpose()?;
+        let c_source = c_source.map(CSource::new).transpose().map_err(|error| Error::Input(format!("c: {error}")))?;
         let options = ExportOptions { shift, sensors, program, c_source, fmu_libraries, car_fmu_libraries };
         wetclutch::export(&vehicle, &options)
     })?;

@@ -23,7 +23,7 @@ def c_source(tmp_path: Path) -> Path:
     """What the header of ``wetclutch.c`` says, for the images of this version."""
     version = wc.export(wc.Car.read(EIGHT_SPEED), tmp_path / "first")[-1].read_bytes()[4]
     file = tmp_path / "wetclutch.c"
-    file.write_text(f"/* wetclutch */\n#define IMAGE_VERSION {version}u\n#define HEAP 4096u\n")
+    file.write_text(f"/* wetclutch */\n#define IMAGE_VERSION {version}u\n#define HEAP 4096u\n#define STACK_BYTES 2048u\n/* The end of wetclutch.c. */\n")
     return file
 
 

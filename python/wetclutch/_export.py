@@ -67,8 +67,8 @@ def export(
         )
     into = Path(folder)
     into.mkdir(parents=True, exist_ok=True)
-    # All of them, or none.
+    # Each appears whole; none if one of them cannot be written.
     with tempfile.TemporaryDirectory(dir=into, prefix=".wetclutch-") as staging:
-        for name, data in files:
-            (Path(staging) / name).write_bytes(data)
-        return [(Path(staging) / name).replace(into / name) for name, _ in files]
+        for file, data in files:
+            (Path(staging) / file).write_bytes(data)
+        return [(Path(staging) / file).replace(into / file) for file, _ in files]

@@ -51,7 +51,7 @@ impl Walk<'_, '_> {
             return Err(Error::Recursion(function.symbol.clone()));
         }
         self.open.push(index);
-        let mut needs = own(function);
+        let mut needs = own(function)?;
         let mut below = 0;
         for operator in &function.body {
             if let Operator::Call { function_index } = operator {
@@ -69,22 +69,59 @@ impl Walk<'_, '_> {
     }
 }
 
-/// What a function needs by itself. It takes its part of the stack by one subtraction from the stack pointer.
-fn own(function: &Function<'_>) -> Needs {
+/// What a function needs by itself. It takes its part of the stack once, by a subtraction from the stack pointer, and gives it back by the
+/// sum; one that calls nothing may leave the stack pointer as it is, also in a local variable. Any other use of it is an error, as it would
+/// leave the size of the stack unknown.
+fn own(function: &Function<'_>) -> Result<Needs, Error> {
+    use Operator as O;
+    let other = || Error::StackPointer(function.symbol.clone());
     let mut needs = Needs::default();
+    // The local variable that holds the stack pointer.
+    let mut held = None;
     for (at, operator) in function.body.iter().enumerate() {
+        let taken = || match function.body.get(at + 1..at + 3) {
+            Some([O::I32Const { value }, O::I32Sub]) if *value > 0 => Ok(value.cast_unsigned()),
+            _ => Err(other()),
+        };
+        let before = |count: usize| at.checked_sub(count).map_or(&[][..], |from| &function.body[from..at]);
         match operator {
-            Operator::GlobalGet { global_index: STACK_POINTER } => {
+            O::GlobalGet { global_index: STACK_POINTER } => {
+                if needs.stack {
+                    return Err(other());
+                }
                 needs.stack = true;
-                if let Some([Operator::I32Const { value }, Operator::I32Sub]) = function.body.get(at + 1..at + 3) {
-                    needs.stack_bytes = needs.stack_bytes.max(value.cast_unsigned());
+                match function.body.get(at + 1) {
+                    Some(O::LocalSet { local_index }) => held = Some(*local_index),
+                    _ => needs.stack_bytes = taken()?,
                 }
             }
-            Operator::GlobalSet { .. } => needs.stack = true,
+            O::LocalGet { local_index } if held == Some(*local_index) => {
+                needs.stack_bytes = needs.stack_bytes.max(taken()?);
+            }
+            O::LocalSet { local_index }
+                if held == Some(*local_index) && !matches!(before(1), [O::GlobalGet { .. }]) =>
+            {
+                held = None;
+            }
+            O::LocalTee { local_index } if held == Some(*local_index) => held = None,
+            O::GlobalSet { global_index: STACK_POINTER } => {
+                let takes =
+                    matches!(before(4), [O::GlobalGet { .. }, O::I32Const { .. }, O::I32Sub, O::LocalTee { .. }]);
+                let gives_back = match before(3) {
+                    [O::LocalGet { .. }, O::I32Const { value }, O::I32Add] => {
+                        value.cast_unsigned() == needs.stack_bytes
+                    }
+                    _ => false,
+                };
+                if !takes && !gives_back {
+                    return Err(other());
+                }
+            }
+            O::GlobalGet { .. } | O::GlobalSet { .. } => return Err(Error::Part("a global variable")),
             _ => needs.memory |= touches_memory(operator),
         }
     }
-    needs
+    Ok(needs)
 }
 
 /// Whether an instruction that is translated reads or writes the memory.

@@ -63,7 +63,7 @@ impl Documentation {
         for (at, line) in text.lines().enumerate() {
             let plain = line.trim();
             if let Some(text) = plain.strip_prefix("///") {
-                lines.push(text.trim().to_owned());
+                lines.push(without_targets(text.trim()));
                 continue;
             }
             if plain.starts_with("#[") {
@@ -86,6 +86,14 @@ impl Documentation {
     pub(crate) fn of(&self, path: &RustPath) -> Option<&Entry> {
         self.entries.get(&(path.module.clone(), path.of.clone(), path.name.clone()))
     }
+}
+
+/// A line without the targets of its links.
+fn without_targets(line: &str) -> String {
+    let (first, links) = line.split_once("](").unwrap_or((line, ""));
+    let parts = links.split("](").map(|rest| rest.split_once(')').map_or("", |(_, after)| after));
+    let is_link = !links.is_empty();
+    std::iter::once(first).chain(parts.filter(|_| is_link)).collect::<Vec<_>>().join("]")
 }
 
 /// The type of `impl<T> Type<T> {` and of `impl Trait for Type {`.

@@ -10,6 +10,9 @@ pub enum Error {
     /// A function that calls itself has no largest stack.
     #[error("{0} calls itself")]
     Recursion(String),
+    /// The stack of a function is not known.
+    #[error("{0} uses the stack pointer in a way by which the size of its stack is not known")]
+    StackPointer(String),
     /// An instruction that is not translated.
     #[error("{function}: {instruction} is not translated")]
     Instruction {

@@ -82,6 +82,9 @@ pub(crate) struct Value {
     binding: Binding,
     /// It is an `int` of C, 0 or 1.
     is_truth: bool,
+    /// Its value, if it is a constant whole number.
+    pub(crate) constant: Option<u64>,
+    /// Whether it is a number.
     pub(crate) is_constant: bool,
     pub(crate) reads_memory: bool,
     /// Local variables that it reads; the stack pointer is `u32::MAX`.
@@ -99,6 +102,7 @@ impl Value {
             ty,
             binding: Binding::Primary,
             is_truth: false,
+            constant: None,
             is_constant: false,
             reads_memory: false,
             locals: vec![],
@@ -112,12 +116,13 @@ impl Value {
 
     /// A word.
     pub(crate) fn word(value: u32) -> Self {
-        Self { is_constant: true, ..Self::primary(word(value), Type::Word) }
+        Self { constant: Some(value.into()), is_constant: true, ..Self::primary(word(value), Type::Word) }
     }
 
     /// A long.
     pub(crate) fn long(value: u64) -> Self {
-        Self { is_constant: true, ..Self::primary(format!("UINT64_C({value:#x})"), Type::Long) }
+        let text = format!("UINT64_C({value:#x})");
+        Self { constant: Some(value), is_constant: true, ..Self::primary(text, Type::Long) }
     }
 
     /// A number of single precision, to the last bit.
@@ -140,7 +145,7 @@ impl Value {
 
     /// An expression of the parts of this one.
     fn with(&self, text: String, ty: Type, binding: Binding) -> Self {
-        Self { text, ty, binding, is_truth: false, is_constant: false, ..self.clone() }
+        Self { text, ty, binding, is_truth: false, constant: None, is_constant: false, ..self.clone() }
     }
 
     /// The reads of another expression as well.

@@ -364,8 +364,9 @@ impl Writer<'_, '_> {
             O::F32Copysign => self.of_two("copysignf", Single)?,
             O::F32ConvertI32U => self.cast("(float)", Single)?,
             O::F32ConvertI32S => {
-                self.cast("(int32_t)", Word)?;
-                self.cast("(float)", Single)?;
+                let value = self.pop()?;
+                // In one expression: a variable of its own would have lost the sign.
+                self.push(value.unary("(int32_t)", Word).unary("(float)", Single));
             }
             O::I32TruncSatF32U => self.of_one("whole", Word)?,
             O::I32TruncSatF32S => self.of_one("whole_signed", Word)?,
@@ -423,8 +424,8 @@ impl Writer<'_, '_> {
     /// A sum of words, where a large number that is added is a small one that is subtracted.
     fn sum(&mut self) -> Result<(), Error> {
         let (left, right) = self.two()?;
-        let small = right.text.trim_end_matches('u').strip_prefix("0xffff").filter(|_| right.is_constant);
-        let small = small.and_then(|_| u32::from_str_radix(right.text.get(2..10)?, 16).ok());
+        // From 4096 below zero on.
+        let small = right.constant.and_then(|value| u32::try_from(value).ok()).filter(|value| *value > u32::MAX - 4096);
         self.push(match small {
             Some(value) => Value::binary(&left, "-", &Value::word(value.wrapping_neg()), Binding::Sum),
             None => Value::binary(&left, "+", &right, Binding::Sum),
@@ -442,14 +443,12 @@ impl Writer<'_, '_> {
     /// A shift by a number of bits below the width, as WebAssembly takes it.
     fn shift(&mut self, symbol: &str, width: u32) -> Result<(), Error> {
         let (left, right) = self.two()?;
-        let by = if right.is_constant {
-            let text = right.text.trim_start_matches("UINT64_C(").trim_end_matches([')', 'u']);
-            let digits = text.strip_prefix("0x");
-            let value = digits.map_or_else(|| text.parse(), |digits| u32::from_str_radix(digits, 16));
-            Value::word(value.unwrap_or_default() % width)
-        } else {
-            let cast = if width == 64 { right.unary("(uint32_t)", Type::Word) } else { right };
-            Value::binary(&cast, "&", &Value::word(width - 1), Binding::Bits)
+        let by = match right.constant {
+            Some(value) => Value::word((value % u64::from(width)) as u32),
+            None => {
+                let by = if width == 64 { right.unary("(uint32_t)", Type::Word) } else { right };
+                Value::binary(&by, "&", &Value::word(width - 1), Binding::Bits)
+            }
         };
         self.push(Value::binary(&left, symbol, &by, Binding::Bits));
         Ok(())
@@ -710,12 +709,12 @@ impl Writer<'_, '_> {
         let (head, foot) = if frame.is_reachable && tail(1) == Some("}") && tail(2) == Some(back.as_str()) {
             let condition = tail(3).and_then(|line| line.strip_prefix("if (")?.strip_suffix(") {")).map(str::to_owned);
             match condition {
-                Some(condition) => {
+                Some(condition) if !self.is_of_body(&condition, frame.line) => {
                     self.lines.truncate(count - 3);
                     frame.jumps -= 1;
                     ("do {", format!("}} while ({condition});"))
                 }
-                None => ("for (;;) {", String::new()),
+                _ => ("for (;;) {", String::new()),
             }
         } else if !frame.is_reachable && tail(1) == Some(back.as_str()) {
             self.lines.truncate(count - 1);
@@ -737,6 +736,16 @@ impl Writer<'_, '_> {
         self.line(foot);
         let label = if frame.jumps > 0 { format!("again_{}: ", frame.label) } else { String::new() };
         self.lines[frame.line].1 = format!("{label}{head}");
+    }
+
+    /// Whether a condition reads a variable that is declared behind this line, within the braces of a loop.
+    fn is_of_body(&self, condition: &str, line: usize) -> bool {
+        let names = condition.split(|c: char| !c.is_ascii_alphanumeric()).filter(|name| name.starts_with(['t', 'r']));
+        let mut names = names.filter(|name| name[1..].starts_with(|c: char| c.is_ascii_digit()));
+        names.any(|name| {
+            let declares = |text: &str| text.contains(&format!(" {name} =")) || text.ends_with(&format!(" {name};"));
+            self.lines[line + 1..].iter().any(|(_, text)| declares(text))
+        })
     }
 
     /// The whole function.

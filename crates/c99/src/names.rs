@@ -136,6 +136,12 @@ pub(crate) struct Names {
 }
 
 impl Names {
+    /// Leaves the names of a text to it, but for those of the functions of the module.
+    pub(crate) fn reserve(&mut self, text: &str) {
+        let names = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+        self.taken.extend(names.filter(|name| !name.starts_with("inner_")).map(str::to_owned));
+    }
+
     /// This name, with a number behind it if it is taken.
     pub(crate) fn take(&mut self, name: &str) -> String {
         let free = (1..).map(|number| if number == 1 { name.to_owned() } else { format!("{name}_{number}") });

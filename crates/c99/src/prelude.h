@@ -2,33 +2,52 @@
 #include <math.h>
 #include <string.h>
 
-#if defined(__FAST_MATH__)
-#error "compile without -ffast-math: it changes the order of floating-point operations"
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ != 0))
+#error "compile without -ffast-math and -ffinite-math-only: they change floating-point operations"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD != 0)
 #error "float must be evaluated as float (FLT_EVAL_METHOD 0)"
 #endif
-#if defined(__clang__)
+/* No operation is combined with another one. GCC does not know this: -std=c99 or -ffp-contract=off there. */
+#if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
 #endif
 
 /* The byte order of the machine: the memory is an array of words of 32 bits in this order. */
-#if defined(__BYTE_ORDER__) && defined(__ORDER_BIG_ENDIAN__)
+#if !defined(WETCLUTCH_BIG_ENDIAN)
+#if defined(__BYTE_ORDER__) && defined(__ORDER_BIG_ENDIAN__) && defined(__ORDER_LITTLE_ENDIAN__)
 #if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
-#define IS_BIG_ENDIAN 1
+#define WETCLUTCH_BIG_ENDIAN 1
+#elif __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+#define WETCLUTCH_BIG_ENDIAN 0
+#endif
+#elif defined(_M_IX86) || defined(_M_X64) || defined(_M_ARM64) || defined(__LITTLE_ENDIAN__)
+#define WETCLUTCH_BIG_ENDIAN 0
+#elif defined(__BIG_ENDIAN__)
+#define WETCLUTCH_BIG_ENDIAN 1
 #endif
 #endif
-#if defined(IS_BIG_ENDIAN)
+#if !defined(WETCLUTCH_BIG_ENDIAN)
+#error "define WETCLUTCH_BIG_ENDIAN as 1 if the highest byte of a word comes first on this machine, else as 0"
+#endif
+#if WETCLUTCH_BIG_ENDIAN
 #define OF_BYTE 3u
 #else
 #define OF_BYTE 0u
 #endif
 
-/* A word of the memory. */
+/* A word of the memory, whatever type the caller gives it. */
+#if defined(__GNUC__)
+typedef union __attribute__((may_alias)) {
+  uint32_t u;
+  float f;
+} word_t;
+#else
 typedef union {
   uint32_t u;
   float f;
 } word_t;
+#endif
 
 #if defined(__GNUC__)
 #define SMALL static inline __attribute__((unused))
@@ -166,7 +185,7 @@ SMALL void set_bytes_of_u64(uint8_t *m, uint32_t address, uint32_t offset, uint6
 /* Copies bytes; the places may overlap. */
 SMALL void copy(uint8_t *m, uint32_t to, uint32_t from, uint32_t count)
 {
-#if defined(IS_BIG_ENDIAN)
+#if WETCLUTCH_BIG_ENDIAN
   uint32_t i;
   if (((to | from | count) & 3u) != 0u) {
     if (to <= from) {
@@ -187,7 +206,7 @@ SMALL void copy(uint8_t *m, uint32_t to, uint32_t from, uint32_t count)
 /* Writes a byte to so many places. */
 SMALL void fill(uint8_t *m, uint32_t to, uint32_t value, uint32_t count)
 {
-#if defined(IS_BIG_ENDIAN)
+#if WETCLUTCH_BIG_ENDIAN
   uint32_t i;
   if (((to | count) & 3u) != 0u) {
     for (i = 0u; i < count; i++) {

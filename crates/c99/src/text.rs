@@ -45,13 +45,13 @@ fn needed(calls: &Calls) -> u32 {
 
 /// The C of a module: `before`, its functions, `after`. The functions that it exports have `inner_` before their names.
 ///
-/// `after` finds the macros `STACK_BYTES` (where the stack begins) and `HEAP` (the first free address), and `begin_memory(m)`, which writes
+/// `after` finds the macros `STACK_BYTES` (where the stack begins), `HEAP` (the first free address) and `MODULE_HASH`, and `begin_memory(m)`, which writes
 /// the constants.
 ///
 /// # Errors
 /// [`Error`]: the module cannot be translated.
-pub fn translate(module: &[u8], before: &str, after: &str, documentation: &Documentation) -> Result<String, Error> {
-    let module = Module::read(module)?;
+pub fn translate(bytes: &[u8], before: &str, after: &str, documentation: &Documentation) -> Result<String, Error> {
+    let module = Module::read(bytes)?;
     let calls = Calls::of(&module)?;
     let needed = needed(&calls);
     if needed > module.stack {
@@ -59,6 +59,7 @@ pub fn translate(module: &[u8], before: &str, after: &str, documentation: &Docum
     }
     let paths: Vec<RustPath> = module.functions.iter().map(|function| RustPath::of(&function.symbol)).collect();
     let mut taken = Names::default();
+    [before, PRELUDE, after].into_iter().for_each(|text| taken.reserve(text));
     let names: Vec<String> = module
         .functions
         .iter()
@@ -74,6 +75,7 @@ pub fn translate(module: &[u8], before: &str, after: &str, documentation: &Docum
     let mut text = format!("{before}\n{PRELUDE}\n");
     let _ = writeln!(text, "/* Where the stack begins, and the first address behind stack and constants. */");
     let _ = writeln!(text, "#define STACK_BYTES {}u\n#define HEAP {}u\n", module.stack, module.heap);
+    let _ = writeln!(text, "/* Of the module. */\n#define MODULE_HASH {:#010x}u\n", hash(bytes));
     constants(&module, &mut text);
     for index in calls.order.iter().copied().filter(|index| reached[*index]) {
         let path = &paths[index];
@@ -98,6 +100,11 @@ pub fn translate(module: &[u8], before: &str, after: &str, documentation: &Docum
     }
     text.push_str(after);
     Ok(text)
+}
+
+/// FNV-1a of some bytes.
+fn hash(bytes: &[u8]) -> u32 {
+    bytes.iter().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
 }
 
 /// Which functions are called from outside, at any depth.

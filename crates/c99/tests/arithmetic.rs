@@ -196,11 +196,46 @@ fn long_here(a: u32, b: u32) -> u32 {
     value as u32 ^ (value >> 32) as u32
 }
 
+/// A signed number of an expression that is longer than a line: minus the sum of the constants and `a`, as a number of single precision.
+fn long_expression() -> Function {
+    let mut body = vec![0x20, 0];
+    for at in 0..16 {
+        body.extend([constant(64), vec![0x2d, 0, at, 0x6a]].concat());
+    }
+    body.extend([constant(-1), vec![0x6c, 0xb2]].concat());
+    Function::new("long_expression", &[I32], &[F32], &body)
+}
+
+/// Counts from `a` down to the first number below it that has no remainder by 4. The condition of the loop is the result of a block, which
+/// is 1 as well where the count is above 1000.
+fn loop_until() -> Function {
+    let get = |local: u8| vec![0x20, local];
+    let body = [
+        vec![0x03, 0x40], // loop
+        [get(0), constant(1), vec![0x6b, 0x21, 0]].concat(),
+        vec![0x02, I32], // block with a result
+        [constant(1), get(0), constant(1000), vec![0x4b, 0x0d, 0, 0x1a]].concat(),
+        [get(0), constant(3), vec![0x71]].concat(),
+        vec![0x0b],
+        vec![0x0d, 0, 0x0b], // again
+        get(0),
+    ]
+    .concat();
+    Function::new("loop_until", &[I32], &[I32], &body)
+}
+
+/// Shifts of 64 bits by constants beyond 32 bits.
+fn long_shift() -> Function {
+    let by = [0x42, 0x84, 0x80, 0x80, 0x80, 0x80, 0x20]; // 2^40 + 4
+    let body = [&[0x20, 0, 0xad][..], &by, &[0x86, 0x42, 1, 0x88, 0xa7]].concat();
+    Function::new("long_shift", &[I32], &[I32], &body)
+}
+
 #[test]
 fn each_instruction_has_its_results_in_c() {
     let get = |local: u8| vec![0x20, local];
     let one = |name: &str| ["clz", "extend", "fabs", "fneg", "fceil", "ffloor", "ftrunc", "fsqrt"].contains(&name);
-    let mut functions = vec![in_memory(), branches(), long()];
+    let mut functions = vec![in_memory(), branches(), long(), long_expression(), loop_until(), long_shift()];
     for (name, opcode, _) in OF_WORDS {
         let divisor = [get(1), constant(1), get(1), vec![0x1b]].concat(); // 1 for 0
         let body = match name {
@@ -229,6 +264,12 @@ fn each_instruction_has_its_results_in_c() {
         let _ = writeln!(calls, "  say({text});");
         let _ = writeln!(expected, "{result:08x}");
     };
+    for a in [1_u32, 2, 5, 64, 999, 1003] {
+        let until = (0..a).rev().find(|count| *count <= 1000 && count % 4 == 0).unwrap_or_default();
+        call(format!("inner_loop_until({a}u)"), until);
+        call(format!("bits(inner_long_expression(m, {a}u))"), (-f32::from(a as u16 + 136)).to_bits());
+        call(format!("inner_long_shift({:#x}u)", a << 24), ((u64::from(a << 24) << 4) >> 1) as u32);
+    }
     for a in WORDS {
         for b in WORDS {
             call(format!("inner_in_memory(m, {a}u, {b}u)"), in_memory_here(a, b));

@@ -52,6 +52,36 @@ fn an_import_recursion_and_double_precision_are_named() {
     assert!(refused_body(&[], &[], &[0x11, 0, 0]).to_string().contains("table"));
 }
 
+/// A function of the prelude is not one of the module.
+#[test]
+fn a_name_of_the_files_around_is_not_taken_again() {
+    let before = "static int f_g(void);";
+    let function = Function::new("f", &[], &[I32], &constant(3));
+    let text = translate(&module(&[function], 64, None), before, "int inner_f_2;", &Documentation::default()).unwrap();
+    assert!(text.contains("static uint32_t inner_f(void)\n"), "{text}");
+}
+
+#[test]
+fn a_use_of_the_stack_pointer_that_hides_its_size_is_refused() {
+    let body = |instructions: &[&[u8]]| Function { locals: 1, ..Function::new("f", &[], &[], &instructions.concat()) };
+    let (get, set, keep, tee) = (&[0x23, 0][..], &[0x24, 0][..], &[0x21, 0][..], &[0x22, 0][..]);
+    let (sub, add, and, drop) = (&[0x6b][..], &[0x6a][..], &[0x71][..], &[0x1a][..]);
+    let number = constant;
+    for hidden in [
+        body(&[get, &number(-4096), add, tee, set]),
+        body(&[get, &number(100), sub, &number(-64), and, tee, set]),
+        body(&[get, &number(16), sub, tee, set, get, &number(4096), sub, set]),
+        body(&[get, keep, &[0x20, 0], &number(-4096), add, drop]),
+        body(&[get, &number(16), sub, tee, set, &[0x20, 0], &number(32), add, set]),
+        body(&[&number(64), set]),
+    ] {
+        assert_eq!(refused(&module(&[hidden], 65536, None)), Error::StackPointer("function_0".to_owned()));
+    }
+    // One that calls nothing and leaves the stack pointer as it is.
+    let leaf = body(&[get, keep, &[0x20, 0], &number(4096), sub, tee, drop]);
+    assert_eq!(stack(&module(&[leaf], 65536, None)).unwrap().exported, [("f".to_owned(), 4096)]);
+}
+
 /// `f` takes 4096 bytes of the stack and calls `g`, which takes 32.
 #[test]
 fn the_stack_of_the_calls_is_known() {

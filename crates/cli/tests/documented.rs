@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::support::{Folder, ROOT, printed, said, shown, wetclutch};
 
 /// What other tests run, or needs a bus or a library that is built.
-const ELSEWHERE: [&str; 5] = ["candump ", "--check-elf", "--fmu", "--car-fmu", "--c wetclutch.c"];
+const ELSEWHERE: [&str; 5] = ["candump ", "--check-elf", "--fmu", "--car-fmu", "--c target"];
 /// Pages whose commands are run here.
 const PAGES: [&str; 8] = [
     "how-to/describe-a-gearbox",

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{Folder, ROOT, VEHICLE, printed, refused, wetclutch};
+use crate::support::{Folder, ROOT, VEHICLE, printed, refused, said, wetclutch};
 
 fn car() -> String {
     format!("{ROOT}vehicles/eight_speed.toml")
@@ -48,15 +48,19 @@ fn export_puts_the_c_of_the_observer_beside_the_other_files() {
     };
     let of_library = memory(&[]);
     let image = std::fs::read(Path::new(&out).join("wetclutch_eight_speed_parameters.bin")).unwrap();
-    let source =
-        format!("/* The observer of wetclutch. */\n#define IMAGE_VERSION {}u\n#define HEAP 500000u\n", image[4]);
+    let source = format!(
+        "/* The observer of wetclutch. */\n#define IMAGE_VERSION {}u\n#define HEAP 500000u\n#define STACK_BYTES 400000u\n/* The end of wetclutch.c. */\n",
+        image[4]
+    );
     let source = folder.write("wetclutch.c", source);
     assert!(!Path::new(&out).join("wetclutch.c").exists());
     let of_c = memory(&["--c", &source]);
     assert!(of_c > of_library + 500_000 && of_c.is_multiple_of(8), "{of_library} {of_c}");
     assert_eq!(std::fs::read(Path::new(&out).join("wetclutch.c")).unwrap(), std::fs::read(&source).unwrap());
-    let said = refused(&wetclutch(&["export", &car(), "--c", &source, "-o", &folder.path("")]));
-    assert!(said.contains("the output would replace this input"), "{said}");
+    let again = wetclutch(&["export", &car(), "--shift", "1-2", "-o", &out]);
+    assert!(said(&again).contains("wetclutch.c in the folder is of an earlier export"), "{again:?}");
+    let wrong = refused(&wetclutch(&["export", &car(), "--c", &source, "-o", &folder.path("")]));
+    assert!(wrong.contains("the output would replace this input"), "{wrong}");
 }
 
 #[test]

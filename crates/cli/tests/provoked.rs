@@ -108,10 +108,13 @@ fn options_for_other_files_are_named() {
     provokes(&["fit", "-", "--vehicle", VEHICLE, "-o", &folder.path("f.toml")], "a fit reads a log twice");
     provokes(
         &["export", &car, "--c", &city, "-o", &out],
-        "not the C of the observer: it defines neither HEAP nor IMAGE_VERSION",
+        "not the C of the observer: it does not define HEAP, STACK_BYTES and IMAGE_VERSION",
     );
     provokes(&["export", &car, "--c", program, "-o", &out], "not the C of the observer: it is not text");
-    let old = folder.write("wetclutch.c", "#define IMAGE_VERSION 1u\n#define HEAP 80u\n");
+    let cut = folder.write("cut.c", "#define IMAGE_VERSION 1u\n#define HEAP 80u\n#define STACK_BYTES 64u\n");
+    provokes(&["export", &car, "--c", &cut, "-o", &out], "cut.c: not the C of the observer: it is not whole");
+    let old = "#define IMAGE_VERSION 1u\n#define HEAP 80u\n#define STACK_BYTES 64u\n/* The end of wetclutch.c. */\n";
+    let old = folder.write("wetclutch.c", old);
     provokes(&["export", &car, "--c", &old, "-o", &out], "not the C of the observer: it takes images of version 1");
     provokes(&["export", &car, "--c", &folder.path(""), "-o", &out], "no wetclutch.c: it is a regular file");
     let library = ["export", &car, "--shift", "1-2", "--fmu", program, "-o", &out];

@@ -8,6 +8,7 @@ use observer::{GearboxFilter, ShiftTables, gearbox_filter};
 
 use crate::c_text;
 use crate::error::ExportError;
+use crate::portable::CSource;
 
 /// What is exported of a car.
 #[derive(Debug, Clone, Default)]
@@ -19,7 +20,7 @@ pub struct ExportOptions {
     /// A linked program with the parameters: its addresses go into the description for calibration tools.
     pub program: Option<Vec<u8>>,
     /// `wetclutch.c` as `embedded/portable` makes it, for the same folder: with it no library is needed.
-    pub c_source: Option<Vec<u8>>,
+    pub c_source: Option<CSource>,
     /// Shared libraries of `embedded/fmu`, each for another platform: with one of them models for co-simulation are written too.
     pub fmu_libraries: Vec<Vec<u8>>,
     /// The same of `embedded/car_fmu`: models of the simulated car with its shift controller.

@@ -6,7 +6,7 @@ use ecu::{LEARNT_WORDS, status};
 use observer::Health;
 
 use crate::c_text::{comment, upper};
-use crate::{ExportedFilter, Image};
+use crate::{CSource, ExportedFilter, Image};
 
 /// `wetclutch.h`, the same for every car.
 pub(crate) fn library() -> String {
@@ -24,8 +24,22 @@ pub(crate) fn library() -> String {
         .replace("@LEARNT@", &LEARNT_WORDS.to_string())
 }
 
+/// The memory of the observer, bytes, and what it is.
+pub(crate) fn memory(image: &Image, c_source: Option<&CSource>) -> (usize, String) {
+    match c_source {
+        Some(source) => (
+            source.memory_bytes(image),
+            format!("enough for wetclutch.c, with its stack of {}, and for the library.", source.stack),
+        ),
+        None => (
+            image.memory_bytes,
+            "of a machine of 64 bits. One of 32 bits needs less: wetclutch_memory_size. For wetclutch.c export with --c.".to_owned(),
+        ),
+    }
+}
+
 /// The header of a car.
-pub(crate) fn of_car(filter: &ExportedFilter, image: &Image, memory_bytes: usize) -> String {
+pub(crate) fn of_car(filter: &ExportedFilter, image: &Image, c_source: Option<&CSource>) -> String {
     let (name, macros) = (&filter.name, upper(&filter.name));
     let mut places = String::new();
     for (at, element) in filter.elements().iter().enumerate() {
@@ -42,6 +56,7 @@ pub(crate) fn of_car(filter: &ExportedFilter, image: &Image, memory_bytes: usize
         );
     }
     let shifts: Vec<String> = filter.shifts().map(|shift| filter.shift_name(shift)).collect();
+    let (bytes, of) = memory(image, c_source);
     let mut text = String::new();
     let _ = write!(
         text,
@@ -49,8 +64,8 @@ pub(crate) fn of_car(filter: &ExportedFilter, image: &Image, memory_bytes: usize
          #ifndef WETCLUTCH_{macros}_H\n#define WETCLUTCH_{macros}_H\n\n#include \"wetclutch.h\"\n\n\
          #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
          /* Places of the elements in wetclutch_input.commands and wetclutch_estimate.element_pa, and of the gears. */\n{places}\n\
-         /* Memory of the observer, bytes: of a machine of 64 bits. One of 32 bits needs less: wetclutch_memory_size. */\n\
-         #define WETCLUTCH_{macros}_MEMORY_BYTES {}u\n\n\
+         /* Memory of the observer, bytes: {of} */\n\
+         #define WETCLUTCH_{macros}_MEMORY_BYTES {bytes}u\n\n\
          /* The parameters, all of them words of 32 bits: float, or uint32_t. The unit is in the comment. */\n\
          typedef struct {{\n{}}} wetclutch_{name}_parameters_t;\n\n\
          extern const wetclutch_{name}_parameters_t wetclutch_{name}_parameters;\n\n\
@@ -67,7 +82,6 @@ pub(crate) fn of_car(filter: &ExportedFilter, image: &Image, memory_bytes: usize
         comment(&shifts.join(", ")),
         env!("CARGO_PKG_VERSION"),
         filter.vehicle_sha256,
-        memory_bytes,
         image.members(filter),
         4 * image.words.len(),
     );

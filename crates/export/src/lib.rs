@@ -24,14 +24,13 @@ mod units;
 
 use config::CarFile;
 
-use crate::portable::Portable;
-
 pub use a2l::{Addresses, a2l};
 pub use elf::addresses;
 pub use error::ExportError;
 pub use exported_file::ExportedFile;
 pub use exported_filter::{ExportOptions, ExportedFilter};
 pub use parameters::{Entry, Image, Values};
+pub use portable::CSource;
 pub use shift_inputs::shift_inputs;
 
 /// The files of a car's observer.
@@ -41,8 +40,7 @@ pub use shift_inputs::shift_inputs;
 pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFile>, ExportError> {
     let filter = ExportedFilter::new(file, options)?;
     let image = Image::of(&filter)?;
-    let portable = options.c_source.as_deref().map(Portable::new).transpose()?;
-    let memory_bytes = portable.as_ref().map_or(image.memory_bytes, |of| of.memory_bytes(&image));
+    let c_source = options.c_source.as_ref();
     let addresses = match &options.program {
         Some(program) => addresses(program, &filter, &image)?,
         None => Addresses::default(),
@@ -51,20 +49,20 @@ pub fn export(file: &CarFile, options: &ExportOptions) -> Result<Vec<ExportedFil
     let name = &filter.name;
     let texts = [
         ("wetclutch.h".to_owned(), header::library()),
-        (format!("wetclutch_{name}.h"), header::of_car(&filter, &image, memory_bytes)),
+        (format!("wetclutch_{name}.h"), header::of_car(&filter, &image, c_source)),
         (format!("wetclutch_{name}_parameters.c"), image.c_source(&filter)),
         (format!("wetclutch_{name}_selftest.c"), test.c_source(&filter)),
         (format!("wetclutch_{name}.a2l"), a2l(&filter, &image, &addresses)),
         ("example.c".to_owned(), readme::example(name)),
         (format!("wetclutch_{name}_sfunction.c"), readme::sfunction(&filter)),
         ("certificate.md".to_owned(), certificate::certificate(&filter)),
-        ("report.md".to_owned(), readme::report(&filter, &image, &test, memory_bytes)),
+        ("report.md".to_owned(), readme::report(&filter, &image, &test, c_source)),
         ("README.md".to_owned(), readme::readme(&filter)),
     ];
     let mut files: Vec<_> = texts.into_iter().map(|(name, text)| ExportedFile::text(name, text)).collect();
     files.push(ExportedFile { name: format!("wetclutch_{name}_parameters.bin"), bytes: image.bytes() });
-    if let Some(portable) = portable {
-        files.push(ExportedFile { name: "wetclutch.c".to_owned(), bytes: portable.source.to_vec() });
+    if let Some(source) = c_source {
+        files.push(ExportedFile::text("wetclutch.c".to_owned(), source.text.clone()));
         files.push(ExportedFile::text("CMakeLists.txt".to_owned(), readme::cmake(name)));
     }
     if !options.fmu_libraries.is_empty() {

@@ -1,8 +1,9 @@
 //! What stands beside the code: how to build it, how large it is, an example.
 
 use crate::c_text::upper;
+use crate::header::memory;
 use crate::self_test::SelfTest;
-use crate::{ExportedFilter, Image};
+use crate::{CSource, ExportedFilter, Image};
 
 /// `example.c`.
 pub(crate) fn example(name: &str) -> String {
@@ -27,14 +28,15 @@ pub(crate) fn readme(filter: &ExportedFilter) -> String {
 }
 
 /// `report.md`: sizes, and what is compared.
-pub(crate) fn report(filter: &ExportedFilter, image: &Image, test: &SelfTest, memory_bytes: usize) -> String {
+pub(crate) fn report(filter: &ExportedFilter, image: &Image, test: &SelfTest, c_source: Option<&CSource>) -> String {
     let name = &filter.name;
+    let (memory, of_memory) = memory(image, c_source);
     let tables = filter.filter().tables;
     format!(
         "# Sizes and tests of the observer of \"{car}\"\n\n\
          | what | | of what it is |\n|---|---|---|\n\
          | parameters in flash | {image_bytes} bytes | `sizeof(wetclutch_{name}_parameters_t)`: {elements} elements, {gears} gears, {shifts} shifts |\n\
-         | memory of the observer | {memory} bytes | of a machine of 64 bits; on one of 32 bits `wetclutch_memory_size` returns less |\n\
+         | memory of the observer | {memory} bytes | {of_memory} |\n\
          | what is learnt, to be kept | {learnt} bytes | `sizeof(wetclutch_learnt)` |\n\
          | input and estimate | {input} and {estimate} bytes | `sizeof(wetclutch_input)`, `sizeof(wetclutch_estimate)` |\n\
          | self-test | {steps} steps of a simulated shift {shift} | every word of every estimate, by a checksum |\n\n\
@@ -45,7 +47,6 @@ pub(crate) fn report(filter: &ExportedFilter, image: &Image, test: &SelfTest, me
         elements = tables.elements.len(),
         gears = tables.gears.len(),
         shifts = tables.shifts.len(),
-        memory = memory_bytes,
         learnt = 4 * ecu::LEARNT_WORDS,
         input = size_of::<ecu::Input>(),
         estimate = size_of::<ecu::Estimate>(),

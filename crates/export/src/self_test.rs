@@ -32,12 +32,15 @@ pub(crate) struct SelfTest {
 }
 
 impl SelfTest {
-    /// The first shift of a filter that can be simulated.
+    /// The first shift of a filter that can be simulated, of upshifts first: the filter learns from these.
     pub(crate) fn of(filter: &ExportedFilter, image: &Image, sensors: Option<&Sensors>) -> Result<Self, ExportError> {
         let usual = config::ExperimentFile::bench().ok().and_then(|file| file.experiment.sensors);
         let failed = |shift, message| ExportError::SelfTest { shift: filter.shift_name(shift), message };
         let mut why = None;
-        for shift in filter.shifts() {
+        let ratio = |place: usize| filter.car.gearbox.gears.get(place).map_or(0.0, |gear| gear.ratio);
+        let is_upshift = |&[from, to]: &[usize; 2]| ratio(from) > ratio(to) && ratio(to) > 0.0;
+        let (upshifts, others): (Vec<_>, Vec<_>) = filter.shifts().partition(is_upshift);
+        for shift in upshifts.into_iter().chain(others) {
             let Some(sensors) = sensors.or(usual.as_ref()) else { break };
             match shift_inputs([&filter.car; 2], &filter.tables, shift, (sensors, 1)) {
                 Ok(inputs) => {

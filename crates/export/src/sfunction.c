@@ -6,7 +6,7 @@
  * |---|---|---|
  * | 1 | 7 | engine, turbine, output and wheel speed, rad/s; engine torque, N m; longitudinal acceleration, m/s^2; oil temperature, degC. Not a number (NaN) where no reading came |
  * | 2 | 7 | the age of each, s |
- * | 3 | @ELEMENTS@ | commands of the valves, A or %, by the places of the elements; NaN where none came |
+ * | 3 | @ELEMENTS@ | commands of the valves, A or %, by the places of the elements, as they are now; NaN where none came |
  * | 4 | 3 | places of the gear before and after, -1 neutral; 1 while the lock-up clutch carries torque |
  *
  * | output | width | what it is |
@@ -15,10 +15,13 @@
  * | 2 | 8 | lowest and highest pressure, Pa, and torque, N m, of the offgoing, then of the oncoming clutch; NaN without a range |
  * | 3 | 3 | status, health, phase of the shift (-1 none), as in wetclutch.h |
  * | 4 | @ELEMENTS@ | pressure of each element by the models of its valve and piston, Pa |
+ *
+ * The estimate of a step is that of its inputs, and each step changes the state: the block may not stand in an algebraic loop.
  */
 #define S_FUNCTION_NAME wetclutch_@CAR@_sfunction
 #define S_FUNCTION_LEVEL 2
 
+#include <float.h>
 #include <math.h>
 
 #include "simstruc.h"
@@ -32,6 +35,15 @@
 /* The memory of the observer: a work vector, so that Simulink saves and restores it with its own state. */
 #define MEMORY_WORDS ((int_T)((WETCLUTCH_@CAR_UPPER@_MEMORY_BYTES + 7u) / 8u))
 
+#define MDL_CHECK_PARAMETERS
+static void mdlCheckParameters(SimStruct *S)
+{
+  const real_T step_s = mxGetScalar(ssGetSFcnParam(S, 0));
+  if (!((step_s > 0.0) && (step_s <= 0.1))) {
+    ssSetErrorStatus(S, "the sample time must be above 0 and at most 0.1 s");
+  }
+}
+
 static void mdlInitializeSizes(SimStruct *S)
 {
   static const int_T inputs[4] = {READINGS, READINGS, ELEMENTS, 3};
@@ -41,6 +53,8 @@ static void mdlInitializeSizes(SimStruct *S)
   if (ssGetNumSFcnParams(S) != ssGetSFcnParamsCount(S)) {
     return; /* Simulink says so */
   }
+  /* It is called where a parameter changes, not for the first one. */
+  mdlCheckParameters(S);
   ssSetSFcnParamTunable(S, 0, 0);
   if (!ssSetNumInputPorts(S, 4) || !ssSetNumOutputPorts(S, 4)) {
     return;
@@ -63,17 +77,9 @@ static void mdlInitializeSampleTimes(SimStruct *S)
   ssSetOffsetTime(S, 0, 0.0);
 }
 
-#define MDL_CHECK_PARAMETERS
-static void mdlCheckParameters(SimStruct *S)
-{
-  const real_T step_s = mxGetScalar(ssGetSFcnParam(S, 0));
-  if (!(step_s > 0.0 && step_s <= 0.1)) {
-    ssSetErrorStatus(S, "the sample time must be above 0 and at most 0.1 s");
-  }
-}
-
-#define MDL_START
-static void mdlStart(SimStruct *S)
+/* At the start, and where a subsystem resets its states. */
+#define MDL_INITIALIZE_CONDITIONS
+static void mdlInitializeConditions(SimStruct *S)
 {
   const uint32_t status = wetclutch_init((uint64_t *)ssGetDWork(S, 0), (uint32_t)MEMORY_WORDS * 8u, WETCLUTCH_@CAR_UPPER@_IMAGE, WETCLUTCH_@CAR_UPPER@_IMAGE_BYTES);
   if (status != 0u) {
@@ -81,15 +87,27 @@ static void mdlStart(SimStruct *S)
   }
 }
 
+/* In single precision; what is too large there is infinite, and refused. */
+static float single_of(real_T value)
+{
+  return (fabs(value) <= (real_T)FLT_MAX) ? (float)value : ((value > 0.0) ? INFINITY : -INFINITY);
+}
+
 static wetclutch_reading reading_of(real_T value, real_T age_s)
 {
   wetclutch_reading reading = {0.0f, 0.0f, 0u};
   if (value == value) {
-    reading.value = (float)value;
-    reading.age_s = (float)age_s;
+    reading.value = single_of(value);
+    reading.age_s = (age_s == age_s) ? single_of(age_s) : 0.0f;
     reading.came = 1u;
   }
   return reading;
+}
+
+/* A place of a gear; what can be none is one that is in no table. */
+static int32_t gear_of(real_T value)
+{
+  return ((value >= -1.0) && (value <= 1000.0)) ? (int32_t)value : 1000;
 }
 
 static real_T if_given(float value, uint32_t is_given)
@@ -120,9 +138,9 @@ static void mdlOutputs(SimStruct *S, int_T tid)
   for (at = 0; at < ELEMENTS; at++) {
     input.commands[at] = reading_of(commands[at], 0.0);
   }
-  input.gear_from = (int32_t)gears[0];
-  input.gear_to = (int32_t)gears[1];
-  input.lock_up_applied = (gears[2] != 0.0) ? 1u : 0u;
+  input.gear_from = gear_of(gears[0]);
+  input.gear_to = gear_of(gears[1]);
+  input.lock_up_applied = (gears[2] > 0.5) ? 1u : 0u;
   (void)wetclutch_step((uint64_t *)ssGetDWork(S, 0), &input, &estimate);
   for (at = 0; at < 2; at++) {
     const wetclutch_clutch *const clutch = clutches[at];

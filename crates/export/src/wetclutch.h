@@ -1,6 +1,6 @@
 /* The gearbox filter of wetclutch on a transmission controller.
  *
- * Link with libwetclutch.a, or compile wetclutch.c. Nothing is allocated; there is no static data that is written, and may be used for several observers and
+ * Link with libwetclutch.a, or compile wetclutch.c. Nothing is allocated and no static data is written: it may be used for several observers and
  * from several tasks, if no two of them use the same memory at a time. Quantities are in SI units; a name ends in its unit.
  */
 #ifndef WETCLUTCH_H

@@ -5,7 +5,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use ecu::{Input, OwnedObserver};
-use export::{ExportOptions, Image, export};
+use export::{CSource, ExportOptions, Image, export};
 use observer::gearbox::ShiftInput;
 
 use crate::readings::{car_file, city, filter_of, root, sampled_shifts};
@@ -111,7 +111,7 @@ pub(crate) fn build(folder: &Path, code: Code, compiler: &str, options: &[&str],
 }
 
 pub(crate) fn exported(folder: &Folder, vehicle: &str) {
-    let c_source = portable().map(|path| std::fs::read(path).unwrap());
+    let c_source = portable().map(|path| CSource::new(std::fs::read(path).unwrap()).unwrap());
     for file in export(&car_file(vehicle), &ExportOptions { c_source, ..ExportOptions::default() }).unwrap() {
         std::fs::write(folder.0.join(file.name), file.bytes).unwrap();
     }

@@ -25,7 +25,7 @@ mod text;
 mod vehicle;
 mod words;
 
-pub use ::export::{ExportOptions, ExportedFile};
+pub use ::export::{CSource, ExportOptions, ExportedFile};
 pub use car::{Car, Drive, ElementId, ErrorBudget, Gear, GearId, Reading, Sensors, ShiftCommand, ShiftId, Step};
 pub use config::Source;
 pub use error::Error;

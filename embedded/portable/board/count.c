@@ -1,4 +1,4 @@
-/* Counts the instructions of a step on a Cortex-M4F in QEMU, over the readings of the self-test, after the self-test itself.
+/* Counts the instructions of a step on a Cortex-M4F in QEMU, over the readings of the self-test, and the stack of the task that it takes.
  *
  * With `-icount shift=6` every instruction takes 64 ns, and the system timer counts down at 25 MHz. It prints by semihosting; there is no
  * library of C behind it but memcpy, memmove and memset.
@@ -12,8 +12,13 @@
 wetclutch_estimate wetclutch_@CAR@_estimate;
 /* Also enough where the library is linked instead of wetclutch.c. */
 static uint64_t memory[1u << 17];
-static uint32_t counted, most;
+static uint32_t counted, most, learning, init;
 static uint64_t sum;
+/* A step that takes more learns from a shift. */
+#define LEARNING 100000u
+/* Below the stack of the caller, words. */
+#define PAINTED 32768u
+#define PAINT 0x5a5aa5a5u
 
 static int32_t semihosting(int32_t operation, const void *argument) {
   register int32_t r0 __asm__("r0") = operation;
@@ -47,19 +52,48 @@ uint32_t __wrap_wetclutch_step(uint64_t *place, const wetclutch_input *input, we
   const uint32_t instructions = ((before - TIMER[2]) & 0xffffffu) * 40u / 64u;
   counted++;
   sum += instructions;
+  learning += instructions > LEARNING;
   most = instructions > most ? instructions : most;
   return status;
 }
 
+uint32_t __real_wetclutch_init(uint64_t *place, uint32_t bytes, const uint32_t *image, uint32_t image_bytes);
+uint32_t __wrap_wetclutch_init(uint64_t *place, uint32_t bytes, const uint32_t *image, uint32_t image_bytes);
+uint32_t __wrap_wetclutch_init(uint64_t *place, uint32_t bytes, const uint32_t *image, uint32_t image_bytes) {
+  const uint32_t before = TIMER[2];
+  const uint32_t status = __real_wetclutch_init(place, bytes, image, image_bytes);
+  init = (uint32_t)((uint64_t)((before - TIMER[2]) & 0xffffffu) * 40u / 64u);
+  return status;
+}
+
+/* Writes the paint below the stack pointer, and finds how deep it has gone. */
+static volatile uint32_t *paint(void) {
+  volatile uint32_t *const here = (volatile uint32_t *)__builtin_frame_address(0);
+  uint32_t at;
+  for (at = 64u; at < PAINTED; at++) here[-(int32_t)at] = PAINT;
+  return here;
+}
+
+static uint32_t stack_of(const volatile uint32_t *here) {
+  uint32_t at = PAINTED - 1u;
+  while (at > 64u && here[-(int32_t)at] == PAINT) at--;
+  return 4u * at;
+}
+
 static void run(void) {
   int32_t wrong;
+  volatile uint32_t *here;
   TIMER[1] = 0xffffffu;
   TIMER[2] = 0u;
   TIMER[0] = 5u;
+  here = paint();
   wrong = wetclutch_@CAR@_selftest(memory, sizeof memory);
   say_number(wrong == 0 ? "self-test 0, steps" : "self-test failed, steps", counted);
   say_number("mean", (uint32_t)(sum / counted));
   say_number("most", most);
+  say_number("learning", learning);
+  say_number("init", init);
+  say_number("stack", stack_of(here));
   (void)semihosting(0x18, (const void *)0x20026);
   for (;;) {
   }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use trace::{ShownPath as _, WholeFile};
-use wetclutch::{ExportOptions, ExportedFile, VehicleFile, read_sensors};
+use wetclutch::{CSource, ExportOptions, ExportedFile, VehicleFile, read_sensors};
 
 use super::{not_an_input, replaceable, warn_without_effect};
 use crate::args::Export;
@@ -34,6 +34,12 @@ pub(crate) fn export(options: &Export) -> Result<(), Failure> {
         )?;
     }
     write_all(&options.output, &files)?;
+    if options.c.is_none() && options.output.join("wetclutch.c").exists() {
+        output::note(
+            "warning: wetclutch.c in the folder is of an earlier export, and the memory in the header is that of the library\n\
+             hint: export again with --c to use it, or remove it with CMakeLists.txt",
+        );
+    }
     if options.json {
         let object = |file: &ExportedFile| json!({ "path": options.output.join(&file.name).shown().to_string(), "bytes": file.bytes.len() });
         return output::json(&json!({ "files": files.iter().map(object).collect::<Vec<_>>() }));
@@ -67,12 +73,10 @@ fn read_library(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// The C of the observer.
-fn read_c(path: &Path) -> Result<Vec<u8>, Failure> {
-    read_linked(
-        path,
-        "wetclutch.c",
-        "it is in the archive of each release; embedded/portable/build makes it from the sources",
-    )
+fn read_c(path: &Path) -> Result<CSource, Failure> {
+    let hint = "it is in the archive of each release; embedded/portable/build makes it from the sources";
+    let source = read_linked(path, "wetclutch.c", hint)?;
+    CSource::new(source).map_err(|error| named(path, Failure::Input(error.to_string())))
 }
 
 /// What a linker wrote.

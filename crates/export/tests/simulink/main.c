@@ -17,16 +17,24 @@ int main(int count, char **names) {
   wetclutch_input input;
   int steps = 0, given = 0, ranges = 0, different = 0, at;
   if (from == NULL) return 1;
-  block.parameter.value = 0.0;
-  mdlCheckParameters(&block);
+  block.parameter.value = 0.5;
+  mdlInitializeSizes(&block);
   if (block.error == NULL) return 2;
   block.error = NULL;
   block.parameter.value = (real_T)0.01f;
   mdlInitializeSizes(&block);
   mdlInitializeSampleTimes(&block);
-  mdlCheckParameters(&block);
   block.work = calloc((size_t)block.work_width, sizeof(real_T));
-  mdlStart(&block);
+  mdlInitializeConditions(&block);
+  for (at = 0; at < READINGS; at++) {
+    block.input[0][at] = at % 2 == 0 ? 1e300 : (real_T)NAN;
+    block.input[1][at] = -1e300;
+  }
+  for (at = 0; at < 3; at++) block.input[3][at] = at == 0 ? 1e12 : (real_T)NAN;
+  mdlOutputs(&block, 0);
+  at = WETCLUTCH_STATUS_GEAR_REFUSED | WETCLUTCH_STATUS_READING_REFUSED;
+  if (((int)block.output[2][0] & at) != at || block.output[0][0] == block.output[0][0]) return 6;
+  mdlInitializeConditions(&block);
   if (block.error != NULL || block.sample_time_s != block.parameter.value || block.inputs != 4 || block.outputs != 4) return 3;
   if (wetclutch_init(beside, sizeof beside, WETCLUTCH_@CAR_UPPER@_IMAGE, WETCLUTCH_@CAR_UPPER@_IMAGE_BYTES) != 0u) return 4;
   while (fread(&input, sizeof input, 1, from) == 1) {
