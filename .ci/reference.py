@@ -297,7 +297,10 @@ def columns():
     out.mkdir(parents=True)
     drive = (ROOT / "drives/city.toml").read_text()
     (WORK / "drives").mkdir(exist_ok=True)
-    (WORK / "drives" / "town.toml").write_text(drive.replace("repetitions = 20", "repetitions = 1"))
+    # With all sensors that there are: those of the bench, and an accelerometer.
+    bench = (ROOT / "experiments/bench.toml").read_text()
+    sensors = bench[bench.index("[sensors]") : bench.index("[[observer]]")] + "[sensors.acceleration]\nnoise_m_s2 = 0.05\n"
+    (WORK / "drives" / "town.toml").write_text(drive.replace("repetitions = 20", "repetitions = 1") + "\n" + sensors)
     demo, car = ROOT / "vehicles/two_speed_at.toml", ROOT / "vehicles/eight_speed.toml"
     steps = [
         ("demo", "-o", str(out / "demo")),
@@ -320,7 +323,7 @@ def columns():
         ("`simulate`, car of one shift", "demo/trace.csv"),
     ]
     page = [HEAD, "# Columns of the outputs\n"]
-    page.append("Units are in the names ([suffixes](conventions.md#units)). `NAME` is an element of the gearbox in lower case. How they come about: [outputs of `estimate`](estimates.md).")
+    page.append("Units are in the names ([suffixes](conventions.md#units)). `NAME` is an element of the gearbox in lower case. How they come about: [outputs of `estimate`](estimates.md). The columns of an accelerometer are there where the log or the drive has one.")
     unknown = []
     for title, name in tables:
         page += ["", f"## {title}", "", "| column | |", "|---|---|"]
