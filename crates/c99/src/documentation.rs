@@ -98,11 +98,7 @@ fn without_targets(line: &str) -> String {
 
 /// The type of `impl<T> Type<T> {` and of `impl Trait for Type {`.
 fn type_of_block(line: &str) -> Option<String> {
-    let line = line
-        .split(" for ")
-        .last()?
-        .split_once(" where")
-        .map_or_else(|| line.split(" for ").last(), |(of, _)| Some(of))?;
+    let line = line.split(" where").next()?.rsplit(" for ").next()?;
     let mut words = String::new();
     let mut depth = 0_i32;
     for character in line.chars() {

@@ -144,8 +144,8 @@ impl Names {
 
     /// This name, with a number behind it if it is taken.
     pub(crate) fn take(&mut self, name: &str) -> String {
-        let free = (1..).map(|number| if number == 1 { name.to_owned() } else { format!("{name}_{number}") });
-        let name = free.into_iter().find(|name| !self.taken.contains(name)).unwrap_or_default();
+        let mut names = (1..).map(|number| if number == 1 { name.to_owned() } else { format!("{name}_{number}") });
+        let name = names.find(|name| !self.taken.contains(name)).unwrap_or_default();
         self.taken.insert(name.clone());
         name
     }

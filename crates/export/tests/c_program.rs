@@ -87,11 +87,12 @@ fn codes() -> Vec<Code> {
     all.into_iter().filter(|code| *code == Code::Library || portable().is_some()).collect()
 }
 
-/// Compilers that are there.
+/// Compilers that are there; `cc` is one of the others where there is one.
 fn compilers() -> Vec<&'static str> {
     let is_there =
         |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
-    ["gcc", "clang", "cc"].into_iter().filter(is_there).take(2).collect()
+    let named: Vec<_> = ["gcc", "clang"].into_iter().filter(is_there).collect();
+    if named.is_empty() { vec!["cc"] } else { named }
 }
 
 pub(crate) fn build(folder: &Path, code: Code, compiler: &str, options: &[&str], main: &str, car: &str) {
