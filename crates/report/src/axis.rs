@@ -21,6 +21,9 @@ const RANGE_ROOM: f64 = 0.35;
 /// Part of a step by which a value may lie beyond the end of an axis: less than a stroke is wide.
 const SLACK: f64 = 0.02;
 
+/// So many ticks have no axis.
+const MAX_TICKS: f64 = 100.0;
+
 /// Values from here on are written with an exponent.
 const LARGE: f64 = 1e6;
 
@@ -97,6 +100,14 @@ fn short(value: f64) -> String {
 pub(crate) fn nice_step(minimum: f64) -> f64 {
     let power = Real::powf(10.0, Real::log10(minimum).floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|&step| step >= minimum * 0.999).unwrap_or(minimum)
+}
+
+/// The multiples of a step from `low` to `high`.
+pub(crate) fn ticks(low: f64, high: f64, step: f64) -> Vec<f64> {
+    let [first, last] = [(low / step - SLACK).ceil(), (high / step + SLACK).floor()];
+    // A step that is too short for the values has no end.
+    let count = if last - first <= MAX_TICKS { (last - first) as usize + 1 } else { 0 };
+    if last < first { Vec::new() } else { (0..count).map(|n| (first + n as f64) * step).collect() }
 }
 
 /// Decimals that tell multiples of a step apart.

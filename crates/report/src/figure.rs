@@ -4,23 +4,13 @@
 //! panels and named above the first. Margins and heights follow from the names, so that none is cut.
 
 use std::borrow::Cow;
-use std::sync::Arc;
-
-use kuva::backend::svg::SvgBackend;
-use kuva::plot::line::LinePlot;
-use kuva::plot::{BandPlot, LineStyle};
-use kuva::render::annotations::ShadedRegion;
-use kuva::render::color::Color;
-use kuva::render::layout::{Layout, TickFormat};
-use kuva::render::plots::Plot;
-use kuva::render::render::{Primitive, Scene, TextAnchor, render_multiple};
 
 pub use crate::axis::Axis;
-use crate::axis::{Scale, decimals, nice_step};
-use crate::legend::{Entry, Key, LABEL_SIZE, LINE, broken, placed, width};
+use crate::axis::{Scale, decimals, nice_step, ticks};
+use crate::drawing::{Anchor, Drawing, Fill, Letters, Pen, TEXT};
+use crate::legend::{Entry, Key, LINE, broken, placed, width};
 pub use crate::palette::{Stroke, Weight};
 use crate::simplified::{simplified, simplified_range};
-use crate::svg_text::numbered;
 
 const WIDTH: f64 = 900.0;
 const TOP: f64 = 8.0;
@@ -35,15 +25,22 @@ const GAP: f64 = 8.0;
 const KEY: f64 = 26.0;
 /// Width of the ticks of an axis and of the gap to their labels.
 const TICKS: f64 = 14.0;
-const TICK_SIZE: u32 = 12;
+/// Length of a tick.
+const MARK: f64 = 5.0;
+/// Labels of ticks.
+const TICK: Letters = Letters { size: 12, ..Letters::label(TEXT) };
 /// Distance of the ticks of a value axis, about, pixels.
 const TICK_DISTANCE: f64 = 34.0;
 /// Distance from a curve within which its points may be left out, pixels.
 const TOLERANCE: f64 = 0.15;
-/// Opacity of a shaded range.
+/// Opacity of a shaded range, and of a span of the common axis.
 const RANGE_OPACITY: f64 = 0.16;
-pub(crate) const TEXT: &str = "#222222";
-pub(crate) const FONT: &str = "Helvetica, Arial, 'Liberation Sans', sans-serif";
+const SPAN_OPACITY: f64 = 0.45;
+const GRID: Pen<'_> = Pen { colour: "#CCCCCC", width: 0.5, dash: None };
+const EDGE: Pen<'_> = Pen { colour: "#000000", width: 0.8, dash: None };
+/// Colours of the names of spans, and of remarks.
+const SPAN_NAME: &str = "#444444";
+const REMARK: &str = "#666666";
 
 /// One curve.
 #[derive(Debug, Clone)]
@@ -129,14 +126,19 @@ struct Margins {
     right: f64,
 }
 
+/// Where a panel lies, and its axes.
+struct Frame {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+    x_range: (f64, f64),
+    scale: Scale,
+}
+
 impl Figure {
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
-        numbered(&self.drawing())
-    }
-
-    /// The same with clip paths that no other figure of this process has: a part of a page, which numbers them ([`numbered`]).
-    pub(crate) fn drawing(&self) -> String {
         self.in_shown_units().drawn()
     }
 
@@ -146,18 +148,15 @@ impl Figure {
             left: panels.iter().map(Placed::left).fold(0.0, f64::max),
             right: panels.iter().map(Placed::right).fold(0.0, f64::max),
         };
-        let whole = |panel: &Placed<'_>| panel.height + TOP + BOTTOM;
         let names = if self.spans.iter().any(|span| !span.label.is_empty()) { NAMES } else { 0.0 };
-        let height = names + panels.iter().map(whole).sum::<f64>() + AXIS;
-        let mut scene = Scene::new(WIDTH, height);
-        scene.font_family = Some(FONT.to_owned());
+        let mut drawing = Drawing::default();
         let mut y = names;
         for (i, panel) in panels.iter().enumerate() {
-            self.draw(&mut scene, panel, &margins, y, i + 1 == panels.len());
-            y += whole(panel);
+            self.draw(&mut drawing, panel, &margins, y + TOP, i + 1 == panels.len());
+            y += TOP + panel.height + BOTTOM;
         }
-        self.name_spans(&mut scene, &margins);
-        document(&scene)
+        self.name_spans(&mut drawing, &margins);
+        drawing.document(WIDTH, y + AXIS)
     }
 
     fn place<'a>(&self, panel: &'a Panel) -> Placed<'a> {
@@ -196,118 +195,111 @@ impl Figure {
     }
 
     /// The phases' names over their middles, moved right where they would touch.
-    fn name_spans(&self, scene: &mut Scene, margins: &Margins) {
+    fn name_spans(&self, drawing: &mut Drawing, margins: &Margins) {
         let (from, to) = self.x_range;
         let mut free = margins.left;
         for span in self.spans.iter().filter(|span| !span.label.is_empty()) {
             let middle = ((span.start + span.end) / 2.0 - from) / (to - from);
             let half = width(&span.label) / 2.0;
             let x = (margins.left + middle * (WIDTH - margins.left - margins.right)).max(free + half);
-            scene.add(text(x, NAMES - 4.0, &span.label, "#444444", TextAnchor::Middle));
+            drawing.text((x, NAMES - 4.0), &span.label, Anchor::Middle, Letters::label(SPAN_NAME));
             free = x + half + GAP;
         }
     }
 
-    fn draw(&self, scene: &mut Scene, placed: &Placed<'_>, margins: &Margins, y: f64, last: bool) {
-        let bottom = if last { AXIS } else { BOTTOM };
-        let panel_scene = render_multiple(placed.plots(), self.layout(placed, margins, bottom, last));
-        scene.add(Primitive::GroupStart {
-            transform: Some(format!("translate(0,{y})")),
-            title: None,
-            extra_attrs: None,
-        });
-        scene.elements.extend(panel_scene.elements);
-        scene.defs.extend(panel_scene.defs);
-        scene.add(Primitive::GroupEnd);
-
+    fn draw(&self, drawing: &mut Drawing, placed: &Placed<'_>, margins: &Margins, top: f64, last: bool) {
+        let frame = Frame {
+            left: margins.left,
+            right: WIDTH - margins.right,
+            top,
+            bottom: top + placed.height,
+            x_range: self.x_range,
+            scale: placed.scale,
+        };
+        self.draw_axes(drawing, placed, &frame, last);
+        for span in &self.spans {
+            let [start, end] = [span.start, span.end].map(|end| frame.x(end.clamp(self.x_range.0, self.x_range.1)));
+            let fill = Fill { colour: span.colour, opacity: SPAN_OPACITY };
+            drawing.rectangle((start, top), (end - start, placed.height), fill);
+        }
+        placed.draw_curves(drawing, &frame);
         let lines = placed.y_label();
         for (n, line) in lines.iter().enumerate() {
-            let x = margins.left - placed.ticks() - LINE * (lines.len() - n) as f64 + 11.0;
-            scene.add(Primitive::Text {
-                x,
-                y: y + TOP + placed.height / 2.0,
-                content: line.clone(),
-                size: LABEL_SIZE,
-                anchor: TextAnchor::Middle,
-                rotate: Some(-90.0),
-                bold: false,
-                color: Some(Color::from(TEXT)),
-            });
+            let x = frame.left - placed.ticks() - LINE * (lines.len() - n) as f64 + 11.0;
+            let letters = Letters { upright: true, ..Letters::label(TEXT) };
+            drawing.text((x, top + placed.height / 2.0), line, Anchor::Middle, letters);
         }
-        if last {
-            let middle = (margins.left + WIDTH - margins.right) / 2.0;
-            scene.add(text(middle, y + TOP + placed.height + 36.0, &self.x_label, TEXT, TextAnchor::Middle));
-        }
-        let top = y + TOP;
-        for (at, entry) in self::placed(placed.legend(top), top, top + placed.height) {
-            draw_entry(scene, &entry, WIDTH - margins.right + GAP, at);
+        for (at, entry) in self::placed(placed.legend(top), top, frame.bottom) {
+            draw_entry(drawing, &entry, frame.right + GAP, at);
         }
     }
 
-    fn layout(&self, placed: &Placed<'_>, margins: &Margins, bottom: f64, last: bool) -> Layout {
-        let (from, to) = self.x_range;
+    /// The grid, the edges with their ticks, and below the last panel the common axis.
+    fn draw_axes(&self, drawing: &mut Drawing, placed: &Placed<'_>, frame: &Frame, last: bool) {
+        let &Frame { left, right, top, bottom, x_range: (from, to), scale } = frame;
         let x_step = nice_step((to - from) / 7.0);
-        let scale = placed.scale;
-        let mut layout = Layout::new((from, to), (scale.low, scale.high))
-            .with_width(WIDTH)
-            .with_height(TOP + placed.height + bottom)
-            .with_force_margins(margins.left, margins.right)
-            .with_force_margins_y(TOP, bottom)
-            .with_x_axis_min(from)
-            .with_x_axis_max(to)
-            .with_y_axis_min(scale.low)
-            .with_y_axis_max(scale.high)
-            .with_y_tick_step(scale.step)
-            .with_x_tick_step(x_step)
-            .with_x_tick_format(TickFormat::Fixed(decimals(x_step)))
-            .with_y_tick_format(TickFormat::Custom(Arc::new(move |value| scale.text(value))))
-            .with_tick_size(TICK_SIZE)
-            .with_label_size(LABEL_SIZE)
-            .with_grid_line_width(0.5)
-            .with_axis_line_width(0.8);
-        if placed.is_unmarked() {
-            layout = layout.with_y_tick_format(TickFormat::Custom(Arc::new(|_| String::new())));
+        let x_ticks: Vec<f64> = ticks(from, to, x_step);
+        let y_ticks = if placed.is_unmarked() { Vec::new() } else { ticks(scale.low, scale.high, scale.step) };
+        let upright = x_ticks.iter().map(|&x| [(frame.x(x), top), (frame.x(x), bottom)]);
+        let level = y_ticks.iter().map(|&y| [(left, frame.y(y)), (right, frame.y(y))]);
+        let grid: Vec<_> = upright.chain(level).collect();
+        drawing.lines(grid.iter().map(<[_; 2]>::as_slice), GRID);
+        drawing.line(&[(left, top), (left, bottom), (right, bottom)], EDGE);
+        let mut marks: Vec<_> = y_ticks.iter().map(|&y| [(left - MARK, frame.y(y)), (left, frame.y(y))]).collect();
+        for &y in &y_ticks {
+            let place = (left - MARK - 3.0, frame.y(y) + 4.4);
+            drawing.text(place, &scale.text(y), Anchor::End, TICK);
         }
-        layout.suppress_x_ticks = !last;
-        layout.show_legend = false;
-        for span in &self.spans {
-            let (start, end) = (span.start.max(from), span.end.min(to));
-            layout = layout
-                .with_shaded_region(ShadedRegion::vertical(start, end).with_color(span.colour).with_opacity(0.45));
+        if last {
+            marks.extend(x_ticks.iter().map(|&x| [(frame.x(x), bottom), (frame.x(x), bottom + MARK)]));
+            for &x in &x_ticks {
+                let label = format!("{x:.*}", decimals(x_step));
+                drawing.text((frame.x(x), bottom + 17.0), &label, Anchor::Middle, TICK);
+            }
+            let place = ((left + right) / 2.0, bottom + 36.0);
+            drawing.text(place, &self.x_label, Anchor::Middle, Letters::label(TEXT));
         }
-        layout
+        drawing.lines(marks.iter().map(<[_; 2]>::as_slice), EDGE);
+    }
+}
+
+impl Frame {
+    /// Where a value of the common axis stands.
+    fn x(&self, value: f64) -> f64 {
+        let (from, to) = self.x_range;
+        self.left + (value - from) / (to - from) * (self.right - self.left)
+    }
+
+    /// Where a value of the panel's axis stands.
+    fn y(&self, value: f64) -> f64 {
+        let Scale { low, high, .. } = self.scale;
+        self.bottom - (value - low) / (high - low) * (self.bottom - self.top)
+    }
+
+    fn place(&self, points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+        points.iter().map(|&(x, value)| (self.x(x), self.y(value))).collect()
     }
 }
 
 impl Placed<'_> {
-    fn plots(&self) -> Vec<Plot> {
+    /// The ranges, and over them the curves, the strongest last.
+    fn draw_curves(&self, drawing: &mut Drawing, frame: &Frame) {
         let Scale { low, high, .. } = self.scale;
-        // Without any plot there would be no axes.
-        let mut plots = vec![Plot::Line(LinePlot::new())];
         for (band, [lower, upper]) in self.panel.bands.iter().zip(&self.ranges) {
             for (lower, upper) in pieces(lower).into_iter().zip(pieces(upper)) {
-                let clamped = |ends: &[(f64, f64)]| ends.iter().map(|p| p.1.clamp(low, high)).collect::<Vec<_>>();
-                plots.push(Plot::Band(
-                    BandPlot::new(lower.iter().map(|p| p.0), clamped(&lower), clamped(&upper))
-                        .with_color(band.colour)
-                        .with_opacity(RANGE_OPACITY),
-                ));
+                let around: Vec<_> =
+                    (upper.iter().chain(lower.iter().rev())).map(|&(x, end)| (x, end.clamp(low, high))).collect();
+                drawing.area(&frame.place(&around), Fill { colour: band.colour, opacity: RANGE_OPACITY });
             }
         }
         let mut order: Vec<usize> = (0..self.visible.len()).rev().collect();
         order.sort_by_key(|&n| self.panel.series[n].stroke.weight);
-        // Coordinates of a diverged curve would be beyond what a viewer can draw; the panel's edge cuts these as well.
-        let far = |value: f64| value.clamp(low - (high - low), high + (high - low));
         for n in order {
-            let Stroke { colour, weight, dash } = self.panel.series[n].stroke;
-            let style = dash.map_or(LineStyle::Solid, |dash| LineStyle::Custom(dash.into()));
-            for piece in pieces(&self.visible[n]) {
-                let data = piece.into_iter().map(|(x, value)| (x, far(value)));
-                let line = LinePlot::new().with_data(data).with_color(colour).with_line_style(style.clone());
-                plots.push(Plot::Line(line.with_stroke_width(weight.width())));
+            let parts: Vec<_> = within(&self.visible[n], low, high).iter().map(|part| frame.place(part)).collect();
+            if !parts.is_empty() {
+                drawing.lines(parts.iter().map(Vec::as_slice), self.panel.series[n].stroke.pen());
             }
         }
-        plots
     }
 
     /// The entries of the legend of a panel whose upper edge is at `top`.
@@ -357,40 +349,19 @@ impl Placed<'_> {
     }
 }
 
-/// The scene as an SVG document that scales with the page around it.
-pub(crate) fn document(scene: &Scene) -> String {
-    let svg = SvgBackend::new().render_scene(scene);
-    svg.replacen("<svg ", &format!("<svg viewBox=\"0 0 {} {}\" ", scene.width, scene.height), 1)
-}
-
-fn draw_entry(scene: &mut Scene, entry: &Entry, x: f64, top: f64) {
+fn draw_entry(drawing: &mut Drawing, entry: &Entry, x: f64, top: f64) {
     let middle = top + LINE / 2.0;
     match entry.key {
-        Key::Stroke(stroke) => scene.add(Primitive::Line {
-            x1: x,
-            y1: middle,
-            x2: x + KEY,
-            y2: middle,
-            stroke: Color::from(stroke.colour),
-            stroke_width: stroke.weight.width(),
-            stroke_dasharray: stroke.dash.map(str::to_owned),
-        }),
-        Key::Range(colour) => scene.add(Primitive::Rect {
-            x,
-            y: middle - 5.0,
-            width: KEY,
-            height: 10.0,
-            fill: Color::from(colour),
-            stroke: None,
-            stroke_width: None,
-            opacity: Some(RANGE_OPACITY),
-        }),
+        Key::Stroke(stroke) => drawing.line(&[(x, middle), (x + KEY, middle)], stroke.pen()),
+        Key::Range(colour) => {
+            drawing.rectangle((x, middle - 5.0), (KEY, 10.0), Fill { colour, opacity: RANGE_OPACITY });
+        }
         Key::Remark => {}
     }
-    let colour = if entry.key == Key::Remark { "#666666" } else { TEXT };
+    let colour = if entry.key == Key::Remark { REMARK } else { TEXT };
     for (n, line) in entry.lines.iter().enumerate() {
         let y = middle + 4.5 + LINE * n as f64;
-        scene.add(text(x + KEY + GAP, y, line, colour, TextAnchor::Start));
+        drawing.text((x + KEY + GAP, y), line, Anchor::Start, Letters::label(colour));
     }
 }
 
@@ -405,17 +376,25 @@ fn pieces(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     points.split(|(_, v)| !v.is_finite()).filter(|piece| piece.len() > 1).map(<[_]>::to_vec).collect()
 }
 
-fn text(x: f64, y: f64, content: &str, colour: &str, anchor: TextAnchor) -> Primitive {
-    Primitive::Text {
-        x,
-        y,
-        content: content.to_owned(),
-        size: LABEL_SIZE,
-        anchor,
-        rotate: None,
-        bold: false,
-        color: Some(Color::from(colour)),
+/// The parts of a curve between two values; its lines end where they cross these.
+fn within(points: &[(f64, f64)], low: f64, high: f64) -> Vec<Vec<(f64, f64)>> {
+    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
+    for line in points.windows(2) {
+        let (from, to) = (line[0], line[1]);
+        let is_finite = from.1.is_finite() && to.1.is_finite();
+        if !is_finite || from.1.max(to.1) < low || from.1.min(to.1) > high {
+            continue;
+        }
+        let cut = |end: (f64, f64)| {
+            let value = end.1.clamp(low, high);
+            if value == end.1 { end } else { (from.0 + (value - from.1) / (to.1 - from.1) * (to.0 - from.0), value) }
+        };
+        match parts.last_mut().filter(|part| part.last() == Some(&cut(from))) {
+            Some(part) => part.push(cut(to)),
+            None => parts.push(vec![cut(from), cut(to)]),
+        }
     }
+    parts
 }
 
 #[cfg(test)]
@@ -467,10 +446,9 @@ mod tests {
             line("rival", Weight::Rival, along(3.0)),
         ];
         let figure = figure(series, Axis::All);
-        let widths: Vec<f64> = (figure.place(&figure.panels[0]).plots().into_iter().skip(1))
-            .map(|plot| if let Plot::Line(line) = plot { line.stroke_width } else { f64::NAN })
-            .collect();
-        assert_eq!(widths, [Weight::Rival, Weight::Main, Weight::Truth].map(Weight::width));
+        let svg = figure.svg();
+        let at = |weight: Weight| svg.find(&format!("stroke-width=\"{}\"", weight.width())).unwrap();
+        assert!(at(Weight::Rival) < at(Weight::Main) && at(Weight::Main) < at(Weight::Truth), "{svg}");
     }
 
     #[test]
@@ -478,10 +456,25 @@ mod tests {
         let wild = line("sliding", Weight::Rival, vec![(0.0, 0.1), (0.5, -3e10), (1.0, f64::INFINITY)]);
         let truth = line("true", Weight::Truth, vec![(0.0, 0.0), (1.0, 0.3)]);
         let figure = figure(vec![truth, wild], Axis::Within(-0.2, 0.5));
-        assert!(figure.svg().contains("axis ends at -0.2"));
-        for plot in figure.place(&figure.panels[0]).plots() {
-            let Plot::Line(line) = plot else { continue };
-            assert!(line.data.iter().all(|point| (-1.0..1.0).contains(&point.y)), "coordinates that a viewer can draw");
+        let svg = figure.svg();
+        assert!(svg.contains("axis ends at -0.2"));
+        let height: f64 = svg.split("viewBox=\"0 0 900 ").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
+        for path in svg.split(" d=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
+            for point in path.split(['M', 'L', 'Z']).filter(|point| !point.is_empty()) {
+                let y: f64 = point.split_once(' ').unwrap().1.parse().unwrap();
+                assert!((0.0..height).contains(&y), "a line ends where it leaves the panel: {path}");
+            }
         }
+    }
+
+    #[test]
+    fn a_curve_ends_where_it_leaves_the_panel_and_begins_where_it_comes_back() {
+        let points = [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0), (3.0, 0.0), (4.0, f64::NAN), (5.0, 1.0), (6.0, 2.0)];
+        let expected = [vec![(0.0, 1.0), (0.5, 2.0)], vec![(2.5, 2.0), (3.0, 0.0)], vec![(5.0, 1.0), (6.0, 2.0)]];
+        assert_eq!(within(&points, 0.0, 2.0), expected);
+        // Through the whole panel, along its edge, and beyond it.
+        assert_eq!(within(&[(0.0, -1.0), (1.0, 3.0)], 0.0, 2.0), [[(0.25, 0.0), (0.75, 2.0)]]);
+        assert_eq!(within(&[(0.0, 2.0), (1.0, 2.0), (2.0, 2.0)], 0.0, 2.0), [[(0.0, 2.0), (1.0, 2.0), (2.0, 2.0)]]);
+        assert!(within(&[(0.0, 3.0), (1.0, 1e300)], 0.0, 2.0).is_empty() && within(&[(0.0, 1.0)], 0.0, 2.0).is_empty());
     }
 }

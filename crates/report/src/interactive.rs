@@ -6,7 +6,6 @@ use minijinja::Value;
 use serde::Serialize;
 
 use crate::figure::{Axis, Figure, Panel};
-use crate::svg_text::compact;
 
 /// Bytes of the figures of shifts in a page, and of the drawings among them. The rest of a page takes less than one megabyte, and a page
 /// stays below five.
@@ -122,11 +121,8 @@ impl Figure {
     fn markup(&self, drawn: bool) -> String {
         // A name may hold the end of a script.
         let data = self.json().replace('<', "\\u003c");
-        let drawing = if drawn {
-            compact(&self.drawing())
-        } else {
-            "<p>This figure needs a browser that runs scripts.</p>".to_owned()
-        };
+        let drawing =
+            if drawn { self.svg() } else { "<p>This figure needs a browser that runs scripts.</p>".to_owned() };
         format!(
             "<div class=\"figure\"><script type=\"application/json\">{data}</script><noscript>{drawing}</noscript></div>"
         )

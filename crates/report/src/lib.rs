@@ -4,6 +4,7 @@
 
 mod axis;
 pub mod car_sensitivity_page;
+mod drawing;
 pub mod drive_page;
 pub mod figure;
 pub mod fit_page;
@@ -26,7 +27,6 @@ mod shown_figure;
 mod simplified;
 pub mod speeds_page;
 pub mod study_page;
-mod svg_text;
 pub mod tables;
 mod words;
 

@@ -9,7 +9,6 @@ use trace::shown_units::sentence;
 use trace::units::mpa;
 
 use crate::shift_figure::{drive_figure, page_figure, shift_figure};
-use crate::svg_text::numbered;
 use crate::tables::{compliant_certificates, phase_name, quality_rows, rigid_certificates, score_rows};
 
 /// Why a page could not be made.
@@ -64,7 +63,7 @@ const SCRIPT: &str = concat!(
 
 /// A page from its template, with the scripts of its figures and tables.
 pub(crate) fn render(template: &str, context: Value) -> Result<String, PageError> {
-    let html = numbered(&templates()?.get_template(template)?.render(context)?);
+    let html = templates()?.get_template(template)?.render(context)?;
     let has_figures = html.contains("<div class=\"figure\">");
     let plots =
         if has_figures { format!("<style>{PLOTS_STYLE}</style>\n<script>{PLOTS}</script>\n") } else { String::new() };

@@ -6,6 +6,8 @@
 
 use car::{GainMethod, ObserverEntry, ObserverKind};
 
+use crate::drawing::Pen;
+
 /// Black: the truth of the main quantity.
 const BLACK: &str = "#000000";
 /// The open loop, and signals beside the main quantity.
@@ -66,6 +68,10 @@ pub struct Stroke {
 }
 
 impl Stroke {
+    pub(crate) fn pen(&self) -> Pen<'_> {
+        Pen { colour: self.colour, width: self.weight.width(), dash: self.dash }
+    }
+
     /// The truth of the main quantity of a panel.
     pub const TRUTH: Self = Self { colour: BLACK, weight: Weight::Truth, dash: None };
     /// A signal.

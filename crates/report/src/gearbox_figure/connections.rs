@@ -2,7 +2,8 @@
 
 use geartrain::Member;
 use geartrain::{Connection, ElementKind, GearTrain};
-use kuva::render::render::TextAnchor;
+
+use crate::drawing::Anchor;
 
 use super::canvas::{Canvas, Tone, text_width};
 use super::layout::{ARROW, Column, LABEL, Layout, ROW, labels, members};
@@ -60,7 +61,7 @@ fn draw_shaft(canvas: &mut Canvas, train: &GearTrain, layout: &Layout, shaft: us
     let to = if is_output { layout.right } else { to };
     canvas.line((layout.left, y), (layout.right, y), Tone::Guide);
     canvas.line((from, y), (to, y), Tone::Dark);
-    canvas.text((layout.left - 6.0, y + MIDDLE), member_name(train, member), TextAnchor::End, Tone::Dark);
+    canvas.text((layout.left - 6.0, y + MIDDLE), member_name(train, member), Anchor::End, Tone::Dark);
     if is_input {
         arrow(canvas, layout.left - 6.0 - text_width(member_name(train, member), false) - 8.0, y, "input");
     }
@@ -75,7 +76,7 @@ fn arrow(canvas: &mut Canvas, x: f64, y: f64, label: &str) {
     canvas.line((start, y), (x, y), Tone::Dark);
     canvas.line((x - 6.0, y - 4.0), (x, y), Tone::Dark);
     canvas.line((x - 6.0, y + 4.0), (x, y), Tone::Dark);
-    canvas.text((start, y - 7.0), label, TextAnchor::Start, Tone::Dark);
+    canvas.text((start, y - 7.0), label, Anchor::Start, Tone::Dark);
 }
 
 fn draw_housing(canvas: &mut Canvas, train: &GearTrain, layout: &Layout) {
@@ -86,7 +87,7 @@ fn draw_housing(canvas: &mut Canvas, train: &GearTrain, layout: &Layout) {
         canvas.line((x, y), (x - 8.0, y + 8.0), Tone::Open);
         x += 10.0;
     }
-    canvas.text((layout.left - 6.0, y + MIDDLE), member_name(train, Member::Housing), TextAnchor::End, Tone::Dark);
+    canvas.text((layout.left - 6.0, y + MIDDLE), member_name(train, Member::Housing), Anchor::End, Tone::Dark);
 }
 
 fn draw_set(canvas: &mut Canvas, train: &GearTrain, layout: &Layout, column: Column, x: f64) {
@@ -94,10 +95,10 @@ fn draw_set(canvas: &mut Canvas, train: &GearTrain, layout: &Layout, column: Col
     let (top, bottom) = heights.iter().fold((f64::MAX, f64::MIN), |(top, bottom), &y| (top.min(y), bottom.max(y)));
     canvas.line((x, top), (x, bottom), Tone::Dark);
     let labels = labels(train, column);
-    canvas.text((x - 4.0, layout.head()), &labels[0], TextAnchor::Start, Tone::Dark);
+    canvas.text((x - 4.0, layout.head()), &labels[0], Anchor::Start, Tone::Dark);
     for (&y, label) in heights.iter().zip(&labels[1..]) {
         canvas.dot((x, y), 4.5, Tone::Dark, true);
-        canvas.text((x + LABEL, y - 5.0), label, TextAnchor::Start, Tone::Dark);
+        canvas.text((x + LABEL, y - 5.0), label, Anchor::Start, Tone::Dark);
     }
 }
 
@@ -129,10 +130,10 @@ fn draw_pair(
         Some(_) => canvas.square((x, driven), 5.0, tone, torque.is_some()),
     }
     let labels = labels(train, Column::Pair(at));
-    canvas.text((x - 4.0, layout.head()), &labels[0], TextAnchor::Start, tone);
+    canvas.text((x - 4.0, layout.head()), &labels[0], Anchor::Start, tone);
     let beside = if down > 0.0 { -5.0 } else { 14.0 };
     for (y, teeth) in [(driver, &labels[1]), (driven, &labels[2])] {
-        canvas.text((x + LABEL, y + beside), teeth, TextAnchor::Start, tone);
+        canvas.text((x + LABEL, y + beside), teeth, Anchor::Start, tone);
     }
 }
 
@@ -168,9 +169,9 @@ fn draw_element(
         canvas.dot((x, y), 4.5, tone, true);
     }
     let name = &labels(train, Column::Element(at))[0];
-    canvas.text((x - 4.0, layout.head()), name, TextAnchor::Start, tone);
+    canvas.text((x - 4.0, layout.head()), name, Anchor::Start, tone);
     if let Some(torque) = torque {
-        canvas.text((x + LABEL + 2.0, plates - 6.0), &speed_text(Some(torque)), TextAnchor::Start, tone);
+        canvas.text((x + LABEL + 2.0, plates - 6.0), &speed_text(Some(torque)), Anchor::Start, tone);
     }
 }
 
@@ -182,11 +183,11 @@ fn draw_speeds(canvas: &mut Canvas, train: &GearTrain, layout: &Layout, gear: &E
     let (low, high) = known().fold((0.0_f64, 1.0_f64), |(low, high), speed| (low.min(speed), high.max(speed)));
     let x = |speed: f64| left + width * (speed - low) / (high - low);
     let (top, bottom) = (layout.head() + 6.0, layout.y(Member::Housing));
-    canvas.text((left, layout.head()), "speed / turbine speed", TextAnchor::Start, Tone::Dark);
+    canvas.text((left, layout.head()), "speed / turbine speed", Anchor::Start, Tone::Dark);
     canvas.line((x(0.0), top), (x(0.0), bottom), Tone::Open);
     canvas.dashed((x(1.0), top), (x(1.0), bottom), Tone::Open);
     for (value, label) in [(0.0, "0"), (1.0, "1")] {
-        canvas.text((x(value), bottom + 15.0), label, TextAnchor::Middle, Tone::Dark);
+        canvas.text((x(value), bottom + 15.0), label, Anchor::Middle, Tone::Dark);
     }
     for shaft in 0..train.shafts.len() {
         let (y, speed) = (layout.y(Member::Shaft(shaft)), gear.speeds.get(shaft).copied().flatten());
@@ -195,7 +196,7 @@ fn draw_speeds(canvas: &mut Canvas, train: &GearTrain, layout: &Layout, gear: &E
             canvas.bar((from, y - 5.0), (to - from, 10.0), Tone::Dark);
             canvas.dot((x(speed), y), 4.0, Tone::Dark, true);
         }
-        canvas.text((left + width + 62.0, y + MIDDLE), &speed_text(speed), TextAnchor::End, Tone::Dark);
+        canvas.text((left + width + 62.0, y + MIDDLE), &speed_text(speed), Anchor::End, Tone::Dark);
     }
 }
 
@@ -234,7 +235,7 @@ pub(super) fn legend(canvas: &mut Canvas, train: &GearTrain, (left, top): (f64, 
     ];
     let mut y = top + 12.0;
     for (_, line) in lines.iter().filter(|line| line.0) {
-        canvas.text((left, y), line, TextAnchor::Start, Tone::Dark);
+        canvas.text((left, y), line, Anchor::Start, Tone::Dark);
         y += 17.0;
     }
 }

@@ -2,7 +2,8 @@
 
 use geartrain::Member;
 use geartrain::{GearTrain, PlanetarySet, Planets};
-use kuva::render::render::TextAnchor;
+
+use crate::drawing::Anchor;
 
 use super::canvas::{Canvas, Tone, text_width};
 use super::{MARGIN, member_name};
@@ -41,18 +42,18 @@ pub(super) fn draw(canvas: &mut Canvas, train: &GearTrain, speeds: &[Option<f64>
         let ends = places.iter().fold((0.0_f64, 0.0_f64), |(low, high), place| (low.min(place.2), high.max(place.2)));
         let y = |place: f64| top + HEAD + LEVER.0 * (ends.1 - place) / (ends.1 - ends.0);
         let (upper, lower) = (top + HEAD - 8.0, top + HEAD + LEVER.0 + 8.0);
-        canvas.text((x, top + 8.0), &format!("lever of set {}", at + 1), TextAnchor::Start, Tone::Dark);
+        canvas.text((x, top + 8.0), &format!("lever of set {}", at + 1), Anchor::Start, Tone::Dark);
         canvas.line((at_speed(0.0), upper), (at_speed(0.0), lower), Tone::Open);
         canvas.dashed((at_speed(1.0), upper), (at_speed(1.0), lower), Tone::Open);
         for (value, label) in [(0.0, "0"), (1.0, "1")] {
-            canvas.text((at_speed(value), lower + 14.0), label, TextAnchor::Middle, Tone::Dark);
+            canvas.text((at_speed(value), lower + 14.0), label, Anchor::Middle, Tone::Dark);
         }
-        canvas.text((origin, lower + 30.0), "speed / turbine speed", TextAnchor::Start, Tone::Dark);
+        canvas.text((origin, lower + 30.0), "speed / turbine speed", Anchor::Start, Tone::Dark);
         let points: Option<Vec<(f64, f64)>> =
             places.iter().map(|place| Some((at_speed(speed_of(place.1)?), y(place.2)))).collect();
         for &place in &places {
             canvas.line((origin, y(place.2)), (origin + LEVER.1, y(place.2)), Tone::Guide);
-            canvas.text((origin - 12.0, y(place.2) + 4.5), &label(place), TextAnchor::End, Tone::Dark);
+            canvas.text((origin - 12.0, y(place.2) + 4.5), &label(place), Anchor::End, Tone::Dark);
         }
         if let Some(points) = points {
             let highest = points.iter().copied().fold(points[0], |a, b| if b.1 < a.1 { b } else { a });

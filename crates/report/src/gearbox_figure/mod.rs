@@ -25,7 +25,7 @@ const TITLE: f64 = 34.0;
 pub fn train_figure(gearbox: &Gearbox) -> Option<String> {
     let train = gearbox.train.as_ref()?;
     let layout = Layout::new(train, MARGIN + TITLE, false);
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::default();
     canvas.title(MARGIN, &gearbox.name);
     connections::draw(&mut canvas, train, &layout, None);
     connections::legend(&mut canvas, train, (MARGIN, layout.bottom() + MARGIN), None);
@@ -38,7 +38,7 @@ pub fn gear_figure(gearbox: &Gearbox, gear: usize) -> Option<String> {
     let torques = gear.holding.iter().map(|holding| (holding.element, holding.per_turbine_torque));
     let engaged = Engaged { torques: torques.collect(), speeds: &gear.shaft_speeds };
     let layout = Layout::new(train, MARGIN + TITLE, true);
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::default();
     let names: Vec<&str> = gear.holding.iter().map(|holding| gearbox.elements[holding.element].name.as_str()).collect();
     canvas.title(
         MARGIN,
