@@ -169,7 +169,7 @@ impl HybridIntegrator {
         powertrain: &Powertrain,
         inputs: &Inputs,
         until_s: f64,
-        record: &mut impl FnMut(&Segment<'_>),
+        record: &mut dyn FnMut(&Segment<'_>),
     ) -> Result<(), PlantError> {
         // The oil in the cylinders is integrated only where it matters.
         if powertrain.has_stroke() {
@@ -185,7 +185,7 @@ impl HybridIntegrator {
         powertrain: &Powertrain,
         inputs: &Inputs,
         until_s: f64,
-        record: &mut impl FnMut(&Segment<'_>),
+        record: &mut dyn FnMut(&Segment<'_>),
     ) -> Result<(), PlantError> {
         // New inputs change pressures and speeds only by and by: the mode is still the right one.
         let acting = powertrain.acting(inputs);
@@ -227,7 +227,7 @@ impl HybridIntegrator {
         trial: &Trial<N, Torques>,
         end_s: f64,
         inputs: &Inputs,
-        record: &mut impl FnMut(&Segment<'_>),
+        record: &mut dyn FnMut(&Segment<'_>),
     ) {
         record(&Segment { start_s: self.time_s, end_s, mode: self.mode, inputs, trial });
         self.time_s = end_s;

@@ -221,19 +221,28 @@ impl AnyObserver {
         samples: impl Iterator<Item = Result<(Input<f64>, S), E>>,
         take: impl FnMut(S, Estimate<f64>) -> Result<(), E>,
     ) -> Result<(), E> {
+        run(samples, self.start(budget), take)
+    }
+
+    /// The observer before its first sample: a function that makes a step, and gives the guaranteed range with it where the error budget of a
+    /// vehicle is given.
+    fn start(&self, budget: Option<&Vehicle>) -> Stepping<'_> {
         match self {
-            Self::Rigid(observer) => run_bounded(budget, samples, observer, take),
-            Self::Compliant(observer) => run_bounded(budget, samples, observer.as_ref(), take),
-            Self::Sliding(observer) => run_bounded(budget, samples, observer, take),
-            Self::Gearbox(observer) => run_bounded(budget, samples, observer.as_ref(), take),
-            Self::Kalman(observer) => run_bounded(budget, samples, observer.as_ref(), take),
-            Self::Extended(observer) => run_bounded(budget, samples, observer.as_ref(), take),
-            Self::Unscented(observer) => run_bounded(budget, samples, observer.as_ref(), take),
-            Self::SuperTwisting(observer) => run_bounded(budget, samples, observer.as_ref(), take),
-            Self::Inversion(observer) => run_bounded(budget, samples, observer.as_ref(), take),
+            Self::Rigid(observer) => start(budget, observer),
+            Self::Compliant(observer) => start(budget, observer.as_ref()),
+            Self::Sliding(observer) => start(budget, observer),
+            Self::Gearbox(observer) => start(budget, observer.as_ref()),
+            Self::Kalman(observer) => start(budget, observer.as_ref()),
+            Self::Extended(observer) => start(budget, observer.as_ref()),
+            Self::Unscented(observer) => start(budget, observer.as_ref()),
+            Self::SuperTwisting(observer) => start(budget, observer.as_ref()),
+            Self::Inversion(observer) => start(budget, observer.as_ref()),
         }
     }
 }
+
+/// A step of an observer that runs. It has no type parameters, so that there is one copy of an observer's code whatever it is run over.
+type Stepping<'a> = Box<dyn FnMut(&Input<f64>) -> Estimate<f64> + 'a>;
 
 /// The ranges at every sample, the same for every observer.
 pub fn ranges(vehicle: &Vehicle, columns: &RunColumns<'_>) -> Vec<Bounds<f64>> {
@@ -248,14 +257,13 @@ pub fn ranges(vehicle: &Vehicle, columns: &RunColumns<'_>) -> Vec<Bounds<f64>> {
         .collect()
 }
 
-fn run_bounded<S, E>(
-    budget: Option<&Vehicle>,
-    samples: impl Iterator<Item = Result<(Input<f64>, S), E>>,
-    observer: &impl Estimator<f64>,
-    take: impl FnMut(S, Estimate<f64>) -> Result<(), E>,
-) -> Result<(), E> {
+fn start<'a, O: Estimator<f64>>(budget: Option<&Vehicle>, observer: &'a O) -> Stepping<'a> {
+    fn stepping<'a, O: Estimator<f64, State: 'a> + 'a>(observer: O) -> Stepping<'a> {
+        let mut state = observer.start();
+        Box::new(move |input| observer.step(&mut state, input))
+    }
     match budget {
-        Some(vehicle) => run(samples, &bounded(vehicle, observer), take),
-        None => run(samples, observer, take),
+        Some(vehicle) => stepping(bounded(vehicle, observer)),
+        None => stepping(observer),
     }
 }

@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use car::Vehicle;
 use drivetrain::{CommandKind, ReducedShift};
-use observer::{Estimate, Estimator, Input, Reading};
+use observer::{Estimate, Input, Reading};
 use trace::{Trace, TraceError, signal};
 
 /// The signals that the observers read. `C` is where one is found: the values of a column, or its place in a row.
@@ -166,20 +166,19 @@ impl<'a> RunColumns<'a> {
     }
 }
 
-/// Runs an observer over samples, and gives `take` one estimate for each, with what came along with the sample. Ends at
-/// the first error.
+/// Runs an observer, which `step` is a step of, over samples, and gives `take` one estimate for each, with what came along with the sample.
+/// Ends at the first error.
 ///
 /// # Errors
 /// Those of the samples and of `take`.
 pub fn run<S, E>(
     samples: impl Iterator<Item = Result<(Input<f64>, S), E>>,
-    observer: &impl Estimator<f64>,
+    mut step: impl FnMut(&Input<f64>) -> Estimate<f64>,
     mut take: impl FnMut(S, Estimate<f64>) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut state = observer.start();
     for sample in samples {
         let (input, along) = sample?;
-        take(along, observer.step(&mut state, &input))?;
+        take(along, step(&input))?;
     }
     Ok(())
 }

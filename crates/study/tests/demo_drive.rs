@@ -15,10 +15,15 @@ fn comparison() -> (Vehicle, Comparison) {
 
 fn estimates(columns: &RunColumns<'_>, observer: &impl Estimator<f64>) -> Vec<Estimate<f64>> {
     let mut estimates = Vec::new();
-    let Ok(()) = run(columns.samples(), observer, |(), estimate| {
-        estimates.push(estimate);
-        Ok(())
-    });
+    let mut state = observer.start();
+    let Ok(()) = run(
+        columns.samples(),
+        |input| observer.step(&mut state, input),
+        |(), estimate| {
+            estimates.push(estimate);
+            Ok(())
+        },
+    );
     estimates
 }
 

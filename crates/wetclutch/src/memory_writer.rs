@@ -16,6 +16,8 @@ pub(crate) struct MemoryWriter {
     width: usize,
     /// How often the last word of each column is to be repeated.
     repeats: Vec<usize>,
+    /// How often all words are to be repeated besides: the rows with numbers alone since the last row with words.
+    all_repeats: usize,
     /// The numbers of the rows that are not in their columns yet, row after row.
     block: Vec<f64>,
 }
@@ -34,7 +36,8 @@ impl MemoryWriter {
             std::iter::once((signal::TIME, ColumnKind::Number)).chain(named).map(column).collect();
         let is_words: Vec<bool> = columns.iter().map(|column| matches!(column.values, Values::Words(_))).collect();
         let width = is_words.iter().filter(|is_words| !**is_words).count();
-        Self { table: Table { columns }, repeats: vec![0; is_words.len()], is_words, width, block: Vec::new() }
+        let repeats = vec![0; is_words.len()];
+        Self { table: Table { columns }, repeats, all_repeats: 0, is_words, width, block: Vec::new() }
     }
 
     /// Makes room for rows that are known to come.
@@ -45,8 +48,19 @@ impl MemoryWriter {
         });
     }
 
+    /// Writes a row with the numbers of all columns that have numbers, in their order, and the words of the row before.
+    pub(crate) fn numbers(&mut self, time_s: f64, numbers: impl IntoIterator<Item = f64>) {
+        let end = self.block.len() + self.width;
+        self.block.resize(end, f64::NAN);
+        let row = self.block.get_mut(end - self.width..).unwrap_or_default();
+        row.iter_mut().zip(std::iter::once(time_s).chain(numbers)).for_each(|(cell, number)| *cell = number);
+        self.all_repeats += 1;
+        self.move_whole_block();
+    }
+
     /// Writes a row.
     pub(crate) fn push<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) {
+        self.repeat_all();
         self.block.push(time_s);
         let mut at = 1;
         cells.into_iter().take_while(|cell| !matches!(cell, Cell::SameWords)).for_each(|cell| {
@@ -67,14 +81,13 @@ impl MemoryWriter {
                 false => self.block.push(f64::NAN),
             }
         }
-        if self.block.len() >= BLOCK * self.width {
-            self.move_block();
-        }
+        self.move_whole_block();
     }
 
     /// The table.
     pub(crate) fn finish(mut self) -> Table {
         self.move_block();
+        self.repeat_all();
         (0..self.repeats.len()).for_each(|column| self.repeat(column));
         self.table
     }
@@ -91,6 +104,20 @@ impl MemoryWriter {
         let times = std::mem::take(&mut self.repeats[column]);
         if let Values::Words(words) = &mut self.table.columns[column].values {
             words.repeat(times);
+        }
+    }
+
+    /// Counts for each column the rows whose words are all those before.
+    fn repeat_all(&mut self) {
+        let times = std::mem::take(&mut self.all_repeats);
+        if times > 0 {
+            self.repeats.iter_mut().for_each(|repeats| *repeats += times);
+        }
+    }
+
+    fn move_whole_block(&mut self) {
+        if self.block.len() >= BLOCK * self.width {
+            self.move_block();
         }
     }
 
@@ -136,6 +163,32 @@ mod tests {
         assert_eq!(table.words("health").unwrap().words, ["good"]);
         assert_eq!(table.column("turbine_speed_rad_s").and_then(Column::unit), Some("rad/s"));
         assert_eq!(table.column("phase").and_then(Column::unit), None);
+    }
+
+    #[test]
+    fn a_row_of_numbers_has_the_words_of_the_row_before() {
+        let columns = [("phase", ColumnKind::Word), ("a_pa", ColumnKind::Number), ("b_pa", ColumnKind::Number)];
+        for rows in [1, BLOCK, 3 * BLOCK + 1] {
+            let [mut writer, mut expected] = [(); 2].map(|()| MemoryWriter::new(columns.into_iter()));
+            for row in 0..rows {
+                let value = row as f64;
+                let is_new = row % 5 == 0;
+                let word = if is_new { Cell::Word(["fill", "torque phase"][row / 5 % 2]) } else { Cell::SameWord };
+                expected.push(value, [word, Cell::Number(-value), Cell::Number(2.0 * value)]);
+                if is_new {
+                    writer.push(value, [word, Cell::Number(-value), Cell::Number(2.0 * value)]);
+                } else {
+                    writer.numbers(value, [-value, 2.0 * value]);
+                }
+            }
+            assert_eq!(writer.finish(), expected.finish(), "{rows}");
+        }
+        // A missing number is empty.
+        let mut writer = MemoryWriter::new(columns.into_iter());
+        writer.numbers(0.0, [1.0]);
+        let table = writer.finish();
+        assert_eq!(table.numbers("a_pa"), Some([1.0].as_slice()));
+        assert!(table.numbers("b_pa").unwrap()[0].is_nan() && table.words("phase").unwrap().codes.len() == 1);
     }
 
     #[test]

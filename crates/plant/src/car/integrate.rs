@@ -165,7 +165,7 @@ impl CarIntegrator {
         model: &CarModel,
         inputs: &CarInputs,
         until_s: f64,
-        record: &mut impl FnMut(&CarStep<'_>),
+        record: &mut dyn FnMut(&CarStep<'_>),
     ) -> Result<(), CarError> {
         let inputs = &self.with_loaded_dogs(model, inputs);
         self.resettle(model, inputs)?;
@@ -190,7 +190,7 @@ impl CarIntegrator {
         model: &CarModel,
         inputs: &CarInputs,
         until_s: f64,
-        record: &mut impl FnMut(&CarStep<'_>),
+        record: &mut dyn FnMut(&CarStep<'_>),
     ) -> Result<(), CarError> {
         let acting = model.acting(inputs);
         let mut rates: Rates<N> = match self.known.take() {
@@ -273,7 +273,7 @@ impl CarIntegrator {
         trial: &Trial<N, CarTorques>,
         step_s: f64,
         inputs: &CarInputs,
-        record: &mut impl FnMut(&CarStep<'_>),
+        record: &mut dyn FnMut(&CarStep<'_>),
     ) {
         let end_s = self.time_s + step_s;
         record(&CarStep {

@@ -95,7 +95,7 @@ impl<'p> Output<'p> {
             Self::File(writer, path) => writer.numbers(time_s, numbers).map_err(|error| Error::writing(path, &error)),
             Self::Standard(writer) => Ok(writer.numbers(time_s, numbers)?),
             Self::Memory(writer) => {
-                writer.push(time_s, numbers.iter().map(|number| Cell::Number(*number)).chain([Cell::SameWords]));
+                writer.numbers(time_s, numbers.iter().copied());
                 Ok(())
             }
             Self::Live(..) => self.cells(time_s, numbers.iter().map(|number| Cell::Number(*number))),

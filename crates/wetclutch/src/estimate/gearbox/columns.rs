@@ -184,6 +184,15 @@ impl Value {
             }
         }
     }
+
+    /// The number of its cell in a row, of a column that has numbers.
+    pub(crate) fn number(self, row: &Row<'_>) -> f64 {
+        match self.cell(row) {
+            Cell::Number(number) => number,
+            Cell::Whole(number) => number as f64,
+            Cell::Word(_) | Cell::SameWord | Cell::SameWords => f64::NAN,
+        }
+    }
 }
 
 /// How many columns stand before the columns of readings that end a table.

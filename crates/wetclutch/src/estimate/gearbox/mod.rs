@@ -17,10 +17,10 @@ use observer::ShiftTables;
 use report::drive_page::{DrivePage, MAX_DRAWN, findings, shift_words};
 use study::gearbox::gear_numbers::GearNumbers;
 use trace::signal::ACCELERATION_READING;
-use trace::{Cell, ShownPath as _};
+use trace::{Cell, ColumnKind, ShownPath as _};
 
 use self::checks::{RowTimes, refused};
-use self::columns::{Knows, Row, Same, before_readings, chosen, columns, measured};
+use self::columns::{Knows, Row, Same, Value, before_readings, chosen, columns, measured};
 pub use self::columns::{is_car_column, is_measured_column};
 pub use self::learnt::LearntOfDrive;
 use self::passing::Passing;
@@ -142,6 +142,8 @@ pub fn estimate(
     let knows = Knows::of(car, is_named || source.has_acceleration());
     let columns = chosen(columns(&places, knows), measured(car, tables), names)?;
     let (before_readings, mut said, mut named_before) = (before_readings(&columns), None, None);
+    let numbers_alone: Vec<Value> =
+        columns.iter().filter(|column| column.kind != ColumnKind::Word).map(|column| column.value).collect();
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(destination, named)?;
     table.reserve(log.known_rows(&options.shifts));
@@ -155,6 +157,10 @@ pub fn estimate(
             readings: said.replace(row.said()) == Some(row.said()),
             others: named_before.replace(row.named()) == Some(row.named()),
         };
+        if let (Output::Memory(writer), true) = (&mut table, same.readings && same.others) {
+            writer.numbers(time_s, numbers_alone.iter().map(|value| value.number(&row)));
+            return Ok(());
+        }
         let new = if same.readings { &columns[..before_readings] } else { &columns[..] };
         let rest = (new.len() < columns.len()).then_some(Cell::SameWords);
         table.cells(time_s, new.iter().map(|column| column.cell(&row, same)).chain(rest))?;
