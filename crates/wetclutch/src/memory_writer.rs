@@ -50,10 +50,10 @@ impl MemoryWriter {
 
     /// Writes a row with the numbers of all columns that have numbers, in their order, and the words of the row before.
     pub(crate) fn numbers(&mut self, time_s: f64, numbers: impl IntoIterator<Item = f64>) {
-        let end = self.block.len() + self.width;
-        self.block.resize(end, f64::NAN);
-        let row = self.block.get_mut(end - self.width..).unwrap_or_default();
-        row.iter_mut().zip(std::iter::once(time_s).chain(numbers)).for_each(|(cell, number)| *cell = number);
+        let begin = self.block.len();
+        self.block.push(time_s);
+        self.block.extend(numbers.into_iter().take(self.width - 1));
+        self.block.resize(begin + self.width, f64::NAN);
         self.all_repeats += 1;
         self.move_whole_block();
     }

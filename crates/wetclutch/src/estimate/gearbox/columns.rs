@@ -97,7 +97,7 @@ impl<'a> Row<'a> {
     /// Pressure, torque, their ranges, both by the valve model, whether the speeds show nothing, and the standard deviations, in the order
     /// of [`CLUTCH`].
     fn clutch(&self, which: usize, what: usize) -> f64 {
-        let Some(clutch) = self.estimate.clutches.map(|clutches| clutches[which]) else { return f64::NAN };
+        let Some(clutch) = self.estimate.clutches.as_ref().map(|clutches| &clutches[which]) else { return f64::NAN };
         if !clutch.element.has_pressure() && ![TORQUE, TORQUE_DEVIATION].contains(&what) {
             // It has a torque alone.
             return f64::NAN;
@@ -186,8 +186,14 @@ impl Value {
     }
 
     /// The number of its cell in a row, of a column that has numbers.
+    #[inline]
     pub(crate) fn number(self, row: &Row<'_>) -> f64 {
-        match self.cell(row) {
+        let cell = match self {
+            // Most columns are those of the clutches of a shift, and most rows are of no shift.
+            Self::Clutch(..) if row.estimate.clutches.is_none() => return f64::NAN,
+            _ => self.cell(row),
+        };
+        match cell {
             Cell::Number(number) => number,
             Cell::Whole(number) => number as f64,
             Cell::Word(_) | Cell::SameWord | Cell::SameWords => f64::NAN,
