@@ -33,8 +33,9 @@ const TICK: Letters = Letters { size: 12, ..Letters::label(TEXT) };
 const TICK_DISTANCE: f64 = 34.0;
 /// Distance from a curve within which its points may be left out, pixels.
 const TOLERANCE: f64 = 0.15;
-/// Opacity of a shaded range, and of a span of the common axis.
+/// Opacity of a shaded range.
 const RANGE_OPACITY: f64 = 0.16;
+/// Opacity of a span of the common axis.
 const SPAN_OPACITY: f64 = 0.45;
 const GRID: Pen<'_> = Pen { colour: "#CCCCCC", width: 0.5, dash: None };
 const EDGE: Pen<'_> = Pen { colour: "#000000", width: 0.8, dash: None };
@@ -217,8 +218,9 @@ impl Figure {
             scale: placed.scale,
         };
         self.draw_axes(drawing, placed, &frame, last);
-        for span in &self.spans {
-            let [start, end] = [span.start, span.end].map(|end| frame.x(end.clamp(self.x_range.0, self.x_range.1)));
+        let (from, to) = self.x_range;
+        for span in self.spans.iter().filter(|span| span.end > from && span.start < to) {
+            let (start, end) = (frame.x(span.start.max(from)), frame.x(span.end.min(to)));
             let fill = Fill { colour: span.colour, opacity: SPAN_OPACITY };
             drawing.rectangle((start, top), (end - start, placed.height), fill);
         }
@@ -238,7 +240,7 @@ impl Figure {
     fn draw_axes(&self, drawing: &mut Drawing, placed: &Placed<'_>, frame: &Frame, last: bool) {
         let &Frame { left, right, top, bottom, x_range: (from, to), scale } = frame;
         let x_step = nice_step((to - from) / 7.0);
-        let x_ticks: Vec<f64> = ticks(from, to, x_step);
+        let x_ticks = ticks(from, to, x_step);
         let y_ticks = if placed.is_unmarked() { Vec::new() } else { ticks(scale.low, scale.high, scale.step) };
         let upright = x_ticks.iter().map(|&x| [(frame.x(x), top), (frame.x(x), bottom)]);
         let level = y_ticks.iter().map(|&y| [(left, frame.y(y)), (right, frame.y(y))]);
@@ -464,6 +466,19 @@ mod tests {
                 let y: f64 = point.split_once(' ').unwrap().1.parse().unwrap();
                 assert!((0.0..height).contains(&y), "a line ends where it leaves the panel: {path}");
             }
+        }
+    }
+
+    #[test]
+    fn a_figure_without_a_length_and_spans_beyond_its_axis_are_drawn() {
+        let span = |start, end| Span { label: "fill".into(), start, end, colour: "#EDEDED" };
+        for x_range in [(1.0, 1.0), (0.0, 1.0), (1.0, 0.0), (f64::NAN, f64::NAN), (0.0, f64::INFINITY)] {
+            let curve = line("a", Weight::Main, vec![(0.0, 1.0), (1.0, 2.0)]);
+            let spans = vec![span(-2.0, -1.0), span(-1.0, 0.5), span(2.0, f64::NAN)];
+            let svg = Figure { x_range, spans, ..figure(vec![curve], Axis::All) }.svg();
+            assert!(svg.ends_with("</svg>") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+            let shaded = svg.matches("fill=\"#EDEDED\"").count();
+            assert_eq!(shaded, usize::from(x_range == (0.0, 1.0) || x_range == (0.0, f64::INFINITY)), "{x_range:?}");
         }
     }
 
