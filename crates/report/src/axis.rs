@@ -21,7 +21,7 @@ const RANGE_ROOM: f64 = 0.35;
 /// Part of a step by which a value may lie beyond the end of an axis: less than a stroke is wide.
 const SLACK: f64 = 0.02;
 
-/// So many ticks have no axis.
+/// No axis has more ticks.
 const MAX_TICKS: f64 = 100.0;
 
 /// Values from here on are written with an exponent.
@@ -64,6 +64,11 @@ impl Axis {
 }
 
 impl Scale {
+    /// Lowest and highest value that a curve shows: a value may lie a little beyond the end of the axis.
+    pub(crate) fn shown(&self) -> (f64, f64) {
+        (self.low - SLACK * self.step, self.high + SLACK * self.step)
+    }
+
     /// What lies beyond the axis, in words.
     pub(crate) fn beyond(&self, extremes: Option<(f64, f64)>) -> Option<String> {
         let (low, high) = extremes?;
@@ -105,7 +110,7 @@ pub(crate) fn nice_step(minimum: f64) -> f64 {
 /// The multiples of a step from `low` to `high`.
 pub(crate) fn ticks(low: f64, high: f64, step: f64) -> Vec<f64> {
     let [first, last] = [(low / step - SLACK).ceil(), (high / step + SLACK).floor()];
-    // A step that is too short for the values has no end.
+    // None by a step of zero, or one that is far too short.
     let count = if last - first <= MAX_TICKS { (last - first) as usize + 1 } else { 0 };
     if last < first { Vec::new() } else { (0..count).map(|n| (first + n as f64) * step).collect() }
 }

@@ -37,7 +37,7 @@ impl Letters {
     }
 }
 
-/// How a line is drawn.
+/// Colour, width and dashes of a line.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pen<'a> {
     pub(crate) colour: &'a str,
@@ -55,7 +55,7 @@ pub(crate) struct Fill<'a> {
     pub(crate) opacity: f64,
 }
 
-/// What has been drawn.
+/// Elements of an SVG document, in their order.
 #[derive(Debug, Default)]
 pub(crate) struct Drawing {
     elements: String,
@@ -92,7 +92,7 @@ impl Drawing {
     pub(crate) fn area(&mut self, points: &[(f64, f64)], fill: Fill<'_>) {
         self.add(format_args!("<path d=\""));
         self.path(points);
-        self.add(format_args!("Z\"{}/>", fill));
+        self.add(format_args!("Z\"{fill}/>"));
     }
 
     /// A rectangle from its upper left corner.

@@ -297,7 +297,8 @@ impl Placed<'_> {
         let mut order: Vec<usize> = (0..self.visible.len()).rev().collect();
         order.sort_by_key(|&n| self.panel.series[n].stroke.weight);
         for n in order {
-            let parts: Vec<_> = within(&self.visible[n], low, high).iter().map(|part| frame.place(part)).collect();
+            let parts: Vec<_> =
+                within(&self.visible[n], self.scale.shown()).iter().map(|part| frame.place(part)).collect();
             if !parts.is_empty() {
                 drawing.lines(parts.iter().map(Vec::as_slice), self.panel.series[n].stroke.pen());
             }
@@ -379,7 +380,7 @@ fn pieces(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
 }
 
 /// The parts of a curve between two values; its lines end where they cross these.
-fn within(points: &[(f64, f64)], low: f64, high: f64) -> Vec<Vec<(f64, f64)>> {
+fn within(points: &[(f64, f64)], (low, high): (f64, f64)) -> Vec<Vec<(f64, f64)>> {
     let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
     for line in points.windows(2) {
         let (from, to) = (line[0], line[1]);
@@ -470,7 +471,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_without_a_length_and_spans_beyond_its_axis_are_drawn() {
+    fn a_figure_without_a_length_and_spans_beyond_its_axis_have_finite_places() {
         let span = |start, end| Span { label: "fill".into(), start, end, colour: "#EDEDED" };
         for x_range in [(1.0, 1.0), (0.0, 1.0), (1.0, 0.0), (f64::NAN, f64::NAN), (0.0, f64::INFINITY)] {
             let curve = line("a", Weight::Main, vec![(0.0, 1.0), (1.0, 2.0)]);
@@ -483,13 +484,25 @@ mod tests {
     }
 
     #[test]
+    fn a_curve_a_little_beyond_the_end_of_the_axis_is_there() {
+        let highest = line("a", Weight::Main, vec![(0.0, 0.0), (0.2, 100.3), (1.0, 100.3)]);
+        let figure = figure(vec![highest], Axis::All);
+        let panel = figure.place(&figure.panels[0]);
+        assert!(panel.scale.high < 100.3, "{:?}", panel.scale);
+        let parts = within(&panel.visible[0], panel.scale.shown());
+        assert_eq!(parts.iter().map(|part| part.last().copied()).collect::<Vec<_>>(), [Some((1.0, 100.3))]);
+    }
+
+    #[test]
     fn a_curve_ends_where_it_leaves_the_panel_and_begins_where_it_comes_back() {
         let points = [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0), (3.0, 0.0), (4.0, f64::NAN), (5.0, 1.0), (6.0, 2.0)];
         let expected = [vec![(0.0, 1.0), (0.5, 2.0)], vec![(2.5, 2.0), (3.0, 0.0)], vec![(5.0, 1.0), (6.0, 2.0)]];
-        assert_eq!(within(&points, 0.0, 2.0), expected);
+        assert_eq!(within(&points, (0.0, 2.0)), expected);
         // Through the whole panel, along its edge, and beyond it.
-        assert_eq!(within(&[(0.0, -1.0), (1.0, 3.0)], 0.0, 2.0), [[(0.25, 0.0), (0.75, 2.0)]]);
-        assert_eq!(within(&[(0.0, 2.0), (1.0, 2.0), (2.0, 2.0)], 0.0, 2.0), [[(0.0, 2.0), (1.0, 2.0), (2.0, 2.0)]]);
-        assert!(within(&[(0.0, 3.0), (1.0, 1e300)], 0.0, 2.0).is_empty() && within(&[(0.0, 1.0)], 0.0, 2.0).is_empty());
+        assert_eq!(within(&[(0.0, -1.0), (1.0, 3.0)], (0.0, 2.0)), [[(0.25, 0.0), (0.75, 2.0)]]);
+        assert_eq!(within(&[(0.0, 2.0), (1.0, 2.0), (2.0, 2.0)], (0.0, 2.0)), [[(0.0, 2.0), (1.0, 2.0), (2.0, 2.0)]]);
+        assert!(
+            within(&[(0.0, 3.0), (1.0, 1e300)], (0.0, 2.0)).is_empty() && within(&[(0.0, 1.0)], (0.0, 2.0)).is_empty()
+        );
     }
 }

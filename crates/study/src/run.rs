@@ -166,8 +166,8 @@ impl<'a> RunColumns<'a> {
     }
 }
 
-/// Runs an observer, which `step` is a step of, over samples, and gives `take` one estimate for each, with what came along with the sample.
-/// Ends at the first error.
+/// Runs an observer over samples: `step` makes one step of it, and `take` gets the estimate with what came along with the sample. Ends at the
+/// first error.
 ///
 /// # Errors
 /// Those of the samples and of `take`.

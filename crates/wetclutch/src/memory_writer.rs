@@ -16,7 +16,7 @@ pub(crate) struct MemoryWriter {
     width: usize,
     /// How often the last word of each column is to be repeated.
     repeats: Vec<usize>,
-    /// How often all words are to be repeated besides: the rows with numbers alone since the last row with words.
+    /// How often the last words of all columns are to be repeated as well: the rows with numbers alone since the last row with words.
     all_repeats: usize,
     /// The numbers of the rows that are not in their columns yet, row after row.
     block: Vec<f64>,

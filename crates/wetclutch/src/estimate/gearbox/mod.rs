@@ -157,6 +157,7 @@ pub fn estimate(
             readings: said.replace(row.said()) == Some(row.said()),
             others: named_before.replace(row.named()) == Some(row.named()),
         };
+        // In memory words that stay the same are counted and not written.
         if let (Output::Memory(writer), true) = (&mut table, same.readings && same.others) {
             writer.numbers(time_s, numbers_alone.iter().map(|value| value.number(&row)));
             return Ok(());
