@@ -24,7 +24,7 @@ struct Given {
     shift: Option<usize>,
     shifts: Vec<String>,
     learnt: Option<String>,
-    threads: usize,
+    threads: Option<usize>,
     with_page: bool,
 }
 
@@ -71,7 +71,7 @@ impl Given {
             columns: self.columns,
             shifts,
             learnt: self.learnt.as_deref().map(|text| vehicle.learnt_of(text)).transpose()?,
-            threads: self.threads,
+            threads: self.threads.unwrap_or_else(wetclutch::available_threads),
             with_page: self.with_page,
             ..EstimateOptions::default()
         })

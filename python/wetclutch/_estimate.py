@@ -166,7 +166,7 @@ class _Options(TypedDict, total=False):
     shift: int | None
     shifts: Sequence[str]
     learnt: str | None
-    threads: int
+    threads: int | None
     page: bool
 
 
@@ -195,7 +195,7 @@ def estimate(
     shift: int | None = None,
     shifts: Sequence[str] = (),
     learnt: str | None = None,
-    threads: int = 1,
+    threads: int | None = None,
     page: bool = False,
     progress: Progress = False,
     executor: Any = None,
@@ -216,7 +216,8 @@ def estimate(
         shift: The shift with this number alone, from 1.
         shifts: Shifts between these gears alone, such as ``["1-2", "2-3"]``.
         learnt: What was learnt of the car in an earlier log: ``Estimates.learnt``.
-        threads: Threads on which a log is read, estimated and written; the results are the same on any number.
+        threads: Threads on which a log is read, estimated and written; if it is None as many as there are processors, in an executor one. The
+            results are the same on any number.
         page: Whether to make the page of the drive.
         progress: True for a bar, or a function that takes words and the done fraction or None, at most ten times a second.
         executor: Where many logs are estimated: any ``concurrent.futures.Executor``, or a ``dask.distributed.Client``; in this process if
@@ -229,6 +230,8 @@ def estimate(
         InputError: A log cannot be read or is not of this car, or an argument does not fit it.
         WorkError: Workers died again and again at the same log.
     """
+    if threads is None and executor is not None:
+        threads = 1
     check_range("threads", threads, 1, 1024)
     check_range("shift", shift, 1, 10**9)
     check_car(car)

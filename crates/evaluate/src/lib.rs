@@ -19,6 +19,7 @@ mod felt_shift;
 mod late_speeds;
 pub mod learning_count;
 pub mod logged;
+pub mod logged_shifts;
 pub mod measured;
 mod plate_temperature;
 pub mod recording;

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let car = CarFile::eight_speed()?;
     let tables = LoggedDrive::tables(&car, None)?;
     let drive = LoggedDrive::new(&car, &tables, None, None);
-    fs::write(corpus.join("learnt/nothing_yet.toml"), write_learnt(&car.gearbox, drive.learnt().1))?;
+    fs::write(corpus.join("learnt/nothing_yet.toml"), write_learnt(&car.gearbox, drive.filter.learnt().1))?;
     Ok(())
 }
 

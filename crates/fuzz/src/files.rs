@@ -86,7 +86,7 @@ pub(crate) fn learnt(car: &Car, input: &[u8]) {
         assert!(estimate.valve_pa.iter().all(|pressure_pa| !pressure_pa.is_infinite()));
     }
     // What is written is read again.
-    let text = write_learnt(&car.gearbox, drive.learnt().1);
+    let text = write_learnt(&car.gearbox, drive.filter.learnt().1);
     read_learnt(&car.gearbox, &Source::built_in("learnt.toml", &text)).unwrap_or_else(|error| panic!("{error}"));
 }
 

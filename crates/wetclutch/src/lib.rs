@@ -50,3 +50,8 @@ pub use words::{Codes, Words};
 
 /// Takes a sentence for the user as it comes. It may have several lines; one that begins with `hint: ` says what to do.
 pub type Notes<'a> = &'a mut dyn FnMut(&str);
+
+/// As many threads as the processors that this process may use.
+pub fn available_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}

@@ -19,7 +19,7 @@ pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
 pub(crate) use logs::{Convert, Estimate, Fit, FormatChoice, Init, Inspect, LaunchChoice, Mapping, Watch};
 pub(crate) use studies::{
     Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,
-    WorstCaseOptions, available_threads,
+    WorstCaseOptions,
 };
 
 const EXAMPLES: &str = "\

@@ -139,11 +139,6 @@ pub(crate) struct Threads {
     threads: Option<u16>,
 }
 
-/// As many threads as the machine has.
-pub(crate) fn available_threads() -> usize {
-    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
-}
-
 impl Threads {
     /// As many as the machine has.
     pub(crate) const ALL: Self = Self { threads: None };
@@ -155,7 +150,7 @@ impl Threads {
 
     /// The number of threads.
     pub(crate) fn count(&self) -> usize {
-        self.threads.map_or_else(available_threads, usize::from)
+        self.threads.map_or_else(wetclutch::available_threads, usize::from)
     }
 }
 

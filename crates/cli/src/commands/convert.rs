@@ -8,7 +8,7 @@ use logs::{ChannelMap, Log};
 use serde_json::{Value, json};
 use trace::{Cell, ColumnKind, ShownPath as _, TableFormat, TableWriter};
 
-use crate::args::{Convert, FormatChoice, available_threads};
+use crate::args::{Convert, FormatChoice};
 use crate::commands::written::{head, holds_something, is_forced, replaces_only};
 use crate::commands::{channel_map, check_output, not_an_input, warn_without_effect, writable, write_text};
 use crate::failure::Failure;
@@ -38,7 +38,7 @@ pub(crate) fn convert(options: &Convert) -> Result<(), Failure> {
 
 /// Writes the table of a log, and the map for it.
 fn convert_log(path: &Path, output: &Path, map: &ChannelMap) -> Result<Value, Failure> {
-    let mut log = Log::open(path, &map.open)?.on_threads(available_threads());
+    let mut log = Log::open(path, &map.open)?.on_threads(wetclutch::available_threads());
     let is_mapped = !map.channels.is_empty();
     let map_text = is_mapped.then(|| map_of_converted(&log, map)).transpose()?;
     let mut rows = if is_mapped { Converted::by_map(&mut log, map)? } else { Converted::of_log(&mut log)? };

@@ -7,7 +7,7 @@ use fit::drive::{ConverterFit, DriveRecord, fit_converter};
 use logs::{Log, Reading, Readings, Role, SeenGear, SeenGears};
 use trace::{ShownPath as _, quantity};
 
-use crate::args::{Init, LaunchChoice, available_threads};
+use crate::args::{Init, LaunchChoice};
 use crate::commands::{channel_map, or_own_names};
 use crate::failure::Failure;
 use crate::output;
@@ -112,7 +112,7 @@ impl FromLog {
         if let Some(radius_m) = options.wheel_radius_m {
             map.gearbox.wheel_radius_m.get_or_insert(radius_m);
         }
-        let mut log = Log::open(path, &map.open)?.on_threads(available_threads());
+        let mut log = Log::open(path, &map.open)?.on_threads(wetclutch::available_threads());
         let map = or_own_names(map, &log)?;
         map.resolve(&log)?;
         let missing = [Role::TurbineSpeed, Role::OutputSpeed].into_iter().find(|role| !map.has(*role));

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use trace::ShownPath as _;
 use trace::units::rpm;
 
-use crate::args::{Inspect, available_threads};
+use crate::args::Inspect;
 use crate::commands::inspect_drive::{Drive, has_command, page, write_converter};
 use crate::commands::inspect_json;
 use crate::commands::suggested::by_values;
@@ -71,7 +71,7 @@ fn inspect_log(options: &Inspect, path: &Path) -> Result<Option<Value>, Failure>
     if !options.ratios.is_empty() {
         map.gearbox.ratios.clone_from(&options.ratios);
     }
-    let mut log = Log::open(path, &map.open)?.on_threads(available_threads());
+    let mut log = Log::open(path, &map.open)?.on_threads(wetclutch::available_threads());
     if log.channels().is_empty() {
         return Err(nothing_in(path, "channels"));
     }
@@ -160,7 +160,7 @@ fn check_map(path: &Path, log: &Log, map: &ChannelMap) -> Result<(), Failure> {
         return Ok(());
     }
     // A log is read once.
-    let mut log = Log::open(path, &map.open)?.on_threads(available_threads());
+    let mut log = Log::open(path, &map.open)?.on_threads(wetclutch::available_threads());
     let mut readings = Readings::new(&mut log, map)?;
     readings.by_ref().try_for_each(|reading| reading.map(drop))?;
     readings.check()?;

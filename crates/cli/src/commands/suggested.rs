@@ -7,8 +7,6 @@ use config::significant;
 use logs::{Channel, ChannelMap, Log, Mapped, Readings, Role, SeenGears};
 use trace::{Quantity, Unit};
 
-use crate::args::available_threads;
-
 /// Lines of comments for a suggested map, by the ranges of the values of the channels; none where the log shows nothing, or cannot be read again.
 pub(super) fn by_values(path: &Path, suggested: &str, channels: &[Channel], of: &[Option<[f64; 2]>]) -> String {
     let map = ChannelMap::of_text(Path::new("map.toml"), suggested).ok().filter(|_| !of.is_empty());
@@ -18,7 +16,7 @@ pub(super) fn by_values(path: &Path, suggested: &str, channels: &[Channel], of: 
 }
 
 fn opened(path: &Path, map: &ChannelMap) -> Option<Log> {
-    Some(Log::open(path, &map.open).ok()?.on_threads(available_threads()))
+    Some(Log::open(path, &map.open).ok()?.on_threads(wetclutch::available_threads()))
 }
 
 /// The ratios of turbine and output speed in which the car was driven.

@@ -29,7 +29,7 @@ fn warnings(known: &Car, truth: &Car, kind: Option<FaultKind>, calibration: CarC
     for (sample, input) in recording.samples.iter().zip(recording.inputs(known, &tables, &sensors, 1)) {
         logged.push(&LogStep::of(sample.time_s, input));
     }
-    let is_found = logged.has_slipping_element();
+    let is_found = logged.shifts.has_slipping_element();
     (logged.finish().warnings, is_found)
 }
 

@@ -12,8 +12,8 @@ use std::thread::{Builder, Scope, ScopedJoinHandle};
 use crate::Error;
 
 /// Items that are handed on together, and how many times so many may wait \[chosen\]: a thread is woken seldom, and what waits is small.
-const BATCH: usize = 128;
-const WAITING: usize = 4;
+const BATCH: usize = 32;
+const WAITING: usize = 64;
 
 /// Where stages run.
 #[derive(Clone, Copy)]
@@ -82,7 +82,7 @@ pub(crate) enum WriteBehind<'scope, T: Send, F> {
     Failed,
 }
 
-impl<'scope, T: Send, F: FnMut(T) -> Result<(), Error>> WriteBehind<'scope, T, F> {
+impl<'scope, T: Send, F: FnMut(&mut T) -> Result<(), Error>> WriteBehind<'scope, T, F> {
     /// `write` takes each item.
     pub(crate) fn new(stages: Stages<'scope, '_>, write: F) -> Self
     where
@@ -90,8 +90,8 @@ impl<'scope, T: Send, F: FnMut(T) -> Result<(), Error>> WriteBehind<'scope, T, F
         F: Send + 'scope,
     {
         let Stages::Together(scope) = stages else { return Self::Here(write) };
-        let (giver, mut taker) = handed();
-        match spawned(Builder::new(), scope, write, move |write: F| taker.try_for_each(write)) {
+        let (giver, taker) = handed();
+        match spawned(Builder::new(), scope, write, move |write: F| taker.take_all(write)) {
             Ok(writer) => Self::There(giver, writer),
             Err(write) => Self::Here(write),
         }
@@ -101,9 +101,9 @@ impl<'scope, T: Send, F: FnMut(T) -> Result<(), Error>> WriteBehind<'scope, T, F
     ///
     /// # Errors
     /// The stage has failed, with this item or one before it.
-    pub(crate) fn push(&mut self, item: T) -> Result<(), Error> {
+    pub(crate) fn push(&mut self, mut item: T) -> Result<(), Error> {
         let is_taken = match self {
-            Self::Here(write) => return write(item),
+            Self::Here(write) => return write(&mut item),
             Self::There(giver, _) => giver.give(item),
             Self::Failed => false,
         };
@@ -177,6 +177,19 @@ pub(crate) struct Taker<T> {
     empty: Sender<VecDeque<T>>,
 }
 
+impl<T> Taker<T> {
+    /// Takes all items where they stand.
+    fn take_all(self, mut take: impl FnMut(&mut T) -> Result<(), Error>) -> Result<(), Error> {
+        for mut batch in self.filled {
+            batch.iter_mut().try_for_each(&mut take)?;
+            batch.clear();
+            // None is needed where the other thread has ended.
+            let _ = self.empty.send(batch);
+        }
+        Ok(())
+    }
+}
+
 impl<T> Iterator for Taker<T> {
     type Item = T;
 
@@ -208,9 +221,9 @@ mod tests {
                 at += 1;
                 if Some(at) == unread { Err(failed("unread", at)) } else { Ok((at <= last).then_some(at)) }
             };
-            let mut rows = WriteBehind::new(stages, |row: u32| {
-                written.push(row);
-                if Some(row) == unwritten { Err(failed("unwritten", row)) } else { Ok(()) }
+            let mut rows = WriteBehind::new(stages, |row: &mut u32| {
+                written.push(*row);
+                if Some(*row) == unwritten { Err(failed("unwritten", *row)) } else { Ok(()) }
             });
             let all = ReadAhead::new(stages, read).try_for_each(|row| rows.push(row?));
             rows.finish()?;
@@ -258,7 +271,8 @@ mod tests {
     #[should_panic(expected = "in the writer")]
     fn a_panic_of_a_stage_is_one_of_all() {
         let _ = with_stages(2, |stages| {
-            let mut rows = WriteBehind::new(stages, |row: u32| if row > 0 { panic!("in the writer") } else { Ok(()) });
+            let mut rows =
+                WriteBehind::new(stages, |row: &mut u32| if *row > 0 { panic!("in the writer") } else { Ok(()) });
             (0..10_000).try_for_each(|row| rows.push(row))?;
             rows.finish()
         });

@@ -33,15 +33,15 @@ impl<T, F: FnMut() -> Result<Option<T>, Error>> Iterator for ReadAhead<F> {
 /// A stage behind this one.
 pub(crate) struct WriteBehind<T, F>(F, PhantomData<T>);
 
-impl<T, F: FnMut(T) -> Result<(), Error>> WriteBehind<T, F> {
+impl<T, F: FnMut(&mut T) -> Result<(), Error>> WriteBehind<T, F> {
     /// `write` takes each item.
     pub(crate) fn new(_: &Stages, write: F) -> Self {
         Self(write, PhantomData)
     }
 
     /// Hands an item on.
-    pub(crate) fn push(&mut self, item: T) -> Result<(), Error> {
-        (self.0)(item)
+    pub(crate) fn push(&mut self, mut item: T) -> Result<(), Error> {
+        (self.0)(&mut item)
     }
 
     /// All items are taken.

@@ -2,7 +2,9 @@
 
 use car::columns::{element_column, element_commands};
 use car::{Car, Gear, ShiftCommand};
-use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftInput, ShiftPhase};
+use evaluate::LogStep;
+use evaluate::logged::Filtered;
+use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftPhase};
 use observer::{ChannelHealth, Channels, Health, Reading, ShiftTables};
 use study::gearbox::gear_numbers::GearNumbers;
 use trace::signal::{self, ACCELERATION_READING, OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
@@ -17,14 +19,10 @@ pub(crate) struct Row<'a> {
     pub(crate) car: &'a Car,
     pub(crate) numbers: &'a GearNumbers,
     pub(crate) places: &'a [(usize, &'a str)],
-    pub(crate) gears: ShiftCommand,
-    pub(crate) estimate: ShiftEstimate<f64>,
-    /// Guaranteed ranges of the pressures of the elements, Pa.
-    pub(crate) ranges_pa: [Option<[f64; 2]>; MAX_ELEMENTS],
     /// The readings of the row.
-    pub(crate) input: ShiftInput<f64>,
-    /// The reported engine torque, N m.
-    pub(crate) reported_n_m: Option<Reading<f64>>,
+    pub(crate) step: &'a LogStep,
+    /// What the filter made of them.
+    pub(crate) filtered: &'a Filtered,
 }
 
 /// What the columns of readings say of a row: of channels, of the commands of elements, and which of these are those of the shift.
@@ -45,13 +43,13 @@ pub(crate) struct Same {
 impl<'a> Row<'a> {
     /// What its columns of words say but for those of readings: mostly the same as in the row before.
     pub(crate) fn named(&self) -> Named {
-        let ShiftEstimate { gear, phase, clutches, health, .. } = &self.estimate;
-        (self.gears, *gear, *phase, clutches.map(|clutches| clutches.map(|clutch| clutch.element)), *health)
+        let ShiftEstimate { gear, phase, clutches, health, .. } = &self.filtered.estimate;
+        (self.step.input.gear, *gear, *phase, clutches.map(|clutches| clutches.map(|clutch| clutch.element)), *health)
     }
 
     /// What its columns of readings say, which is mostly the same as in the row before.
     pub(crate) fn said(&self) -> Said {
-        let ShiftEstimate { channels, commands, clutches, .. } = &self.estimate;
+        let ShiftEstimate { channels, commands, clutches, .. } = &self.filtered.estimate;
         (*channels, *commands, clutches.map(|clutches| clutches.map(|clutch| clutch.element)))
     }
 
@@ -62,13 +60,13 @@ impl<'a> Row<'a> {
 
     /// The gear (0) or the target gear (1).
     fn of(&self, which: usize) -> Gear {
-        if which == 0 { self.gears.from } else { self.gears.to }
+        if which == 0 { self.step.input.gear.from } else { self.step.input.gear.to }
     }
 
     /// What became of the reading of a channel, by its place in [`READINGS`]; of the command of a clutch of the shift nothing where there
     /// is none.
     fn reading(&self, at: usize) -> Cell<'a> {
-        let ShiftEstimate { channels, commands, clutches, .. } = &self.estimate;
+        let ShiftEstimate { channels, commands, clutches, .. } = &self.filtered.estimate;
         let of_command = |which: usize| clutches.and_then(|of| commands.get(of[which].element.place()?).copied());
         let health = match READINGS.get(at) {
             Some(&ONCOMING_COMMAND_READING) => of_command(1),
@@ -79,7 +77,7 @@ impl<'a> Row<'a> {
     }
 
     fn element(&self, which: usize) -> Cell<'a> {
-        let Some(clutches) = self.estimate.clutches else { return Cell::Word("") };
+        let Some(clutches) = self.filtered.estimate.clutches else { return Cell::Word("") };
         Cell::Word(match clutches[which].element {
             ShiftElement::OneWay => self.one_way(which),
             of => self.places.iter().find(|(at, _)| of.place() == Some(*at)).map_or("", |(_, name)| *name),
@@ -89,7 +87,7 @@ impl<'a> Row<'a> {
     /// The one-way clutch of the shift.
     fn one_way(&self, which: usize) -> &'a str {
         let gearbox = &self.car.gearbox;
-        let single = self.car.single_shift(self.estimate.gear.unwrap_or(self.gears));
+        let single = self.car.single_shift(self.filtered.estimate.gear.unwrap_or(self.step.input.gear));
         let element = single.and_then(|elements| gearbox.elements.get(elements[which]));
         element.map_or("", |element| element.name.as_str())
     }
@@ -97,7 +95,9 @@ impl<'a> Row<'a> {
     /// Pressure, torque, their ranges, both by the valve model, whether the speeds show nothing, and the standard deviations, in the order
     /// of [`CLUTCH`].
     fn clutch(&self, which: usize, what: usize) -> f64 {
-        let Some(clutch) = self.estimate.clutches.as_ref().map(|clutches| &clutches[which]) else { return f64::NAN };
+        let Some(clutch) = self.filtered.estimate.clutches.as_ref().map(|clutches| &clutches[which]) else {
+            return f64::NAN;
+        };
         if !clutch.element.has_pressure() && ![TORQUE, TORQUE_DEVIATION].contains(&what) {
             // It has a torque alone.
             return f64::NAN;
@@ -173,14 +173,16 @@ impl Value {
         match self {
             Self::Of(value) => value(row),
             Self::Clutch(which, what) => row.clutch_cell(which, what),
-            Self::Valve(place) => Cell::Number(row.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
-            Self::Range(place, end) => of(row.ranges_pa[place.min(MAX_ELEMENTS - 1)].map(|range| range[end] + 0.0)),
+            Self::Valve(place) => Cell::Number(row.filtered.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
+            Self::Range(place, end) => {
+                of(row.filtered.pressure_ranges_pa[place.min(MAX_ELEMENTS - 1)].map(|range| range[end] + 0.0))
+            }
             Self::GearNumber(which) => Cell::Number(row.numbers.number(row.of(which))),
             Self::Reading(at) => row.reading(at),
-            Self::Command(place) => Cell::Word(row.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
+            Self::Command(place) => Cell::Word(row.filtered.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
             Self::Measured(reading) => of(reading(row).map(|reading| reading.value)),
             Self::MeasuredCommand(place) => {
-                of(row.input.commands[place.min(MAX_ELEMENTS - 1)].map(|reading| reading.value))
+                of(row.step.input.commands[place.min(MAX_ELEMENTS - 1)].map(|reading| reading.value))
             }
         }
     }
@@ -190,7 +192,7 @@ impl Value {
     pub(crate) fn number(self, row: &Row<'_>) -> f64 {
         let cell = match self {
             // Most columns are those of the clutches of a shift, and most rows are of no shift.
-            Self::Clutch(..) if row.estimate.clutches.is_none() => return f64::NAN,
+            Self::Clutch(..) if row.filtered.estimate.clutches.is_none() => return f64::NAN,
             _ => self.cell(row),
         };
         match cell {
@@ -252,7 +254,7 @@ pub(crate) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
     let mut columns = vec![
         word(signal::GEAR, |row| row.gear(0)),
         word(signal::TARGET_GEAR, |row| row.gear(1)),
-        word(signal::PHASE, |row| Cell::Word(row.estimate.phase.map_or("", |phase| phase.name()))),
+        word(signal::PHASE, |row| Cell::Word(row.filtered.estimate.phase.map_or("", |phase| phase.name()))),
     ];
     if knows.elements {
         columns.extend([word(ROLES[0], |row| row.element(0)), word(ROLES[1], |row| row.element(1))]);
@@ -268,7 +270,7 @@ pub(crate) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
             ELEMENT.iter().zip(values).map(|(what, value)| number(format!("{}_{what}", element_column(name)), value)),
         );
     }
-    columns.push(word(signal::HEALTH, |row| Cell::Word(row.estimate.health.name())));
+    columns.push(word(signal::HEALTH, |row| Cell::Word(row.filtered.estimate.health.name())));
     let gears = [(signal::GEAR_NUMBER, 0), (signal::TARGET_GEAR_NUMBER, 1)];
     columns.extend(gears.map(|(name, which)| number(name, Value::GearNumber(which))));
     columns.extend(readings(places, knows));
@@ -277,26 +279,27 @@ pub(crate) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
 
 /// Torques beside those of the clutches of a shift.
 fn torques(knows: Knows) -> Vec<Column> {
-    let mut columns = vec![number("turbine_torque_estimate_n_m", Value::Of(|row| of(row.estimate.turbine_n_m)))];
+    let mut columns =
+        vec![number("turbine_torque_estimate_n_m", Value::Of(|row| of(row.filtered.estimate.turbine_n_m)))];
     if !knows.elements {
         columns.push(number(
             "clutches_at_turbine_estimate_n_m",
-            Value::Of(|row| of(row.estimate.at_turbine.map(|sum| sum.torque_n_m + 0.0))),
+            Value::Of(|row| of(row.filtered.estimate.at_turbine.map(|sum| sum.torque_n_m + 0.0))),
         ));
         columns.push(number(
             "clutches_at_turbine_deviation_n_m",
-            Value::Of(|row| of(row.estimate.at_turbine.map(|sum| sum.std_dev_n_m))),
+            Value::Of(|row| of(row.filtered.estimate.at_turbine.map(|sum| sum.std_dev_n_m))),
         ));
     }
-    columns.push(number(signal::SHAFT_ESTIMATE, Value::Of(|row| of(row.estimate.shaft_n_m))));
+    columns.push(number(signal::SHAFT_ESTIMATE, Value::Of(|row| of(row.filtered.estimate.shaft_n_m))));
     let clutch = if knows.converter { "lock_up" } else { "launch_clutch" };
     columns.push(number(
         format!("{clutch}_torque_estimate_n_m"),
-        Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.torque_n_m))),
+        Value::Of(|row| of(row.filtered.estimate.input_clutch.map(|clutch| clutch.torque_n_m))),
     ));
     columns.push(number(
         format!("{clutch}_torque_deviation_n_m"),
-        Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.std_dev_n_m))),
+        Value::Of(|row| of(row.filtered.estimate.input_clutch.map(|clutch| clutch.std_dev_n_m))),
     ));
     columns
 }
@@ -320,12 +323,12 @@ type Channel = (&'static str, fn(&Row<'_>) -> Option<Reading<f64>>);
 
 /// The measured channels that an estimate may have too.
 const MEASURED: [Channel; 6] = [
-    (signal::ENGINE_SPEED, |row| row.input.engine_rad_s),
-    (signal::TURBINE_SPEED, |row| row.input.turbine_rad_s),
-    (signal::OUTPUT_SPEED, |row| row.input.output_rad_s),
-    (signal::WHEEL_SPEED, |row| row.input.wheel_rad_s),
-    (signal::REPORTED_ENGINE_TORQUE, |row| row.reported_n_m),
-    (signal::LONGITUDINAL_ACCELERATION, |row| row.input.acceleration_m_s2),
+    (signal::ENGINE_SPEED, |row| row.step.input.engine_rad_s),
+    (signal::TURBINE_SPEED, |row| row.step.input.turbine_rad_s),
+    (signal::OUTPUT_SPEED, |row| row.step.input.output_rad_s),
+    (signal::WHEEL_SPEED, |row| row.step.input.wheel_rad_s),
+    (signal::REPORTED_ENGINE_TORQUE, |row| row.step.reported_n_m),
+    (signal::LONGITUDINAL_ACCELERATION, |row| row.step.input.acceleration_m_s2),
 ];
 
 /// The columns of the readings of a car, which an estimate has where they are asked for.

@@ -2,7 +2,7 @@
 
 use car::Car;
 use evaluate::learning_count::LearningCount;
-use evaluate::logged::LoggedDrive;
+use evaluate::logged::LoggedFilter;
 use observer::ShiftTables;
 use observer::gearbox::{Learnt, LearntElement};
 
@@ -24,22 +24,22 @@ pub struct LearntOfDrive {
 }
 
 impl LearntOfDrive {
-    pub(crate) fn of(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> Self {
-        let (_, learnt, count) = drive.learnt();
+    pub(crate) fn of(car: &Car, tables: &ShiftTables<f64>, filter: &LoggedFilter<'_>) -> Self {
+        let (_, learnt, count) = filter.learnt();
         let LearningCount { taken, forgotten, .. } = count;
         let has_changed = count.has_changed();
         Self {
             learnt: has_changed.then_some(*learnt),
             was_forgotten: has_changed && forgotten > 0,
             shifts: [u64::from(taken), u64::from(learnt.shifts)],
-            sentences: if has_changed { sentences(car, tables, drive) } else { Vec::new() },
+            sentences: if has_changed { sentences(car, tables, filter) } else { Vec::new() },
         }
     }
 }
 
 /// What is known of the car beside its vehicle file, with standard deviations.
-fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> Vec<String> {
-    let (filter, learnt, _) = drive.learnt();
+fn sentences(car: &Car, tables: &ShiftTables<f64>, filter: &LoggedFilter<'_>) -> Vec<String> {
+    let (filter, learnt, _) = filter.learnt();
     let elements = car.gearbox.elements.iter().enumerate();
     let elements: Vec<_> = elements
         .filter_map(|(at, element)| Some((element.name.as_str(), filter.learnt_element(learnt, tables.place(at)?)?)))

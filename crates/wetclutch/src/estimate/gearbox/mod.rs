@@ -10,9 +10,11 @@ use std::path::Path;
 
 use car::{Car, ErrorBudget};
 use config::CarFile;
+use evaluate::LogStep;
 use evaluate::checks::RefusedCommand;
 use evaluate::drive::ScoredDrive;
-use evaluate::logged::LoggedDrive;
+use evaluate::logged::{Filtered, LoggedDrive};
+use evaluate::logged_shifts::LoggedShifts;
 use observer::ShiftTables;
 use report::drive_page::{DrivePage, MAX_DRAWN, findings, shift_words};
 use study::gearbox::gear_numbers::GearNumbers;
@@ -130,7 +132,7 @@ pub fn estimate(
     let mut opened = None;
     let reading = CarReading { car, tables, log, stop: options.follow.as_ref(), threads: options.threads };
     let mut source = CarSource::open(reading, &mut opened, say)?;
-    let mut drive =
+    let LoggedDrive { mut filter, mut shifts } =
         LoggedDrive::new(car, tables, options.sensors.as_ref(), options.learnt.as_ref()).with_delays(source.delays_s());
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();
@@ -152,7 +154,8 @@ pub fn estimate(
     let mut times = RowTimes::default();
     // Without a page no shift is drawn.
     let max_drawn = if options.with_page { MAX_DRAWN } else { 0 };
-    let write = |(time_s, row): (f64, Row<'_>)| {
+    let mut write = |step: &LogStep, filtered: &Filtered| {
+        let (time_s, row) = (step.time_s, Row { car, numbers: &numbers, places: &places, step, filtered });
         let same = Same {
             readings: said.replace(row.said()) == Some(row.said()),
             others: named_before.replace(row.named()) == Some(row.named()),
@@ -167,41 +170,42 @@ pub fn estimate(
         table.cells(time_s, new.iter().map(|column| column.cell(&row, same)).chain(rest))?;
         if options.is_followed() { table.flush() } else { Ok(()) }
     };
-    with_stages(options.threads_of(&log), |stages| {
-        let mut rows = WriteBehind::new(stages, write);
-        let mut steps = ReadAhead::new(stages, || {
-            let step = source.next_step()?;
-            if let Some(step) = &step {
-                times.push(step);
-                if let Some(checks) = &mut checks {
-                    checks.push(step);
-                }
+    let read = || {
+        let next = source.next_step();
+        if let Ok(Some(step)) = &next {
+            times.push(step);
+            if let Some(checks) = &mut checks {
+                checks.push(step);
             }
-            Ok(step)
-        });
-        let passed = steps.try_for_each(|step| {
+        }
+        next
+    };
+    let judge = |row: &mut (LogStep, Filtered)| {
+        shifts.push(&row.0, &mut row.1);
+        shifts.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, shift.gears));
+        passing.push(car, row, &mut write)
+    };
+    with_stages(options.threads_of(&log), |stages| {
+        let mut rows = WriteBehind::new(stages, judge);
+        let filtered = ReadAhead::new(stages, read).try_for_each(|step| {
             let step = step?;
             options.row_done()?;
-            let estimate = drive.push(&step);
-            drive.draw_at_most(max_drawn, |shift| passing.wants(shift.number, car, shift.gears));
-            let (gears, ranges_pa) = (step.input.gear, drive.pressure_ranges_pa());
-            let (input, reported_n_m) = (step.input, step.reported_n_m);
-            let row = Row { car, numbers: &numbers, places: &places, gears, estimate, ranges_pa, input, reported_n_m };
-            passing.push(step.time_s, row, |time_s, row| rows.push((time_s, *row)))
+            rows.push((step, filter.step(&step)))
         });
         rows.finish()?;
-        passed
+        filtered
     })?;
+    let drive = LoggedDrive { filter, shifts };
     let origin_s = shown_from_s(times.first_s());
     let median_s = times.check(path, !log.map.channels.is_empty())?;
     source.finish(say)?;
     say_end_of_followed(options, path, say);
     checks.map_or(Ok(()), |checks| checks.check())?;
-    check_speeds(&drive, (setup, path), say)?;
+    check_speeds(&drive.shifts, (setup, path), say)?;
     if let Some(warning) = slow_log(median_s) {
         say(&warning);
     }
-    let learnt = LearntOfDrive::of(car, tables, &drive);
+    let learnt = LearntOfDrive::of(car, tables, &drive.filter);
     let mut drive = drive.finish();
     passing.check()?;
     drive.shifts.retain(|shift| passing.wants(shift.number, car, shift.gears));
@@ -211,7 +215,7 @@ pub fn estimate(
 }
 
 /// Refuses a log whose speeds are not those of the car, or of which no estimate can be used.
-fn check_speeds(drive: &LoggedDrive<'_>, (setup, path): (&Setup<'_>, &Path), say: Notes<'_>) -> Result<(), Error> {
+fn check_speeds(drive: &LoggedShifts<'_>, (setup, path): (&Setup<'_>, &Path), say: Notes<'_>) -> Result<(), Error> {
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
         say(&format!("warning: {swapped}"));
     }

@@ -153,16 +153,17 @@ impl<'a> CarSource<'a> {
     /// # Errors
     /// The log cannot be read.
     pub fn next_step(&mut self) -> Result<Option<LogStep>, Error> {
-        let next = match self.looked_at.pop_front() {
+        let mut next = match self.looked_at.pop_front() {
             Some(step) => Some(step),
             None => self.kind.next_step()?,
         };
-        Ok(next.map(|mut step| {
+        // In place: steps are large.
+        if let Some(step) = &mut next {
             for (command, reading) in self.commands.iter_mut().zip(&mut step.input.commands) {
                 command.stand(reading);
             }
-            step
-        }))
+        }
+        Ok(next)
     }
 
     /// Says what was met in the log, after its last step.

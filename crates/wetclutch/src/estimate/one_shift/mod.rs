@@ -182,7 +182,7 @@ fn pass<'log, 'rows>(
 ) -> Result<(Measured<'log>, Rows<'rows>), Error> {
     let log = RefCell::new(log);
     with_stages(threads, |stages| {
-        let write = |(mut step, estimate): (Step, Option<Estimate<f64>>)| rows.take(&mut step, estimate.as_ref());
+        let write = |(step, estimate): &mut (Step, Option<Estimate<f64>>)| rows.take(step, estimate.as_ref());
         let passed = RefCell::new(WriteBehind::new(stages, write));
         let in_gears = std::iter::from_fn(|| {
             let mut log = log.borrow_mut();
