@@ -228,6 +228,28 @@ test("a log is estimated as the program does, and its name is text", async () =>
   });
 });
 
+test("an MDF log is estimated as the program does", async () => {
+  const file = join(folder, "log.mf4");
+  program("convert", LOG, "-o", file);
+  program("estimate", file, "--vehicle", resolve(import.meta.dirname, "../../vehicles/six_speed.toml"), "-o", "mdf_estimates.csv");
+  const ours = ask({ ask: "log_estimates", car: "six_speed", name: "log.mf4", map: null }, readFileSync(file));
+  assert(ours === readFileSync(join(folder, "mdf_estimates.csv"), "utf8"), "the estimates differ");
+  await on(async (page) => {
+    await page.select("#set-car", "six_speed");
+    await drop(page, file);
+    assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /log\.mf4 with “six-speed/);
+    assert((await page.$$("#shown-choice option")).length > 4);
+  });
+});
+
+test("frames in packed containers are read, Parquet is refused with a hint", () => on(async (page) => {
+  const data = (name) => resolve(import.meta.dirname, "../../crates/logs/tests/data", name);
+  await drop(page, data("bus.blf"), data("bus.dbc"));
+  await page.waitForFunction(() => !document.querySelector("#log-map").hidden, { timeout: 20000 });
+  await drop(page, data("snappy.parquet"));
+  assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /Parquet logs are not read from memory.*convert/);
+}));
+
 test("a log with other names is mapped by suggestion", () => on(async (page) => {
   const [head, ...rows] = measured.split("\n");
   const renamed = join(folder, "bench.csv");
@@ -264,8 +286,9 @@ test("a CAN log with its DBC is estimated as the program does", async () => {
     await drop(page, log);
     assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /drop its DBC on this page too/);
     await drop(page, log, database);
-    await page.waitForFunction(() => !document.querySelector("#log-map").hidden, { timeout: 20000 });
-    assert.match(await page.$eval("#log-map textarea", (map) => map.value), /turbine_speed_rad_s/);
+    // Its signals have the names of the program.
+    await page.waitForFunction(() => document.querySelector("#log-messages p b"), { timeout: 20000 });
+    assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /bus\.log with “six-speed/);
   });
 });
 

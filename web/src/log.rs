@@ -60,7 +60,7 @@ impl<'a> Given<'a> {
         let options = EstimateOptions { with_page: true, columns, ..EstimateOptions::default() };
         let setup = Setup::new(&self.car, &options)?;
         let mut notes = Vec::new();
-        let log = LogInput { path: self.name, memory: Some(InMemory::Text(&self.text)), map: &self.map };
+        let log = LogInput { path: self.name, memory: Some(InMemory::Bytes(&self.text)), map: &self.map };
         let found = estimate(&setup, log, Destination::Memory, &mut |note| notes.push(note.to_owned()))?;
         Ok((found.with_times_from_origin(), notes))
     }
@@ -83,7 +83,7 @@ pub(crate) fn estimates(asked: &Asked<'_>) -> Result<Table, Error> {
 /// A first channel map for a log, as `wetclutch inspect --suggest` writes it.
 pub(crate) fn suggested(asked: &Asked<'_>) -> Result<Value, Error> {
     let text: Arc<[u8]> = asked.text.into();
-    let mut log = Log::of_text(Path::new(asked.name), &asked.options(), Box::new(std::io::Cursor::new(text)))?;
+    let mut log = Log::of_bytes(Path::new(asked.name), &asked.options(), Box::new(std::io::Cursor::new(text)))?;
     let ranges = logs::inspect(&mut log)?.ranges();
     Ok(json!({ "map": logs::suggest(log.channels(), &ranges, None).trim_end() }))
 }

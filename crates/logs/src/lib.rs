@@ -8,7 +8,7 @@
 //! **Architecture invariant:** this is the only crate that reads the formats of recorders.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
-// What only the readers of MDF, Parquet and BLF logs call.
+// What only the reader of Parquet logs calls, and what needs threads.
 #![cfg_attr(target_family = "wasm", allow(dead_code))]
 
 mod ahead;
@@ -29,7 +29,6 @@ pub mod inspect;
 pub mod log;
 pub mod look_ahead;
 pub mod map;
-#[cfg(not(target_family = "wasm"))]
 mod mdf;
 #[cfg(target_family = "wasm")]
 mod not_in_browser;
@@ -60,7 +59,7 @@ pub use format::{CanKind, Format};
 pub use frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
 pub use held::HeldSpeed;
 pub use inspect::{ChannelSummary, Inspection, inspect};
-pub use log::{Log, OpenOptions, needs_map};
+pub use log::{Log, OpenOptions, bytes_need_map, needs_map};
 pub use look_ahead::{LOOK_AHEAD_S, LookAhead};
 pub use map::{ChannelMap, Combine, Gearbox, Mapped};
 pub use on_change::OnChange;

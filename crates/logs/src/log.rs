@@ -15,10 +15,9 @@ use crate::arrays::Arrays;
 use crate::can::{CanLog, Database};
 use crate::columns::{Columns, Stream};
 use crate::csv_log::CsvLog;
-#[cfg(not(target_family = "wasm"))]
 use crate::mdf::MdfLog;
 #[cfg(target_family = "wasm")]
-use crate::not_in_browser::{MdfLog, ParquetLog};
+use crate::not_in_browser::ParquetLog;
 #[cfg(not(target_family = "wasm"))]
 use crate::parquet_log::ParquetLog;
 use crate::readings_table::ReadingsTable;
@@ -65,6 +64,16 @@ enum Source {
     Can(CanLog),
 }
 
+/// Where a log is read from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    File,
+    Pipe,
+    Memory,
+    /// A file or pipe that is still being written.
+    Growing,
+}
+
 /// The warning of a DBC that is given for a log without frames.
 pub const NO_FRAMES: &str = "the DBC has no effect: there are no frames of a CAN bus in this log\nhint: leave it out";
 
@@ -78,12 +87,12 @@ impl Log {
     /// # Errors
     /// The file cannot be read, or is none of the known formats.
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Self, LogError> {
-        let reader: Box<dyn Read + Send> = match path.to_str() {
-            Some("-") => Box::new(io::stdin()),
-            _ => Box::new(File::open(path).map_err(LogError::io(path))?),
+        let (reader, kind): (Box<dyn Read + Send>, _) = match path.to_str() {
+            Some("-") => (Box::new(io::stdin()), Kind::Pipe),
+            _ => (Box::new(File::open(path).map_err(LogError::io(path))?), Kind::File),
         };
         trace::file_used(FileUse::Read, path);
-        Self::of(path, options, reader, false)
+        Self::of(path, options, reader, kind)
     }
 
     /// Opens a log that is still being written: CSV or text of a CAN log. Its samples come as its lines do, until `stop` is
@@ -93,26 +102,21 @@ impl Log {
     /// See [`Self::open`].
     pub fn follow(path: &Path, options: &OpenOptions, stop: Arc<AtomicBool>) -> Result<Self, LogError> {
         let reader = Following::open(path, stop).map_err(LogError::io(path))?;
-        Self::of(path, options, Box::new(reader), true)
+        Self::of(path, options, Box::new(reader), Kind::Growing)
     }
 
-    /// Opens a log whose text is read from elsewhere than from a file; `path` is what messages call it.
+    /// Opens a log whose bytes are read from elsewhere than from a file; `path` is what messages call it.
     ///
     /// # Errors
     /// See [`Self::open`].
-    pub fn of_text(path: &Path, options: &OpenOptions, text: Box<dyn Read + Send>) -> Result<Self, LogError> {
-        Self::of(path, options, text, false)
+    pub fn of_bytes(path: &Path, options: &OpenOptions, bytes: Box<dyn Read + Send>) -> Result<Self, LogError> {
+        Self::of(path, options, bytes, Kind::Memory)
     }
 
-    fn of(
-        path: &Path,
-        options: &OpenOptions,
-        reader: Box<dyn Read + Send>,
-        is_followed: bool,
-    ) -> Result<Self, LogError> {
+    fn of(path: &Path, options: &OpenOptions, reader: Box<dyn Read + Send>, from: Kind) -> Result<Self, LogError> {
         let (head, reader) = beginning(path, reader)?;
         let database = options.database()?;
-        let is_file = path != Path::new("-");
+        let is_followed = from == Kind::Growing;
         let (source, channels) = match Format::of(&head) {
             Format::Mdf | Format::Parquet | Format::Can(CanKind::Blf) if is_followed => {
                 return Err(LogError::file(
@@ -120,12 +124,19 @@ impl Log {
                     "MDF, Parquet and BLF files cannot be followed while they are written\nhint: follow CSV or a bus log as text; read this file when it is complete",
                 ));
             }
-            Format::Mdf if is_file => {
-                let time = options.time.as_ref();
-                MdfLog::open(path, database, time).map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?
+            Format::Mdf if from != Kind::Pipe => {
+                let memory = if from == Kind::Memory { Some(whole(path, head, reader)?) } else { None };
+                let opened = MdfLog::open(path, memory.as_ref(), database, options.time.as_ref());
+                opened.map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?
             }
-            Format::Parquet if is_file => {
+            Format::Parquet if from == Kind::File => {
                 ParquetLog::open(path, options.time.as_ref()).map(|(log, channels)| (Source::Parquet(log), channels))?
+            }
+            Format::Parquet if from == Kind::Memory => {
+                return Err(LogError::file(
+                    path,
+                    "Parquet logs are not read from memory, as in a browser\nhint: save the channels as CSV or MDF 4 with `wetclutch convert`, or give the file to the program",
+                ));
             }
             Format::Mdf | Format::Parquet => {
                 return Err(LogError::file(
@@ -368,11 +379,24 @@ pub fn needs_map(path: &Path) -> Result<bool, LogError> {
     if !path.metadata().map_err(&io)?.is_file() {
         return Ok(false);
     }
-    let file = File::open(path).map_err(&io)?;
-    match Format::of(&beginning(path, Box::new(file))?.0) {
+    bytes_need_map(path, Box::new(File::open(path).map_err(&io)?))
+}
+
+/// The same of a log whose bytes are read from elsewhere; `path` is what messages call it.
+///
+/// # Errors
+/// See [`needs_map`].
+pub fn bytes_need_map(path: &Path, bytes: Box<dyn Read + Send>) -> Result<bool, LogError> {
+    match Format::of(&beginning(path, bytes)?.0) {
         Format::NotRead(why) => Err(LogError::file(path, why)),
         format => Ok(format != Format::Csv),
     }
+}
+
+/// All bytes of a log.
+fn whole(path: &Path, mut head: Vec<u8>, mut rest: Box<dyn Read + Send>) -> Result<Arc<[u8]>, LogError> {
+    rest.read_to_end(&mut head).map_err(LogError::io(path))?;
+    Ok(head.into())
 }
 
 /// The first bytes of a log and what comes behind them, as UTF-8 without a mark where it is text.

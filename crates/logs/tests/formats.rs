@@ -1,6 +1,8 @@
 //! Files that asammdf, python-can, cantools and pyarrow wrote. What must be in them follows from the formulas of
 //! `tests/data/make.py`, which are stated again here.
 
+use std::path::Path;
+
 use crate::common::{Folder, channel, data, read, with_dbc};
 use logs::{Log, LogError, OpenOptions, Quality};
 
@@ -198,6 +200,10 @@ fn what_holds_nothing_is_named() {
         let native = logs::needs_map(&folder.write("packed", bytes)).unwrap_err().to_string();
         assert_eq!(native, error);
     }
+    let packed = Box::new(std::io::Cursor::new(std::fs::read(data("snappy.parquet")).unwrap()));
+    let in_memory = Log::of_bytes(Path::new("log.parquet"), &OpenOptions::default(), packed).map(|_| ()).unwrap_err();
+    let said = "log.parquet: Parquet logs are not read from memory, as in a browser\nhint: save the channels as CSV";
+    assert!(in_memory.to_string().starts_with(said), "{in_memory}");
     let no_rows = std::fs::read(data("no_rows.parquet")).unwrap();
     assert!(message("no_rows", &no_rows).contains("there are no rows"));
     let brotli = message("brotli", &std::fs::read(data("brotli.parquet")).unwrap());

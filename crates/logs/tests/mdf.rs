@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::common::mdf::{HEAD, append, block, number, places, set};
-use crate::common::{Folder, channel, data, read};
+use crate::common::{Folder, channel, data, read, read_of};
 use falcon_mdf::Mf4Writer;
 use falcon_mdf::write::WriteCodec;
 use logs::{Log, OpenOptions, Quality, Sample};
@@ -476,4 +476,25 @@ fn a_file_whose_description_is_cut_is_refused_with_the_place() {
     let cut = *places(&bytes, b"##CN\0\0\0\0").last().unwrap() + 30;
     let error = read(&folder.write("cut.mf4", &bytes[..cut]), &OpenOptions::default()).map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("its structure: File is truncated: expected"), "{error}");
+}
+
+#[test]
+fn bytes_in_memory_are_read_as_those_of_a_file() {
+    let folder = Folder::new("mdf-in-memory");
+    let names = ["plain_400.mf4", "deflate.mf4", "transposed.mf4", "unsorted.mf4", "lz4.mf4", "bus.mf4", "blocks.mf4"];
+    let options = OpenOptions { dbc: Some(data("bus.dbc")), ..OpenOptions::default() };
+    for name in names {
+        let own = std::fs::read(data(name)).unwrap();
+        for length in [own.len(), own.len() - 40, own.len() / 2, 200, 70] {
+            let path = folder.write(name, &own[..length]);
+            let bytes = Box::new(std::io::Cursor::new(own[..length].to_vec()));
+            let said = |found: Result<(Log, Vec<Sample>, Vec<String>), logs::LogError>| match found {
+                Ok((log, samples, notes)) => Ok((log.channels().to_vec(), format!("{samples:?}"), notes)),
+                Err(error) => Err(error.to_string()),
+            };
+            let of_file = said(read(&path, &options));
+            assert_eq!(said(Log::of_bytes(&path, &options, bytes).and_then(read_of)), of_file, "{name} {length}");
+            assert!(length < own.len() || of_file.is_ok(), "{name}: {of_file:?}");
+        }
+    }
 }

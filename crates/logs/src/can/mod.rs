@@ -1,7 +1,6 @@
 //! CAN logs: frames from candump, ASC, BLF, PCAN, SavvyCAN and python-can files, and the signals that a DBC finds in them.
 
 mod bits;
-#[cfg(not(target_family = "wasm"))]
 mod blf;
 mod database;
 mod frame;
@@ -20,14 +19,11 @@ use std::path::{Path, PathBuf};
 pub use database::Database;
 pub(crate) use frame::{Frame, Frames};
 
-#[cfg(not(target_family = "wasm"))]
 use self::blf::Blf;
 use self::database::Found;
 use crate::CanKind;
 use crate::LogError;
 use crate::columns::{Batch, Stream};
-#[cfg(target_family = "wasm")]
-use crate::not_in_browser::Blf;
 use crate::samples::Sample;
 
 /// A CAN log that has not been read yet.

@@ -1,14 +1,13 @@
 //! The blocks of data of an MDF file: read and unpacked, also ahead on other threads.
 
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use falcon_mdf::blocks::data_block::CompressionType;
 use falcon_mdf::data_index::DataBlockInfo;
-use libdeflater::{DecompressionError, Decompressor};
 
+use super::bytes::Bytes;
+use super::inflate::{NotInflated, inflate};
 use super::limits::LARGEST_BLOCK;
 use crate::ahead::{Crew, Job};
 use crate::columns::Memory;
@@ -22,7 +21,7 @@ const MAX_SPARE: usize = 8;
 
 /// The blocks of a file.
 pub(super) struct Blocks {
-    file: Mutex<File>,
+    file: Bytes,
     /// Bytes of the blocks that are unpacked ahead.
     ahead: AtomicU64,
     /// Memory of blocks that were used.
@@ -97,14 +96,13 @@ impl Ahead {
 }
 
 impl Blocks {
-    pub(super) fn new(file: File) -> Self {
-        Self { file: Mutex::new(file), ahead: AtomicU64::new(0), spare: Mutex::default() }
+    pub(super) fn new(file: Bytes) -> Self {
+        Self { file, ahead: AtomicU64::new(0), spare: Mutex::default() }
     }
 
     /// Reads bytes of the file, in place of what is in `bytes`.
     pub(super) fn read(&self, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), String> {
-        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        let of_file = file.metadata().map_err(|error| error.to_string())?.len();
+        let of_file = self.file.len()?;
         let end = at.checked_add(length).filter(|end| *end <= of_file);
         end.ok_or_else(|| format!("it ends beyond the end of the file, byte {of_file}"))?;
         if length > LARGEST_BLOCK {
@@ -112,7 +110,7 @@ impl Blocks {
         }
         let length = usize::try_from(length).map_err(|error| error.to_string())?;
         bytes.resize(length, 0);
-        file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes)).map_err(|error| error.to_string())
+        self.file.read(at, bytes)
     }
 
     /// Reads a block, and unpacks it to the beginning of the memory; its bytes.
@@ -124,13 +122,11 @@ impl Blocks {
             // Fresh memory is zero already.
             memory.unpacked = vec![0; size];
         }
-        match Decompressor::new().zlib_decompress(&memory.packed, &mut memory.unpacked[..size]) {
+        match inflate(&memory.packed, &mut memory.unpacked[..size]) {
             Ok(unpacked) if unpacked == size => Ok(size),
             Ok(unpacked) => Err(format!("it unpacks to {unpacked} bytes, and its stated size is {size}")),
-            Err(DecompressionError::BadData) => Err("what is packed in it is damaged".to_owned()),
-            Err(DecompressionError::InsufficientSpace) => {
-                Err(format!("it unpacks to more than its stated size, {size} bytes"))
-            }
+            Err(NotInflated::Damaged) => Err("what is packed in it is damaged".to_owned()),
+            Err(NotInflated::TooLong) => Err(format!("it unpacks to more than its stated size, {size} bytes")),
         }
     }
 

@@ -5,7 +5,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::path::Path;
 use std::sync::Arc;
 
 use falcon_mdf::io::{ByteSlice, ByteSource, IoBackend};
@@ -24,9 +23,9 @@ const DATA_LINK: u64 = 2;
 /// The flag of a list whose blocks have blocks of invalidation bits.
 const IS_SPLIT: u64 = 1 << 31;
 
-/// Opens a file that is cut within its data; also the first place that is not whole, and what it lacks. None if what describes the data is cut.
-pub(super) fn open(path: &Path, options: OpenOptions) -> Option<(Mf4File, String, String)> {
-    let mut source = Mended { file: IoBackend::open(path).ok()?, numbers: BTreeMap::new() };
+/// Opens a file of these bytes that is cut within its data; also the first place that is not whole, and what it lacks. None if what describes the data is cut.
+pub(super) fn open(file: IoBackend, options: OpenOptions) -> Option<(Mf4File, String, String)> {
+    let mut source = Mended { file, numbers: BTreeMap::new() };
     let first = source.mend()?;
     let end = source.file.len();
     let file = Mf4File::from_source_with_options(Arc::new(source), options).ok()?;

@@ -304,7 +304,6 @@ impl<'a> Field<'a> {
 
 #[cfg(test)]
 mod tests {
-    use std::fs::File;
     use std::sync::Arc;
 
     use falcon_mdf::write::WriteCodec;
@@ -313,6 +312,7 @@ mod tests {
     use rand_pcg::rand_core::{Rng, SeedableRng};
 
     use super::super::blocks::Blocks;
+    use super::super::bytes::Bytes;
     use super::super::group::numbers;
     use super::super::records::Records;
     use super::*;
@@ -333,7 +333,7 @@ mod tests {
         }
         let path = std::env::temp_dir().join(format!("wetclutch-fields-{}.mf4", std::process::id()));
         writer.write_to_file(&path).unwrap();
-        let open = (Mf4File::open(&path).unwrap(), Arc::new(Blocks::new(File::open(&path).unwrap())));
+        let open = (Mf4File::open(&path).unwrap(), Arc::new(Blocks::new(Bytes::open(&path, None).unwrap())));
         let _ = std::fs::remove_file(path);
         open
     }

@@ -5,17 +5,18 @@
 
 mod blocks;
 mod bus;
+mod bytes;
 mod conversion;
 mod cut;
 mod field;
 mod group;
+mod inflate;
 mod limits;
 mod records;
 mod times;
 mod units;
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -27,6 +28,7 @@ use crate::columns::{Batch, Stream};
 use crate::{Channel, LogError, TimeColumn, error};
 use blocks::Blocks;
 use bus::Bus;
+use bytes::Bytes;
 use conversion::unreadable;
 use field::{Field, Tile};
 use group::{Decoding, Group, Part};
@@ -64,9 +66,10 @@ struct Place {
 }
 
 impl MdfLog {
-    /// Opens a file. A unit in `time` replaces that of the times with this name.
+    /// Opens a file, or its bytes in memory; then `path` is what messages call it. A unit in `time` replaces that of the times with this name.
     pub(crate) fn open(
         path: &Path,
+        memory: Option<&Arc<[u8]>>,
         database: Option<Database>,
         time: Option<&TimeColumn>,
     ) -> Result<(Self, Vec<Channel>), LogError> {
@@ -77,16 +80,19 @@ impl MdfLog {
             max_decompressed: LARGEST_BLOCK,
             ..OpenOptions::default()
         };
-        let (file, cut) = match Mf4File::open_with_options(path, options.clone()) {
-            Ok(file) => (file, None),
-            Err(error) => {
-                let is_cut = matches!(error, Mf4Error::TruncatedFile { .. });
-                let mended = if is_cut { cut::open(path, options) } else { None };
-                let (file, place, what) = mended.ok_or_else(|| damaged(path, "its structure", &error))?;
-                (file, Some((place, what)))
-            }
-        };
-        let blocks = Arc::new(Blocks::new(File::open(path).map_err(LogError::io(path))?));
+        let whole = bytes::backend(path, memory);
+        let (file, cut) =
+            match whole.and_then(|bytes| Mf4File::from_source_with_options(Arc::new(bytes), options.clone())) {
+                Ok(file) => (file, None),
+                Err(error) => {
+                    let is_cut = matches!(error, Mf4Error::TruncatedFile { .. });
+                    let mended = bytes::backend(path, memory).ok().filter(|_| is_cut);
+                    let mended = mended.and_then(|bytes| cut::open(bytes, options));
+                    let (file, place, what) = mended.ok_or_else(|| damaged(path, "its structure", &error))?;
+                    (file, Some((place, what)))
+                }
+            };
+        let blocks = Arc::new(Blocks::new(Bytes::open(path, memory)?));
         let mut names = HashMap::new();
         groups(&file).for_each(|(_, group)| *names.entry(group.acquisition_name.clone()).or_default() += 1);
         let masters = groups(&file).filter_map(|(at, group)| Some((at, time_channel(group)?)));

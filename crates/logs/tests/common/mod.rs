@@ -29,7 +29,11 @@ pub(crate) fn read_on(
     options: &OpenOptions,
     threads: usize,
 ) -> Result<(Log, Vec<Sample>, Vec<String>), LogError> {
-    let mut log = Log::open(path, options)?.on_threads(threads);
+    read_of(Log::open(path, options)?.on_threads(threads))
+}
+
+/// The samples of all channels of a log, and its notes.
+pub(crate) fn read_of(mut log: Log) -> Result<(Log, Vec<Sample>, Vec<String>), LogError> {
     let all: Vec<usize> = (0..log.channels().len()).collect();
     let mut samples = log.samples(&all)?;
     let mut read = Vec::new();

@@ -73,8 +73,8 @@ pub enum InMemory<'a> {
     Table(&'a Arc<Table>),
     /// A table of another kind, which is read where it stands.
     Rows(&'a Arc<dyn TableRows>),
-    /// The text of a file.
-    Text(&'a Arc<[u8]>),
+    /// The bytes of a file, of any format but Parquet.
+    Bytes(&'a Arc<[u8]>),
 }
 
 /// A log and how its channels are mapped to signals.
@@ -102,7 +102,7 @@ impl LogInput<'_> {
         match self.memory? {
             InMemory::Table(table) => Some(Arc::clone(table) as Arc<dyn TableRows>),
             InMemory::Rows(table) => Some(Arc::clone(table)),
-            InMemory::Text(_) => None,
+            InMemory::Bytes(_) => None,
         }
     }
 
@@ -116,7 +116,7 @@ impl LogInput<'_> {
     pub(crate) fn text(&self) -> io::Result<Option<Box<dyn Read + Send>>> {
         Ok(match (self.table(), self.memory) {
             (Some(table), _) => Some(Box::new(TableText::new(table)?)),
-            (None, Some(InMemory::Text(text))) => Some(Box::new(Cursor::new(Arc::clone(text)))),
+            (None, Some(InMemory::Bytes(text))) => Some(Box::new(Cursor::new(Arc::clone(text)))),
             _ => None,
         })
     }
@@ -135,6 +135,15 @@ impl LogInput<'_> {
         self.memory.is_some() || self.path == Path::new("-")
     }
 
+    /// Whether its channels need a map: those of a table with the names of the program need none.
+    pub(crate) fn needs_map(&self) -> Result<bool, Error> {
+        Ok(match self.memory {
+            Some(InMemory::Bytes(bytes)) => logs::bytes_need_map(self.path, Box::new(Cursor::new(Arc::clone(bytes))))?,
+            None if !self.is_stream() => logs::needs_map(self.path)?,
+            _ => false,
+        })
+    }
+
     /// Opens its text.
     fn reader(&self, stop: Option<&Arc<AtomicBool>>) -> Result<Box<dyn Read + Send>, Error> {
         let opening = |source| LogError::Io { path: self.path.to_owned(), source };
@@ -150,7 +159,7 @@ impl LogInput<'_> {
     pub(crate) fn open(&self, stop: Option<&Arc<AtomicBool>>, threads: usize) -> Result<Log, Error> {
         let opening = |source| LogError::Io { path: self.path.to_owned(), source };
         Ok(match (self.text().map_err(opening)?, stop) {
-            (Some(text), _) => Log::of_text(self.path, &self.map.open, text)?,
+            (Some(text), _) => Log::of_bytes(self.path, &self.map.open, text)?,
             (None, Some(stop)) => Log::follow(self.path, &self.map.open, Arc::clone(stop))?,
             (None, None) => Log::open(self.path, &self.map.open)?.on_threads(threads.max(1)),
         })

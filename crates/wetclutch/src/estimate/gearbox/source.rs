@@ -67,7 +67,7 @@ impl<'a> CarSource<'a> {
         let CarReading { car, tables, log, stop, threads } = reading;
         let LogInput { path, map, .. } = log;
         let is_followed = stop.is_some();
-        if map.channels.is_empty() && (log.is_stream() || !logs::needs_map(path)?) {
+        if map.channels.is_empty() && !log.needs_map()? {
             warn_of_dbc(map, say);
             let rows = CarLog::of(log.rows(stop)?, car, tables)?;
             let kind = SourceKind::Rows(Box::new(if is_followed { rows.following() } else { rows }));

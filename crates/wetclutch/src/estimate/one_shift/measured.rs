@@ -173,7 +173,7 @@ impl<'a> Measured<'a> {
     /// A table with the names of the program. `stop` ends one that is followed.
     pub(crate) fn rows(input: LogInput<'_>, vehicle: &Vehicle, stop: Option<&Arc<AtomicBool>>) -> Result<Self, Error> {
         let path = input.path;
-        if !input.is_stream() && logs::needs_map(path)? {
+        if input.needs_map()? {
             check_dbc(path, &input.open(stop, 1)?)?;
             return Err(Error::Input(format!(
                 "{}: this log needs a channel map\nhint: `wetclutch inspect` with --suggest writes a first one, for --map",
