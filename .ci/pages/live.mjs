@@ -19,9 +19,10 @@ test.after(() => rmSync(folder, { recursive: true }));
 const packed = Buffer.from(html.match(/id="wasm">([^<]*)</)[1], "base64");
 const { exports: sensor } = await WebAssembly.instantiate(await WebAssembly.compile(gunzipSync(packed)), {});
 function ask(question, log = Buffer.alloc(0)) {
-  const text = Buffer.concat([Buffer.from(JSON.stringify(question)), Buffer.from([0]), log]);
-  const place = sensor.question(text.length);
-  new Uint8Array(sensor.memory.buffer, place, text.length).set(text);
+  for (const [part, room] of [[Buffer.from(JSON.stringify(question)), sensor.question], [log, sensor.log_bytes]]) {
+    const place = room(part.length);
+    new Uint8Array(sensor.memory.buffer, place, part.length).set(part);
+  }
   const at = sensor.answer();
   return Buffer.from(new Uint8Array(sensor.memory.buffer, at, sensor.answer_bytes())).toString();
 }

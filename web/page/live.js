@@ -36,7 +36,7 @@ const DEFAULTS = {
 };
 const byId = (id) => document.getElementById(id);
 
-// The sensor: questions as JSON, and a log behind them; answers as bytes.
+// The sensor: questions as JSON, with a log; answers as bytes.
 class Sensor {
   static async load() {
     const packed = new Blob([bytesOf(byId("wasm").textContent.trim())]).stream().pipeThrough(new DecompressionStream("gzip"));
@@ -53,12 +53,11 @@ class Sensor {
 
   ask(question, log = new Uint8Array()) {
     const json = new TextEncoder().encode(JSON.stringify(question));
-    const { memory, question: place, answer, answer_bytes: bytes } = this.exports;
-    const at = place(json.length + 1 + log.length);
-    const room = new Uint8Array(memory.buffer, at, json.length + 1 + log.length);
-    room.set(json);
-    room[json.length] = 0;
-    room.set(log, json.length + 1);
+    const { memory, question: place, log_bytes: placeOfLog, answer, answer_bytes: bytes } = this.exports;
+    for (const [part, room] of [[json, place], [log, placeOfLog]]) {
+      const at = room(part.length);
+      new Uint8Array(memory.buffer, at, part.length).set(part);
+    }
     const from = answer();
     return new TextDecoder().decode(new Uint8Array(memory.buffer, from, bytes()));
   }

@@ -24,7 +24,7 @@ pub(crate) struct Asked<'a> {
     /// The DBC of a CAN log.
     pub(crate) dbc: Option<&'a Dbc>,
     /// The log.
-    pub(crate) text: &'a [u8],
+    pub(crate) bytes: Arc<[u8]>,
 }
 
 impl Asked<'_> {
@@ -40,7 +40,7 @@ struct Given<'a> {
     car: CarFile,
     name: &'a Path,
     map: ChannelMap,
-    text: Arc<[u8]>,
+    bytes: Arc<[u8]>,
 }
 
 impl<'a> Given<'a> {
@@ -52,7 +52,7 @@ impl<'a> Given<'a> {
         };
         map.open = OpenOptions { time: map.open.time, ..asked.options() };
         let file = car.read(&car.file(), car.text)?;
-        Ok(Self { car: file, name: Path::new(asked.name), map, text: asked.text.into() })
+        Ok(Self { car: file, name: Path::new(asked.name), map, bytes: asked.bytes.clone() })
     }
 
     fn estimated(&self, columns: &[&str]) -> Result<(DriveEstimates, Vec<String>), Error> {
@@ -60,7 +60,7 @@ impl<'a> Given<'a> {
         let options = EstimateOptions { with_page: true, columns, ..EstimateOptions::default() };
         let setup = Setup::new(&self.car, &options)?;
         let mut notes = Vec::new();
-        let log = LogInput { path: self.name, memory: Some(InMemory::Bytes(&self.text)), map: &self.map };
+        let log = LogInput { path: self.name, memory: Some(InMemory::Bytes(&self.bytes)), map: &self.map };
         let found = estimate(&setup, log, Destination::Memory, &mut |note| notes.push(note.to_owned()))?;
         Ok((found.with_times_from_origin(), notes))
     }
@@ -82,8 +82,7 @@ pub(crate) fn estimates(asked: &Asked<'_>) -> Result<Table, Error> {
 
 /// A first channel map for a log, as `wetclutch inspect --suggest` writes it.
 pub(crate) fn suggested(asked: &Asked<'_>) -> Result<Value, Error> {
-    let text: Arc<[u8]> = asked.text.into();
-    let mut log = Log::of_bytes(Path::new(asked.name), &asked.options(), Box::new(std::io::Cursor::new(text)))?;
+    let mut log = Log::of_bytes(Path::new(asked.name), &asked.options(), asked.bytes.clone())?;
     let ranges = logs::inspect(&mut log)?.ranges();
     Ok(json!({ "map": logs::suggest(log.channels(), &ranges, None).trim_end() }))
 }

@@ -65,11 +65,10 @@ enum Source {
 }
 
 /// Where a log is read from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     File,
     Pipe,
-    Memory,
+    Memory(Arc<[u8]>),
     /// A file or pipe that is still being written.
     Growing,
 }
@@ -105,18 +104,27 @@ impl Log {
         Self::of(path, options, Box::new(reader), Kind::Growing)
     }
 
-    /// Opens a log whose bytes are read from elsewhere than from a file; `path` is what messages call it.
+    /// Opens a log whose bytes are in memory; `path` is what messages call it.
     ///
     /// # Errors
     /// See [`Self::open`].
-    pub fn of_bytes(path: &Path, options: &OpenOptions, bytes: Box<dyn Read + Send>) -> Result<Self, LogError> {
-        Self::of(path, options, bytes, Kind::Memory)
+    pub fn of_bytes(path: &Path, options: &OpenOptions, bytes: Arc<[u8]>) -> Result<Self, LogError> {
+        let reader = Box::new(io::Cursor::new(Arc::clone(&bytes)));
+        Self::of(path, options, reader, Kind::Memory(bytes))
+    }
+
+    /// Opens a log whose text comes from elsewhere, as from a pipe; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    pub fn of_text(path: &Path, options: &OpenOptions, text: Box<dyn Read + Send>) -> Result<Self, LogError> {
+        Self::of(path, options, text, Kind::Pipe)
     }
 
     fn of(path: &Path, options: &OpenOptions, reader: Box<dyn Read + Send>, from: Kind) -> Result<Self, LogError> {
         let (head, reader) = beginning(path, reader)?;
         let database = options.database()?;
-        let is_followed = from == Kind::Growing;
+        let is_followed = matches!(from, Kind::Growing);
         let (source, channels) = match Format::of(&head) {
             Format::Mdf | Format::Parquet | Format::Can(CanKind::Blf) if is_followed => {
                 return Err(LogError::file(
@@ -124,15 +132,15 @@ impl Log {
                     "MDF, Parquet and BLF files cannot be followed while they are written\nhint: follow CSV or a bus log as text; read this file when it is complete",
                 ));
             }
-            Format::Mdf if from != Kind::Pipe => {
-                let memory = if from == Kind::Memory { Some(whole(path, head, reader)?) } else { None };
-                let opened = MdfLog::open(path, memory.as_ref(), database, options.time.as_ref());
+            Format::Mdf if !matches!(from, Kind::Pipe) => {
+                let memory = if let Kind::Memory(bytes) = &from { Some(bytes) } else { None };
+                let opened = MdfLog::open(path, memory, database, options.time.as_ref());
                 opened.map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?
             }
-            Format::Parquet if from == Kind::File => {
+            Format::Parquet if matches!(from, Kind::File) => {
                 ParquetLog::open(path, options.time.as_ref()).map(|(log, channels)| (Source::Parquet(log), channels))?
             }
-            Format::Parquet if from == Kind::Memory => {
+            Format::Parquet if matches!(from, Kind::Memory(_)) => {
                 return Err(LogError::file(
                     path,
                     "Parquet logs are not read from memory, as in a browser\nhint: save the channels as CSV or MDF 4 with `wetclutch convert`, or give the file to the program",
@@ -379,24 +387,22 @@ pub fn needs_map(path: &Path) -> Result<bool, LogError> {
     if !path.metadata().map_err(&io)?.is_file() {
         return Ok(false);
     }
-    bytes_need_map(path, Box::new(File::open(path).map_err(&io)?))
+    format_needs_map(path, Box::new(File::open(path).map_err(&io)?))
 }
 
-/// The same of a log whose bytes are read from elsewhere; `path` is what messages call it.
+/// The same of a log whose bytes are in memory; `path` is what messages call it.
 ///
 /// # Errors
 /// See [`needs_map`].
-pub fn bytes_need_map(path: &Path, bytes: Box<dyn Read + Send>) -> Result<bool, LogError> {
-    match Format::of(&beginning(path, bytes)?.0) {
+pub fn bytes_need_map(path: &Path, bytes: &Arc<[u8]>) -> Result<bool, LogError> {
+    format_needs_map(path, Box::new(io::Cursor::new(Arc::clone(bytes))))
+}
+
+fn format_needs_map(path: &Path, reader: Box<dyn Read + Send>) -> Result<bool, LogError> {
+    match Format::of(&beginning(path, reader)?.0) {
         Format::NotRead(why) => Err(LogError::file(path, why)),
         format => Ok(format != Format::Csv),
     }
-}
-
-/// All bytes of a log.
-fn whole(path: &Path, mut head: Vec<u8>, mut rest: Box<dyn Read + Send>) -> Result<Arc<[u8]>, LogError> {
-    rest.read_to_end(&mut head).map_err(LogError::io(path))?;
-    Ok(head.into())
 }
 
 /// The first bytes of a log and what comes behind them, as UTF-8 without a mark where it is text.

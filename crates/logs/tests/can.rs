@@ -293,7 +293,7 @@ fn a_dbc_in_memory_is_read_as_its_file_and_has_a_largest_size() {
     let bytes = std::fs::read(data("bus.dbc")).unwrap();
     let log = std::fs::read(data("bus.log")).unwrap();
     let of_text = OpenOptions { dbc: Some("bus.dbc".into()), dbc_text: Some(bytes.into()), ..OpenOptions::default() };
-    let opened = Log::of_bytes(Path::new("bus.log"), &of_text, Box::new(std::io::Cursor::new(log))).unwrap();
+    let opened = Log::of_bytes(Path::new("bus.log"), &of_text, log.into()).unwrap();
     assert_eq!(opened.channels(), Log::open(&data("bus.log"), &with_dbc()).unwrap().channels());
     let huge = vec![b' '; 33 << 20];
     let error = logs::can::Database::of_text(Path::new("huge.dbc"), &huge).unwrap_err();

@@ -200,7 +200,7 @@ fn what_holds_nothing_is_named() {
         let native = logs::needs_map(&folder.write("packed", bytes)).unwrap_err().to_string();
         assert_eq!(native, error);
     }
-    let packed = Box::new(std::io::Cursor::new(std::fs::read(data("snappy.parquet")).unwrap()));
+    let packed = std::fs::read(data("snappy.parquet")).unwrap().into();
     let in_memory = Log::of_bytes(Path::new("log.parquet"), &OpenOptions::default(), packed).map(|_| ()).unwrap_err();
     let said = "log.parquet: Parquet logs are not read from memory, as in a browser\nhint: save the channels as CSV";
     assert!(in_memory.to_string().starts_with(said), "{in_memory}");

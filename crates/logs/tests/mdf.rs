@@ -487,7 +487,7 @@ fn bytes_in_memory_are_read_as_those_of_a_file() {
         let own = std::fs::read(data(name)).unwrap();
         for length in [own.len(), own.len() - 40, own.len() / 2, 200, 70] {
             let path = folder.write(name, &own[..length]);
-            let bytes = Box::new(std::io::Cursor::new(own[..length].to_vec()));
+            let bytes = own[..length].into();
             let said = |found: Result<(Log, Vec<Sample>, Vec<String>), logs::LogError>| match found {
                 Ok((log, samples, notes)) => Ok((log.channels().to_vec(), format!("{samples:?}"), notes)),
                 Err(error) => Err(error.to_string()),

@@ -138,7 +138,7 @@ impl LogInput<'_> {
     /// Whether its channels need a map: those of a table with the names of the program need none.
     pub(crate) fn needs_map(&self) -> Result<bool, Error> {
         Ok(match self.memory {
-            Some(InMemory::Bytes(bytes)) => logs::bytes_need_map(self.path, Box::new(Cursor::new(Arc::clone(bytes))))?,
+            Some(InMemory::Bytes(bytes)) => logs::bytes_need_map(self.path, bytes)?,
             None if !self.is_stream() => logs::needs_map(self.path)?,
             _ => false,
         })
@@ -158,8 +158,11 @@ impl LogInput<'_> {
     /// Opens its channels.
     pub(crate) fn open(&self, stop: Option<&Arc<AtomicBool>>, threads: usize) -> Result<Log, Error> {
         let opening = |source| LogError::Io { path: self.path.to_owned(), source };
+        if let Some(InMemory::Bytes(bytes)) = self.memory {
+            return Ok(Log::of_bytes(self.path, &self.map.open, Arc::clone(bytes))?);
+        }
         Ok(match (self.text().map_err(opening)?, stop) {
-            (Some(text), _) => Log::of_bytes(self.path, &self.map.open, text)?,
+            (Some(text), _) => Log::of_text(self.path, &self.map.open, text)?,
             (None, Some(stop)) => Log::follow(self.path, &self.map.open, Arc::clone(stop))?,
             (None, None) => Log::open(self.path, &self.map.open)?.on_threads(threads.max(1)),
         })

@@ -91,7 +91,7 @@ fn collect(
 fn opened(log: LogInput<'_>) -> Result<Log, LogError> {
     let text = log.text().map_err(|source| LogError::Io { path: log.path.to_owned(), source })?;
     match text {
-        Some(text) => Log::of_bytes(log.path, &log.map.open, text),
+        Some(text) => Log::of_text(log.path, &log.map.open, text),
         None => Log::open(log.path, &log.map.open),
     }
 }
