@@ -50,7 +50,9 @@ def test_the_command_gives_the_same_fit(measured: wc.Table, fitted: wc.Fit, tmp_
 def test_valves_and_friction_are_fitted_by_oil_temperature(car: wc.Car, measured: wc.Table, fitted: wc.Fit) -> None:
     assert fitted.adaptations is None
     log = {name: measured[name] for name in measured} | {"oil_temperature_degc": np.full(measured.rows, 64.0)}
-    table = wc.fit(car, log, oil_step=20).adaptations
+    adapted = wc.fit(car, log, oil_step=20, page=True)
+    table = adapted.adaptations
+    assert "Adaptation table" in (adapted.page or "")
     assert table is not None and table.rows > 20 and set(table["oil_from_degc"]) == {60.0}
     assert set(table["quantity"]) == {"fill time", "kiss point", "valve lag", "valve delay", "friction x valve gain"}
     with pytest.raises(wc.InputError, match="the step of the oil temperature is 1 K"):
@@ -87,6 +89,20 @@ def test_intervals_are_drawn(fitted: wc.Fit) -> None:
     matplotlib.use("Agg")
     axis = fitted.plot()
     assert [label.get_text() for label in axis.get_yticklabels()] == fitted.intervals["parameter"]
+
+
+@pytest.mark.parametrize("has_oil", [True, False])
+def test_adaptations_are_drawn_over_the_temperature_or_by_clutch(car: wc.Car, measured: wc.Table, fitted: wc.Fit, has_oil: bool) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    degc = np.where(np.arange(measured.rows) < measured.rows // 2, 30.0, 70.0)
+    log = {name: measured[name] for name in measured} | ({"oil_temperature_degc": degc} if has_oil else {})
+    axes = wc.fit(car, log, oil_step=20).plot_adaptations()
+    assert [axis.get_ylabel() for axis in axes][:2] == ["fill time, ms", "kiss point, kPa"]
+    elements = [text.get_text() for text in (axes[0].get_legend().get_texts() if has_oil else axes[-1].get_xticklabels())]
+    assert elements == sorted(element.upper() for element in car.elements)
+    with pytest.raises(ValueError, match="oil_step"):
+        fitted.plot_adaptations()
 
 
 def test_progress_comes_at_most_ten_times_a_second_and_may_end_the_fit(car: wc.Car, measured: wc.Table) -> None:

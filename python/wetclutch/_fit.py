@@ -60,6 +60,19 @@ class Fit:
 
         return plot_fit(self)
 
+    def plot_adaptations(self) -> Any:
+        """Draws fill time, kiss point, lag, delay and friction of each clutch with their intervals; needs matplotlib.
+
+        Returns:
+            The axes of the figure.
+
+        Raises:
+            ValueError: ``oil_step`` was not given.
+        """
+        from ._plot import plot_adaptations
+
+        return plot_adaptations(self)
+
     def _repr_html_(self) -> str | None:
         return framed(self.page)
 

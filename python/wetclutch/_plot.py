@@ -117,6 +117,53 @@ def plot_fit(fit: Fit) -> Any:
     return axis
 
 
+#: What is adapted of a clutch, with its unit for readers and the factor on its SI value.
+_ADAPTED = (
+    ("fill time", "fill time, ms", 1e3),
+    ("kiss point", "kiss point, kPa", 1e-3),
+    ("valve lag", "valve lag, ms", 1e3),
+    ("valve delay", "valve delay, ms", 1e3),
+    ("friction x valve gain", "friction x valve gain", 1.0),
+)
+
+
+def plot_adaptations(fit: Fit) -> Any:
+    """Fill time, kiss point, lag, delay and friction of each clutch in all shifts, with their intervals, over the temperature of the oil."""
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    table = fit.adaptations
+    if table is None:
+        raise ValueError("the fit has no adaptations: give oil_step to wc.fit")
+    words = {name: np.asarray(table[name]) for name in ("element", "from_gear", "quantity", "verdict")}
+    value, lower, upper = (np.asarray(table[name]) for name in ("value", "lower", "upper"))
+    oil_degc = 0.5 * (np.asarray(table["oil_from_degc"]) + np.asarray(table["oil_to_degc"]))
+    elements = sorted(set(words["element"]))
+    has_oil = bool(np.isfinite(oil_degc).any())
+    of_all = (words["from_gear"] == "all") & np.isfinite(value) & (np.isfinite(oil_degc) == has_oil)
+    figure, axes = plt.subplots(len(_ADAPTED), 1, sharex=True, figsize=(8, 2.0 * len(_ADAPTED)), layout="constrained")
+    for axis, (quantity, label, scale) in zip(axes, _ADAPTED, strict=True):
+        for at, element in enumerate(elements):
+            rows = of_all & (words["quantity"] == quantity) & (words["element"] == element)
+            rows = np.flatnonzero(rows)[np.argsort(oil_degc[rows])]
+            # Beside each other, so that no interval hides another.
+            x = oil_degc[rows] + 0.4 * (at - 0.5 * (len(elements) - 1)) if has_oil else np.full(len(rows), at)
+            ends = scale * np.abs(np.stack([value[rows] - lower[rows], upper[rows] - value[rows]]))
+            is_identified = np.char.startswith(words["verdict"][rows].astype(str), "not").sum() == 0
+            line = "-" if has_oil else ""
+            axis.errorbar(x, scale * value[rows], ends, fmt=f"o{line}", color=f"C{at}", capsize=3, alpha=1.0 if is_identified else 0.35, label=element)
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+    if has_oil:
+        axes[0].legend(loc="upper right", ncols=len(elements), fontsize="small")
+        axes[-1].set_xlabel("temperature of the oil, degC")
+    else:
+        axes[-1].set_xticks(range(len(elements)), elements)
+    axes[0].set_title("adaptations with intervals of 95 %; pale: not identifiable")
+    del figure
+    return axes
+
+
 def plot_distribution(study: Study, column: str) -> Any:
     """The cumulative distribution of a column over the runs that have it."""
     import matplotlib.pyplot as plt

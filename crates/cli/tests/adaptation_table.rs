@@ -21,7 +21,10 @@ fn a_folder_of_logs_gives_a_table_by_clutch_gears_and_oil_temperature() {
     let fit = |logs: &str, more: &[&str]| {
         wetclutch(&[&["fit", logs, "--vehicle", CAR, "-o", &fitted, "--adaptation-table", &table], more].concat())
     };
-    let notes = said(&fit(&folder.path("logs"), &["--oil-step", "10"]));
+    let page = folder.path("fit.html");
+    let notes = said(&fit(&folder.path("logs"), &["--oil-step", "10", "--page", &page]));
+    let page = folder.read("fit.html");
+    assert!(page.contains("Adaptation table") && page.contains("80 to 90") && page.contains("kiss point (kPa)"));
     assert!(notes.contains("adaptation table, oil of 80 to 90 degC: "), "{notes}");
     let is_kept = notes.contains("warning: the given values are kept");
     assert_eq!(notes.contains("the fit of all shifts is not accepted"), is_kept, "{notes}");

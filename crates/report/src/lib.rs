@@ -2,6 +2,7 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+pub mod adaptation_page;
 mod axis;
 pub mod car_sensitivity_page;
 mod drawing;

@@ -4,6 +4,7 @@ mod gearbox;
 mod one_shift;
 
 use std::fmt;
+use std::iter;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,6 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use car::Sensors;
 use config::ConfigError;
 use fit::{Channel, OneStep};
+use report::adaptation_page::adaptation_parts;
 use report::sheet::{Part, Sheet};
 use trace::ShownPath as _;
 
@@ -250,7 +252,7 @@ impl Fitted {
         open.map(|row| row.name.as_str())
     }
 
-    /// Intervals, and what was found, as a page.
+    /// Intervals, adaptations, and what was found, as a page.
     fn page_with(&self, intervals: Part, given: &VehicleFile, logs: &[LogInput<'_>]) -> Result<String, Error> {
         let kept = self.kept.as_ref().map(|reason| format!("warning: the given values are kept: {reason}"));
         Ok(Sheet {
@@ -258,7 +260,7 @@ impl Fitted {
             title: "fit",
             lead: format!("fitted to {}", names(logs)),
             sentences: self.statements.iter().cloned().chain(kept).collect(),
-            parts: vec![intervals],
+            parts: iter::once(intervals).chain(self.adaptations.iter().flat_map(adaptation_parts)).collect(),
             sources: vec![given.source(), self.vehicle.source()],
         }
         .html()?)
