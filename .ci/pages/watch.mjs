@@ -62,9 +62,9 @@ async function open(address, { width = 1280, scheme = "light" } = {}) {
 
 const text = (page, selector) => page.$eval(selector, (of) => of.textContent);
 
-test("the page shows the rows as they come, holds, and says that the log has ended", { timeout: 60000 }, () => watched(async (address, finish) => {
+test("the page shows the rows as they come, holds, and says that the log has ended", { timeout: 150000 }, () => watched(async (address, finish) => {
   const page = await open(address);
-  await page.waitForFunction(() => document.querySelectorAll("#shifts tbody tr").length > 1, { timeout: 20000 });
+  await page.waitForFunction(() => document.querySelectorAll("#shifts tbody tr").length > 1, { timeout: 60000 });
   await frame(page);
   assert.equal(await page.$$eval("#panels .uplot", (plots) => plots.length), 4);
   assert.match(await text(page, "#gear"), /^gear /);
@@ -80,6 +80,8 @@ test("the page shows the rows as they come, holds, and says that the log has end
     await page.screenshot({ path: `${SHOTS}/watch_${width}_${scheme}.png`, fullPage: true });
   }
   await page.click("#hold");
+  // A redraw that had begun.
+  await wait(100);
   const held = await text(page, "#time");
   await wait(300);
   assert.equal(await text(page, "#time"), held);
