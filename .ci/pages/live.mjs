@@ -212,7 +212,7 @@ writeFileSync(LOG, measured);
 const drop = async (page, ...files) => {
   const input = await page.$("#file");
   await input.uploadFile(...files);
-  await page.waitForFunction(() => document.querySelector("#log-messages p b, #log-messages [role=alert]"), { timeout: 20000 });
+  await page.waitForFunction(() => document.querySelector("#log-messages p b, #log-messages [role=alert]"), { timeout: 60000 });
 };
 
 test("a log is estimated as the program does, and its name is text", async () => {
@@ -246,7 +246,7 @@ test("an MDF log is estimated as the program does", async () => {
 test("frames in packed containers are read, Parquet is refused with a hint", () => on(async (page) => {
   const data = (name) => resolve(import.meta.dirname, "../../crates/logs/tests/data", name);
   await drop(page, data("bus.blf"), data("bus.dbc"));
-  await page.waitForFunction(() => !document.querySelector("#log-map").hidden, { timeout: 20000 });
+  await page.waitForFunction(() => !document.querySelector("#log-map").hidden, { timeout: 60000 });
   await drop(page, data("snappy.parquet"));
   assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /Parquet logs are not read from memory.*convert/);
 }));
@@ -257,7 +257,7 @@ test("a log with other names is mapped by suggestion", () => on(async (page) => 
   writeFileSync(renamed, [head.replace("engine_speed_rad_s", "EngineSpeed [rad/s]").replace("turbine_speed_rad_s", "TurbineSpeed [rad/s]").replace("output_speed_rad_s", "OutputSpeed [rad/s]"), ...rows].join("\n"));
   await page.select("#set-car", "six_speed");
   await drop(page, renamed);
-  await page.waitForFunction(() => !document.querySelector("#log-map").hidden, { timeout: 20000 });
+  await page.waitForFunction(() => !document.querySelector("#log-map").hidden, { timeout: 60000 });
   assert.match(await page.$eval("#log-map textarea", (map) => map.value), /TurbineSpeed/);
 }));
 
@@ -288,7 +288,7 @@ test("a CAN log with its DBC is estimated as the program does", async () => {
     assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /drop its DBC on this page too/);
     await drop(page, log, database);
     // Its signals have the names of the program.
-    await page.waitForFunction(() => document.querySelector("#log-messages p b"), { timeout: 20000 });
+    await page.waitForFunction(() => document.querySelector("#log-messages p b"), { timeout: 60000 });
     assert.match(await page.$eval("#log-messages", (messages) => messages.textContent), /bus\.log with “six-speed/);
   });
 });
