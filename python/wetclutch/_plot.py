@@ -149,7 +149,7 @@ def plot_adaptations(fit: Fit) -> Any:
             # Beside each other, so that no interval hides another.
             x = oil_degc[rows] + 0.4 * (at - 0.5 * (len(elements) - 1)) if has_oil else np.full(len(rows), at)
             ends = scale * np.abs(np.stack([value[rows] - lower[rows], upper[rows] - value[rows]]))
-            is_identified = np.char.startswith(words["verdict"][rows].astype(str), "not").sum() == 0
+            is_identified = not np.char.startswith(words["verdict"][rows].astype(str), "not").any()
             line = "-" if has_oil else ""
             axis.errorbar(x, scale * value[rows], ends, fmt=f"o{line}", color=f"C{at}", capsize=3, alpha=1.0 if is_identified else 0.35, label=element)
         axis.set_ylabel(label)
@@ -159,7 +159,8 @@ def plot_adaptations(fit: Fit) -> Any:
         axes[-1].set_xlabel("temperature of the oil, degC")
     else:
         axes[-1].set_xticks(range(len(elements)), elements)
-    axes[0].set_title("adaptations with intervals of 95 %; pale: not identifiable")
+    pale = "not identifiable at one temperature or more" if has_oil else "not identifiable"
+    axes[0].set_title(f"adaptations with intervals of 95 %; pale: {pale}")
     del figure
     return axes
 
