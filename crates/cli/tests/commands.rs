@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use crate::any_car::column;
 use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, stderr, stdout, wetclutch};
 
 fn read(path: impl AsRef<Path>) -> String {
@@ -251,7 +252,11 @@ fn lost_samples_are_counted_and_do_not_stop_the_estimate() {
     let output = wetclutch(&["estimate", &folder.path("lossy.csv"), "--vehicle", VEHICLE, "-o", &out]);
     assert!(output.status.success());
     // The filter goes on without a reading that did not come.
-    assert_eq!(read(&out).matches("absent").count(), 95, "{}", stderr(&output));
+    let readings = column(&read(&out), "turbine_reading");
+    let lost: Vec<&String> = readings.iter().skip(99).step_by(100).collect();
+    assert!(lost.len() == 95 && lost.iter().all(|reading| *reading == "absent"), "{}", stderr(&output));
+    // Where the clutch grips, a slip is in doubt for some rows, and no reading is taken.
+    assert!(readings.iter().filter(|reading| *reading == "absent").count() <= 100);
     assert!(!read(&out).contains("NaN"));
 }
 

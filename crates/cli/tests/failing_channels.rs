@@ -354,7 +354,7 @@ fn the_choice_of_the_observer_looks_at_the_values_of_the_speeds() {
     let without = |speed: &str| case.with(&format!("{speed}_rad_s"), [-1.0, f64::INFINITY], "");
     for more in [&[][..], &["--map", &map]] {
         let (note, ..) = case.estimate(&without("wheel_speed"), more);
-        assert!(note.contains("observer: rigid"), "{note}");
+        assert!(note.contains("observer: gearbox, because the log has no wheel_speed_rad_s"), "{note}");
         let (note, ..) = case.estimate(&without("engine_speed"), more);
         assert!(note.contains("observer: open-loop-maps") && !note.contains("channel_lost"), "{note}");
         let named = |observer: &'static str| [more, &["--observer", observer]].concat();

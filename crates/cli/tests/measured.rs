@@ -60,7 +60,7 @@ fn a_suggested_map_gives_the_same_estimate_as_the_names_of_the_program() {
     let map = folder.write("map.toml", printed(&wetclutch(&["inspect", &log, "--suggest"])));
     let mapped = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--map", &map]);
     assert!(printed(&mapped) == expected, "{}", stderr(&mapped));
-    assert!(stderr(&mapped).contains("shifts: 1 (7.701 to 8.332 s)"), "{}", stderr(&mapped));
+    assert!(stderr(&mapped).contains("shifts: 1 (7.701 to 8.318 s)"), "{}", stderr(&mapped));
     // The same drive with other names, units and signs of decimals.
     let text = std::fs::read_to_string(&log).unwrap();
     let renamed = text.replacen("oncoming_current_a", "Strom [A]", 1).replace(',', ";").replace('.', ",");

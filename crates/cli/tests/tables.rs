@@ -26,12 +26,12 @@ fn a_wheel_speed_of_the_tread_is_read_with_the_radius_of_the_wheels() {
     let folder = Folder::new("tread");
     let log = two_speed(&folder);
     let wheel = "wheel_speed_rad_s";
-    assert!(said(&estimate(&folder, VEHICLE, &log)).contains("observer: kalman"));
+    assert!(said(&estimate(&folder, VEHICLE, &log)).contains("observer: gearbox"));
     let shafts = column(&folder.read("out.csv"), "shaft_torque_estimate_n_m");
     // The wheels of the two-speed car have a radius of 0.3 m.
     for (name, factor) in [("wheel_speed_m_s", 0.3), ("wheel_speed_km_h", 1.08), ("Wheel_Speed_kmh", 1.08)] {
         let other = scaled(&log, wheel, factor).replacen(wheel, name, 1);
-        assert!(said(&estimate(&folder, VEHICLE, &other)).contains("observer: kalman"), "{name}");
+        assert!(said(&estimate(&folder, VEHICLE, &other)).contains("observer: gearbox"), "{name}");
         let read = column(&folder.read("out.csv"), "shaft_torque_estimate_n_m");
         let off = |(a, b): (&String, &String)| a.parse::<f64>().unwrap_or(0.0) - b.parse::<f64>().unwrap_or(0.0);
         assert!(shafts.iter().zip(&read).all(|pair| off(pair).abs() < 1e-3), "{name}");

@@ -7,7 +7,9 @@ use design::{
     Model, compliant_observer, design_compliant, design_discrete, inversion, kalman_filter, rigid_observer,
     unscented_filter,
 };
-use observer::{Estimator, Health, Phase, RigidGains, RigidObserver, RigidState, Sample, SampleEstimator};
+use observer::{
+    Estimator, Health, Phase, RigidGains, RigidObserver, RigidState, Sample, SampleEstimator, one_shift_filter,
+};
 
 #[test]
 fn a_reading_that_no_pressure_explains_is_rejected_and_nothing_possible_is_left() {
@@ -34,6 +36,7 @@ fn an_observer_that_starts_anew_says_so_once() {
     let vehicle = VehicleFile::built_in().unwrap().vehicle;
     let compliant = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
     says_so(&kalman_filter(&vehicle, None), "kalman");
+    says_so(&one_shift_filter(&vehicle, None), "gearbox");
     says_so(&unscented_filter(&vehicle, None), "unscented");
     says_so(&compliant, "compliant");
     says_so(&inversion(&vehicle), "inversion");

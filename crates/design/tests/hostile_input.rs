@@ -11,7 +11,7 @@ use design::{
 use drivetrain::{ClutchValve, PulseWidth, Real, Table1, Valve};
 use observer::{
     CompliantGains, Discretisation, Estimate, Estimator, FillBudget, Health, Input, InputLimits, Reading, RigidGains,
-    Schedule, SlidingGains, Tracker,
+    Schedule, SlidingGains, Tracker, one_shift_filter,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -55,7 +55,7 @@ fn at<T: Real>(sample: &Sample) -> Input<T> {
         output_rad_s: reading(turbine - 0.6 * slip),
         wheel_rad_s: reading(wheel),
         command: reading(command),
-        offgoing_command: reading(wheel),
+        offgoing_command: reading(command),
         engine_torque_n_m: reading(engine),
     }
 }
@@ -108,6 +108,7 @@ fn survives<T: Real>(
             | Health::OutsideRange
             | Health::LimitedToRange
             | Health::PressureLimited
+            | Health::HeldClutchSlips
     );
     prop_assert!(usual || !recovers, "{name} {health:?}");
     Ok(())
@@ -141,6 +142,9 @@ fn attack<T: Real>(
     let kalman = kalman_filter(vehicle, None).cast::<T>();
     survives(&kalman, limits, samples, recovers)?;
     survives(&range.cast(kalman), limits, samples, recovers)?;
+    let gearbox = one_shift_filter(vehicle, None).cast::<T>();
+    survives(&gearbox, limits, samples, recovers)?;
+    survives(&range.cast(gearbox), limits, samples, recovers)?;
     survives!(extended_filter(vehicle, None));
     survives!(super_twisting(vehicle));
     survives!(inversion(vehicle));

@@ -9,7 +9,7 @@ use design::{
     Model, Quantity, best_compliant, best_rigid, bounded, compliant_observer, design_discrete_phase, design_sliding,
     extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
 };
-use observer::{Estimator, Phase, RigidGains, Sample};
+use observer::{Estimator, Phase, RigidGains, Sample, one_shift_filter};
 
 /// A few samples through a shift; every estimate must be a number.
 fn runs(observer: &impl Estimator<f64>, vehicle: &Vehicle, name: &str) {
@@ -35,6 +35,7 @@ fn observers_run(vehicle: &Vehicle, name: &str) {
     runs(&super_twisting(vehicle), vehicle, name);
     runs(&inversion(vehicle), vehicle, name);
     runs(&kalman_filter(vehicle, None), vehicle, name);
+    runs(&one_shift_filter(vehicle, None), vehicle, name);
     runs(&extended_filter(vehicle, None), vehicle, name);
     runs(&unscented_filter(vehicle, None), vehicle, name);
 }

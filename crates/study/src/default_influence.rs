@@ -12,8 +12,8 @@ use trace::Trace;
 use crate::sampling::sampled;
 use crate::{AnyObserver, RunColumns, StudyError, simulate_shift, true_phases};
 
-/// The observers that are looked at: the valve model of the file alone, and the default with a wheel speed.
-pub const OBSERVERS: [ObserverKind; 2] = [ObserverKind::OpenLoopMaps, ObserverKind::Kalman];
+/// The observers that are looked at: the valve model of the file alone, and the default.
+pub const OBSERVERS: [ObserverKind; 2] = [ObserverKind::OpenLoopMaps, ObserverKind::Gearbox];
 /// Time between two readings, s.
 const SAMPLE_S: f64 = 0.01;
 /// Throttle of the shift: the middle of what a driver uses in town [chosen].

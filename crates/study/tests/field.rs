@@ -5,7 +5,7 @@ use std::path::Path;
 use car::{Experiment, Vehicle};
 use config::{ExperimentFile, Study};
 use design::{bounded, kalman_filter, open_loop_maps, rigid_observer};
-use observer::{ChannelHealth, Estimate, Estimator, Health, Input, Phase, Reading, RigidGains};
+use observer::{ChannelHealth, Estimate, Estimator, Health, Input, Phase, Reading, RigidGains, one_shift_filter};
 use study::sampling::through_sensors;
 use study::{Campaign, Consistency, RunColumns, simulate_drive, true_phases};
 use trace::{Trace, signal};
@@ -177,6 +177,27 @@ fn an_observer_says_unused_of_a_wheel_speed_that_it_does_not_read() {
         assert_eq!(estimates.last().unwrap().health, Health::Good);
     }
     assert_eq!(field.kalman(&rows).last().unwrap().channels.wheel, ChannelHealth::Lost);
+}
+
+/// The readings above the highest speed of the file are refused; before, the gearbox filter ended there, with a torque of the wrong sign.
+#[test]
+fn a_turbine_that_turns_faster_than_the_file_says_costs_little() {
+    let mut field = Field::new();
+    let rows = field.rows("nominal");
+    let fastest = rows.iter().filter_map(|row| row.0.turbine_rad_s).map(|reading| reading.value).fold(0.0, f64::max);
+    let error = |vehicle: &Vehicle| {
+        let estimates = field.estimates(&one_shift_filter(vehicle, field.experiment.sensors_given.as_ref()), &rows);
+        SHIFT.map(|phase| rms(&rows, &estimates, phase))
+    };
+    let whole = error(&field.vehicle);
+    let mut slower = field.vehicle.clone();
+    slower.settings.speed_max_rad_s = 0.99 * fastest;
+    let refused = error(&slower);
+    assert!(refused[0] < 1.5 * whole[0] && refused[1] < 2.0 * whole[1], "{whole:?} {refused:?}");
+    field.vehicle = slower;
+    let filter = one_shift_filter(&field.vehicle, None);
+    let estimates = field.estimates(&filter, &rows);
+    assert!(estimates.iter().all(|estimate| estimate.clutch_torque_n_m >= 0.0));
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::{Open, OpenOutput, PhaseChoice, whole};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ObserverChoice {
-    /// kalman if the log has wheel_speed_rad_s, otherwise rigid with peak-to-peak gains
+    /// gearbox; kalman with --sensors and wheel_speed_rad_s; open-loop-maps without an engine speed
     Best,
     /// Reduced-order, rigid driveline, certified gains by `--method`
     Rigid,

@@ -125,7 +125,7 @@ fn describe_file(options: &Check, file: &Path, (source, kind): (Source, Kind)) -
             describe_use(what, "wetclutch design VEHICLE --bounds", file)
         }
         Kind::Sensors => {
-            let command = "wetclutch estimate LOG --vehicle VEHICLE --observer kalman --sensors";
+            let command = "wetclutch estimate LOG --vehicle VEHICLE --sensors";
             describe_use("sensors of a car", command, file)
         }
         Kind::Study => {

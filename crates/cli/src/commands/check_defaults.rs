@@ -29,10 +29,10 @@ pub(super) fn describe_defaults(vehicle: &VehicleFile, all: bool) -> Result<(), 
     };
     output::line(
         "which matter most: RMS change of pressure and torque of the oncoming clutch, in the torque and inertia phase of a\n\
-         simulated upshift when one default is wrong, for the open loop and for the default observer (kalman)\n",
+         simulated upshift when one default is wrong, for the open loop and for the default observer (gearbox)\n",
     )?;
     let shown = if all { influences.len() } else { SHOWN.min(influences.len()) };
-    let titles = ["default", "value", "wrong by", "open kPa", "open N m", "kalman kPa", "kalman N m"];
+    let titles = ["default", "value", "wrong by", "open kPa", "open N m", "gearbox kPa", "gearbox N m"];
     let rows = influences[..shown].iter().map(row);
     output::table(3, titles.map(str::to_owned).to_vec(), rows.collect())?;
     output::line("")?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use car::Vehicle;
+use car::{GainMethod, Vehicle};
 use config::{ExperimentFile, VehicleFile};
 use report::Page;
 use report::page::findings;
@@ -95,7 +95,7 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
 
 /// The default output of `estimate` for measured signals with a wheel speed.
 fn default_estimate(vehicle: &Vehicle, measured: &Trace) -> Result<Trace, Failure> {
-    let (kind, method) = best(true);
+    let (kind, method) = (best(true, false), GainMethod::default());
     let observer = AnyObserver::designed(vehicle, kind, method, measured.median_step_s(), None)?;
     let estimates = observer.run(vehicle, &RunColumns::of(measured, vehicle)?);
     Ok(estimates_trace(&measured.time_s, &estimates))

@@ -10,6 +10,10 @@ use super::{
 use car::ShiftCommand;
 use drivetrain::Real;
 
+/// Of a speed of the filter this fraction has to be one that a reading can have \[chosen\]: a car that turns a little faster than its file
+/// states has no readings then, and the filter goes on without them.
+const SOUND: f64 = 0.5;
+
 impl<T: Real> GearboxFilter<'_, T> {
     /// Ends a filter whose state is not possible, or whose gear does not fit; begins one in a gear.
     pub(super) fn settle(
@@ -28,7 +32,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             let slow = running.x.mean[OUTPUT].abs() <= self.uncertainty.output_least_rad_s;
             let possible = running.x.is_sound()
                 && self.limits.shaft_torque_possible(running.x.mean[SPRING])
-                && running.x.mean[..SPEEDS].iter().all(|&speed| self.limits.speed_valid(speed));
+                && running.x.mean[..SPEEDS].iter().all(|&speed| self.limits.speed_valid(T::of(SOUND) * speed));
             let ratio = self.tied_ratio(running).filter(|_| running.shift.is_none());
             let is_late = running.shift.is_some() && overruns;
             let unfit = is_late || ratio.is_some_and(|ratio| self.slip(ratio, speeds).is_over());

@@ -13,6 +13,8 @@ use crate::{ChannelHealth, LOST_S, PressureRange, Reading};
 /// Distance from the pressure that the command ends at from which on the valve model rests there, Pa \[chosen\]: errors of a
 /// pressure are thousands of this.
 const RESTS_PA: f64 = 1.0;
+/// Shortest step for which the rate of the pressure is taken, s \[chosen\]: of a shorter one rounding would make a rate without bound.
+const RATE_S: f64 = 1e-5;
 
 /// Minimum factor on the lag of a valve \[chosen\]: the bounds of the standard budget end at half the lag.
 const LAG_MIN: f64 = 0.1;
@@ -229,7 +231,7 @@ impl<T: Real> ElementState<T> {
             self.valve_pa = element.limits.possible_pressure(step.phi * before_pa + step.drift_pa);
             self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
         }
-        self.rate_pa_s = (self.valve_pa - start_pa) / dt_s;
+        self.rate_pa_s = (self.valve_pa - start_pa) / dt_s.at_least(T::of(RATE_S));
     }
 
     /// Lets time pass for the pistons, where they have a stroke, once there is a command: after [`Self::step`].

@@ -172,14 +172,15 @@ impl<T: Real> GearboxFilter<'_, T> {
                 } else if health < Health::TooSlow {
                     health = without;
                 }
-                let then = self.measured(&state.newest, None);
+                let (then, is_read) = (self.measured(&state.newest, None), self.are_read(&state.newest));
                 estimate.clutches = shift.map(|shift| {
                     let learnt = state.learnt.known_mean(&self.acting(shift));
-                    [0, 1].map(|c| {
+                    [0, 1].map(|c: usize| {
+                        let c = c.min(1);
                         let clutch = &shift.clutches[c];
                         let lasting = [learnt[c], learnt[c + 2]];
                         let slip = self.slip(clutch.ratio, then);
-                        let direction = Self::direction_by_valve(&slip, turbine_n_m);
+                        let direction = Self::direction_by_valve(is_read, &slip, turbine_n_m);
                         let estimate = self.by_valve(&state.elements, clutch, [slip.value, direction], lasting);
                         let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
                         self.in_range(estimate, &state.elements, (clutch, is_tied), &state.newest)
@@ -214,11 +215,12 @@ impl<T: Real> GearboxFilter<'_, T> {
         if away && slip.is_over() { slip.value.abs() } else { T::zero() }
     }
 
-    /// In which direction a clutch carries where the speeds cannot be used: that of its slip, and where none is seen that of the load, as far
-    /// as it is known. The sign of a slip below the noise of the speeds changes from step to step.
-    fn direction_by_valve(slip: &Slip<T>, turbine_n_m: Option<T>) -> T {
-        match turbine_n_m {
-            Some(load) if !slip.is_over() => load.signum(),
+    /// In which direction a clutch carries where the filter does not run: that of its slip, and where none is read or seen that of the load, as
+    /// far as it is known. The sign of a slip below the noise of the speeds changes from step to step.
+    fn direction_by_valve(is_read: bool, slip: &Slip<T>, turbine_n_m: Option<T>) -> T {
+        match (turbine_n_m, is_read) {
+            (Some(load), is_read) if !is_read || !slip.is_over() => load.signum(),
+            (None, false) => T::one(),
             _ => slip.direction(),
         }
     }

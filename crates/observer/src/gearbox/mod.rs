@@ -125,6 +125,8 @@ const PIECE_S: f64 = 0.0125;
 const MAX_PIECES: usize = 32;
 /// Time without a reading of turbine or output speed in a shift after which it teaches nothing, s \[chosen\].
 const GAP_S: f64 = 0.025;
+/// Longest step, s \[chosen\]; a longer one counts as this.
+const LONGEST_S: f64 = 1e6;
 /// How old the first readings may be, s.
 const FIRST_S: f64 = 0.05;
 /// Low-pass of the turbine torque that the fraction `b` multiplies, s.
@@ -386,6 +388,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             return state.estimate;
         }
         state.started = true;
+        // All that fades has done so, and larger numbers have no square in single precision.
+        let dt_s = dt_s.at_most(T::of(LONGEST_S));
         let of_one_time = state.skew.taken_off(input);
         let input = of_one_time.as_ref().unwrap_or(input);
         if dt_s > T::of(LOST_S) {

@@ -8,6 +8,9 @@ const REMEMBERED: usize = 32;
 /// A pressure this near to what the commands end at is there, Pa.
 const SETTLED_PA: f64 = 1.0;
 
+/// A time up to this is a moment, s \[chosen\]: what is in effect for a part of it is not known, as times are rounded.
+const MOMENT_S: f64 = 1e-6;
+
 /// The valve model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -91,7 +94,7 @@ impl<T: Real> Commands<T> {
         // At a time `x` ago the newest command was in effect that is older than `x` and the delay.
         let (newest, oldest) = (delay_s, delay_s + dt_s);
         let earliest = self.sent.get(self.count.checked_sub(1)?)?;
-        if dt_s <= T::zero() {
+        if dt_s <= T::of(MOMENT_S) {
             let first = self.sent.iter().take(self.count).find(|sent| sent.age_s >= newest);
             return Some(first.unwrap_or(earliest).settled_pa);
         }
@@ -170,6 +173,20 @@ mod tests {
         assert!((commands.mean_pa(0.015, 0.01).unwrap() - 2.0).abs() < 1e-12);
         commands.pass(0.01);
         assert!((commands.mean_pa(0.015, 0.01).unwrap() - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn over_a_moment_one_command_is_in_effect() {
+        let mut commands = Commands::<f32>::new();
+        commands.send(0.0, 1e6, 0.025);
+        commands.pass(0.1);
+        commands.send(0.0, 0.0, 0.025);
+        commands.pass(0.015);
+        for dt_s in [0.0, 1e-44, 1e-30, 1e-9, 1e-7] {
+            commands.pass(dt_s);
+            let mean_pa = commands.mean_pa(0.015, dt_s).unwrap();
+            assert!(mean_pa == 0.0 || mean_pa == 1e6, "{dt_s}: {mean_pa}");
+        }
     }
 
     #[test]

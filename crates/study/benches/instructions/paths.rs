@@ -135,7 +135,7 @@ fn study_runs() -> Box<dyn FnMut()> {
     })
 }
 
-/// Reads rows, runs the default observer with its range, and writes rows, as `wetclutch estimate` does.
+/// Reads rows, runs the Kalman filter with its range, and writes rows, as `wetclutch estimate` does.
 fn estimate_rows() -> Box<dyn FnMut()> {
     let (vehicle, observer, log) = (vehicle(), observer(ObserverKind::Kalman), write_log(Vec::new(), 10_000));
     Box::new(move || estimate(&observer, &vehicle, &log))

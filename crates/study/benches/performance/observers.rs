@@ -41,7 +41,7 @@ pub(crate) fn steps(page: &mut String) -> Figure {
     }
     let peak_to_peak =
         design_discrete(&vehicle, Model::Rigid, GainMethod::PeakToPeak, SAMPLE_TIME_S).unwrap().rigid_gains();
-    observer!("Kalman (the default)", kalman_filter(&vehicle, sensors.as_ref()));
+    observer!("Kalman", kalman_filter(&vehicle, sensors.as_ref()));
     observer!("extended Kalman", extended_filter(&vehicle, sensors.as_ref()));
     observer!("unscented", unscented_filter(&vehicle, sensors.as_ref()));
     observer!("rigid", rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains()));

@@ -31,7 +31,7 @@ pub(crate) fn check_options(options: &EstimateOptions) -> Result<(), Error> {
     if options.learnt.is_some() {
         return Err(learnt_without_effect());
     }
-    // Without a wheel speed the best observer is another; that is known when the log is known.
+    // Without an engine speed the best observer is another; that is known when the log is known.
     if options.sensors.is_some() && options.observer.is_some_and(|kind| !is_filter(kind)) {
         return Err(sensors_without_effect());
     }
@@ -70,30 +70,24 @@ pub(crate) fn choose(
     let (has_engine, has_wheel) = (log.has_engine_speed(), log.has_wheel_speed());
     let (kind, method) = match options.observer {
         None if !has_engine => (ObserverKind::OpenLoopMaps, GainMethod::Iss),
-        None => best(has_wheel),
+        None => (best(has_wheel, options.sensors.is_some()), GainMethod::default()),
         Some(chosen) => (chosen, options.method.unwrap_or_default()),
     };
     if options.observer.is_none() {
-        say(match (has_engine, has_wheel) {
-            (false, _) => {
+        say(match (kind, has_wheel) {
+            (ObserverKind::OpenLoopMaps, _) => {
                 "observer: open-loop-maps, because the log has no engine speed, which all observers need but the open loops"
             }
-            (true, true) => "observer: kalman, because the log has a wheel speed",
-            (true, false) => {
-                "observer: rigid with peak-to-peak gains, because the log has no wheel_speed_rad_s, which kalman needs"
-            }
+            (ObserverKind::Kalman, _) => "observer: kalman, because the sensors are described",
+            (_, true) => "observer: gearbox, because no --sensors are given",
+            (_, false) => "observer: gearbox, because the log has no wheel_speed_rad_s",
         });
     }
     if options.sensors.is_some() && !is_filter(kind) {
         return Err(match options.observer {
-            None if !has_engine => Error::Input(
+            None => Error::Input(
                 "the log has no engine speed: the best observer is then open-loop-maps, which does not use --sensors\n\
                  hint: leave --sensors out, or give the log an engine_speed_rad_s (in a channel map: engine_speed)"
-                    .to_owned(),
-            ),
-            None => Error::Input(
-                "the log has no wheel speed: the best observer is then rigid, which does not use --sensors\n\
-                 hint: leave --sensors out, or give the log a wheel_speed_rad_s (in a channel map: wheel_speed), with which it is kalman"
                     .to_owned(),
             ),
             _ => sensors_without_effect(),
@@ -143,13 +137,10 @@ fn open_loop_phases(
     phases.into_iter().map(|phase| format!("{}: the gain is the open loop: {why}", phase_name(phase))).collect()
 }
 
-/// The observer for a log, if the user names none.
-pub fn best(has_wheel_speed: bool) -> (ObserverKind, GainMethod) {
-    if has_wheel_speed {
-        (ObserverKind::Kalman, GainMethod::Iss)
-    } else {
-        (ObserverKind::Rigid, GainMethod::PeakToPeak)
-    }
+/// The observer for a log with an engine speed, if the user names none: that with the smaller errors where all errors vary together
+/// (`docs/explanation/results.md`).
+pub fn best(has_wheel_speed: bool, has_sensors: bool) -> ObserverKind {
+    if has_wheel_speed && has_sensors { ObserverKind::Kalman } else { ObserverKind::Gearbox }
 }
 
 /// An observer and how its gains were found.
