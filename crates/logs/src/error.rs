@@ -62,8 +62,13 @@ impl LogError {
 
     /// What a binary file holds at this place contradicts itself, or ends too early.
     pub(crate) fn cut_or_damaged(path: &Path, position: impl Into<String>, message: impl Display) -> Self {
-        let hint = "the file is cut or damaged: copy it again from the recorder";
-        Self::damaged(path, position, format!("{message}\nhint: {hint}"))
+        let message = message.to_string();
+        // What says itself what to do is no damage.
+        let hint = match message.contains("\nhint: ") {
+            true => "",
+            false => "\nhint: the file is cut or damaged: copy it again from the recorder",
+        };
+        Self::damaged(path, position, format!("{message}{hint}"))
     }
 
     /// Something in a channel map is wrong, or does not fit the log.

@@ -5,11 +5,11 @@ use std::path::Path;
 use falcon_mdf::blocks::channel::ChannelType;
 use falcon_mdf::{Channel as MdfChannel, Conversion, Mf4Error, Signal, SignalValues, SignalsChunks};
 
-use super::MdfLog;
 use super::conversion::keeps_numbers;
 use super::field::{Field, Tile};
 use super::limits::{BATCH, GroupAt, ON_TRUST};
 use super::records::Records;
+use super::{MdfLog, message};
 use crate::LogError;
 use crate::columns::{Batch, Block, Column, Memory, Stream};
 use crate::samples::Quality;
@@ -86,7 +86,7 @@ impl<'a> Decoding<'a> {
             Self::Own { tile, time, parts } => next_of_parts(parts, time, tile, block, memory),
             Self::Library(chunks) => {
                 let Some(signals) = chunks.next() else { return Ok(false) };
-                signals.and_then(|signals| append(&signals, block)).map_err(|error| error.to_string())?;
+                signals.and_then(|signals| append(&signals, block)).map_err(|error| message(&error))?;
                 Ok(true)
             }
         }

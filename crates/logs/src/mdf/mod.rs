@@ -314,6 +314,16 @@ fn groups(file: &Mf4File) -> impl Iterator<Item = (GroupAt, &ChannelGroup)> {
         .flat_map(|(i, data)| data.channel_groups.iter().enumerate().map(move |(j, group)| ((i, j), group)))
 }
 
+/// What the library for MDF says; of a packing that it was built without, as for the browser, in words of our own.
+fn message(error: &Mf4Error) -> String {
+    match error {
+        Mf4Error::Unsupported { feature, .. } if feature.ends_with("compression") => format!(
+            "the browser does not read its {feature}\nhint: estimate it with the program, or save it deflated or without compression"
+        ),
+        _ => error.to_string(),
+    }
+}
+
 fn damaged(path: &Path, place: &str, error: &Mf4Error) -> LogError {
     match error {
         Mf4Error::UnsupportedVersion { .. } => LogError::damaged(
@@ -321,7 +331,7 @@ fn damaged(path: &Path, place: &str, error: &Mf4Error) -> LogError {
             place,
             format!("{error}\nhint: versions 4.00 to 4.20 are read; save it as one of them"),
         ),
-        _ => LogError::cut_or_damaged(path, place, error),
+        _ => LogError::cut_or_damaged(path, place, message(error)),
     }
 }
 
@@ -338,5 +348,24 @@ impl Stream for Remarks<'_> {
 
     fn notes(&self) -> Vec<String> {
         self.notes.to_vec()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_packing_that_the_browser_does_not_read_is_said_with_what_to_do() {
+        let unsupported = Mf4Error::Unsupported {
+            feature: "lz4 compression".to_owned(),
+            detail: "enable the 'lz4' cargo feature".to_owned(),
+        };
+        let text = damaged(Path::new("log.mf4"), "its records", &unsupported).to_string();
+        assert!(
+            text.contains("the browser does not read its lz4 compression\nhint: estimate it with the program"),
+            "{text}"
+        );
+        assert!(!text.contains("cargo") && text.matches("hint: ").count() == 1, "{text}");
     }
 }
