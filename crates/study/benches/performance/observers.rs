@@ -9,7 +9,7 @@ use design::{
     Model, bounded, compliant_observer, design_compliant, design_discrete, design_rigid, design_sliding,
     extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
 };
-use observer::{Bounded, Estimator, Input, RigidGains};
+use observer::{Bounded, Estimator, Input, RigidGains, one_shift_filter};
 
 use crate::bars::{self, Bar};
 use crate::shared::{SAMPLE_TIME_S, samples, vehicle};
@@ -41,6 +41,7 @@ pub(crate) fn steps(page: &mut String) -> Figure {
     }
     let peak_to_peak =
         design_discrete(&vehicle, Model::Rigid, GainMethod::PeakToPeak, SAMPLE_TIME_S).unwrap().rigid_gains();
+    observer!("gearbox filter", one_shift_filter(&vehicle, sensors.as_ref()));
     observer!("Kalman", kalman_filter(&vehicle, sensors.as_ref()));
     observer!("extended Kalman", extended_filter(&vehicle, sensors.as_ref()));
     observer!("unscented", unscented_filter(&vehicle, sensors.as_ref()));
