@@ -131,7 +131,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             Some(running) => {
                 let (x, line) = (&running.x.mean, &self.driveline);
                 let damper = line.shaft_damping_n_m_s_rad * line.twist_rate(x[OUTPUT], x[WHEEL]);
-                let turbine_n_m = running.torques.map_or(running.slow_n_m, |torques| {
+                // In its first step it has no torques yet.
+                let turbine_n_m = running.torques.map_or(turbine_n_m.unwrap_or(running.slow_n_m), |torques| {
                     torques.turbine_n_m
                         + x[FRACTION] * torques.fraction_n_m
                         + x[SLOW_FRACTION] * torques.slow_fraction_n_m

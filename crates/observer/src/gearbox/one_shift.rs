@@ -32,6 +32,11 @@ const ONCOMING: usize = 1;
 const HOLDS_S: f64 = 0.1;
 /// Time for which readings may show a wrong slip, s: a flare lasts longer.
 const FRESH_S: f64 = 0.025;
+/// Time for which an earlier phase of the shift has to last until it is one, s \[chosen\]: a clutch that has let go or gripped by mistake of
+/// the filter is back within some readings.
+const BACK_S: f64 = 0.05;
+/// Error of the ratio of turbine and output speed by their scales, as a fraction \[chosen\].
+const RATIO_FRACTION: f64 = 0.02;
 
 /// The tables of a vehicle of one shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,6 +93,9 @@ pub struct OneShiftState<T> {
     holds_s: T,
     /// For how long the turbine has run away from the old gear, s.
     flares_s: T,
+    /// For how long an earlier phase than that of the estimate has held, s.
+    back_s: T,
+    phase: Phase,
     supervisor: SupervisorState<T>,
 }
 
@@ -242,17 +250,30 @@ impl<T: Real> OneShiftFilter<T> {
         let kiss_pa = self.supervisor.kiss_pressure_pa;
         let before_or_torque = if valve_pa > kiss_pa { Phase::TorquePhase } else { Phase::BeforeShift };
         let is_released = valve_pa < T::of(0.5) * kiss_pa;
+        let then = state.phase;
+        // A slip that only the estimate shows, or one below that of a release, ends no phase.
+        let release = self.supervisor.release_slip_rad_s;
+        let has_let_go = match then {
+            Phase::BeforeShift | Phase::TorquePhase => slips[0].abs() > release,
+            Phase::InertiaPhase => true,
+            // A clutch that has gripped slips again only where no error of the ratio shows it.
+            Phase::AfterShift => slips[1].abs() > release.at_least(T::of(RATIO_FRACTION) * turbine.abs()),
+        };
         let phase = match (state.stage, found.phase) {
             (_, None) => by_readings,
             (_, Some(_)) if is_released => Phase::BeforeShift,
-            (_, Some(ShiftPhase::BothSlip)) => Phase::InertiaPhase,
+            (_, Some(ShiftPhase::BothSlip)) if has_let_go => Phase::InertiaPhase,
             (Stage::Second, Some(_))
             | (Stage::Up, Some(ShiftPhase::OncomingHolds))
             | (Stage::Down, Some(ShiftPhase::OffgoingHolds)) => Phase::AfterShift,
+            (_, Some(ShiftPhase::BothSlip)) if then == Phase::AfterShift => then,
             _ => before_or_torque,
         };
-        state.supervisor.phase = phase;
-        phase
+        let is_back = phase != Phase::BeforeShift && (phase as u8) < then as u8;
+        state.back_s = if is_back { state.back_s + dt_s } else { T::zero() };
+        state.phase = if is_back && state.back_s < T::of(BACK_S) { then } else { phase };
+        state.supervisor.phase = state.phase;
+        state.phase
     }
 }
 
@@ -279,24 +300,42 @@ impl<T: Real> OneShiftState<T> {
 
 impl<T: Real> OneShiftFilter<T> {
     /// Pressure and torque of the oncoming clutch, Pa and N m.
-    fn oncoming(&self, filter: &GearboxFilter<'_, T>, state: &OneShiftState<T>, found: &ShiftEstimate<T>) -> [T; 2] {
+    fn oncoming(
+        &self,
+        filter: &GearboxFilter<'_, T>,
+        state: &OneShiftState<T>,
+        (taken, found): (&ShiftInput<T>, &ShiftEstimate<T>),
+    ) -> [T; 2] {
         let in_shift = found.clutches.into_iter().flatten().find(|clutch| clutch.element.place() == Some(ONCOMING));
-        if let Some(clutch) = in_shift {
-            return [clutch.pressure_pa, clutch.torque_n_m];
-        }
-        let [up, _] = &self.tables.shifts;
-        let by_valve = filter.unshifted(&state.filter, up, ONCOMING);
-        let held_n_m = self.held_n_m(found).filter(|_| state.stage == Stage::Second);
-        [by_valve.pressure_pa, held_n_m.unwrap_or(by_valve.torque_n_m)]
+        let [pressure_pa, torque_n_m] = match in_shift {
+            Some(clutch) => [clutch.pressure_pa, clutch.torque_n_m],
+            None => {
+                let by_valve = filter.unshifted(&state.filter, &self.tables.shifts[0], ONCOMING);
+                [by_valve.pressure_pa, by_valve.torque_n_m]
+            }
+        };
+        let held_n_m =
+            if state.phase == Phase::AfterShift { self.held_n_m(filter, state, (taken, found)) } else { None };
+        [pressure_pa, held_n_m.unwrap_or(torque_n_m)]
     }
 
-    /// Torque of the oncoming clutch in the gear after the shift, N m: what the turbine torque leaves beside the inertia.
-    fn held_n_m(&self, found: &ShiftEstimate<T>) -> Option<T> {
+    /// Torque of the oncoming clutch after the shift, N m: what the turbine torque by the converter's maps leaves beside the inertia. What the
+    /// filter has learnt of that torque in the shift is not used: after it, the speeds show neither.
+    fn held_n_m(
+        &self,
+        filter: &GearboxFilter<'_, T>,
+        state: &OneShiftState<T>,
+        (taken, found): (&ShiftInput<T>, &ShiftEstimate<T>),
+    ) -> Option<T> {
         let ([_, gear], [up, _]) = (&self.tables.gears, &self.tables.shifts);
-        let (turbine_n_m, output_n_m) = (found.turbine_n_m?, found.shaft_n_m? / self.parameters.driveline.final_ratio);
+        let side = filter.input_side(&state.filter, taken, T::zero())?;
+        let turbine_n_m = filter.turbine.at(&side)?.turbine_n_m;
         let [[m11, m12], _] = up.mass_kg_m2;
-        let rate = (gear.ratio * turbine_n_m - output_n_m) / gear.inertia_kg_m2;
-        Some((turbine_n_m - (m11 * gear.ratio + m12) * rate) / up.clutches[ONCOMING].alpha)
+        let inertia_n_m = found.shaft_n_m.map_or(T::zero(), |shaft_n_m| {
+            let output_n_m = shaft_n_m / self.parameters.driveline.final_ratio;
+            (m11 * gear.ratio + m12) * (gear.ratio * turbine_n_m - output_n_m) / gear.inertia_kg_m2
+        });
+        Some((turbine_n_m - inertia_n_m) / up.clutches[ONCOMING].alpha)
     }
 
     /// Whether the turbine has run away from the old gear for longer than wrong readings can show it.
@@ -319,6 +358,8 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
             stage: Stage::First,
             holds_s: T::zero(),
             flares_s: T::zero(),
+            back_s: T::zero(),
+            phase: Phase::BeforeShift,
             supervisor: SupervisorState::new(),
         }
     }
@@ -333,7 +374,7 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
         self.follow_unheard(state, &found, dt_s);
         let speeds = filter.measured(&state.filter.newest, None);
         let phase = self.phase(state, &found, speeds, dt_s);
-        let [pressure_pa, clutch_torque_n_m] = self.oncoming(&filter, state, &found);
+        let [pressure_pa, clutch_torque_n_m] = self.oncoming(&filter, state, (&taken, &found));
         let flare = if self.flares(state, &found, dt_s) { Health::Flare } else { Health::Good };
         let mut channels = found.channels;
         [channels.offgoing_command, channels.command] = [OFFGOING, ONCOMING].map(|at| found.commands[at]);

@@ -1,9 +1,10 @@
 //! The prediction over a step, and the phase.
 
 use super::{
-    CORE, ClutchTorque, Contact, ElementState, FRACTION, FRACTION_S, FRICTION, FrictionElement, GearboxFilter,
+    CORE, ClutchTorque, Contact, ElementState, FRACTION, FRACTION_S, FRICTION, FrictionElement, GAP_S, GearboxFilter,
     GearboxState, LOAD, MAX_ELEMENTS, MODEL_FRACTION, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SCALE,
-    SPRING, ShiftElement, ShiftRow, TURBINE, TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
+    SPRING, ShiftClutch, ShiftElement, ShiftRow, TURBINE, TWIST_S, Torques, WHEEL, free, output_rate, pieces, square,
+    tied, turbine,
 };
 use crate::gearbox::elements::positive_part;
 use drivetrain::Real;
@@ -194,7 +195,10 @@ impl<T: Real> GearboxFilter<'_, T> {
         let holding = running.phase.phase.holding();
         let contact = |c: usize| {
             let clutch = &shift.clutches[c.min(1)];
-            let slip = self.slip(clutch.ratio, speeds);
+            let mut slip = self.slip(clutch.ratio, speeds);
+            if holding.is_none() && running.has_turned(c, clutch) {
+                slip.value = T::zero();
+            }
             if slip.is_over() || holding.is_some_and(|held| held != c) {
                 // Its slip alone decides.
                 return Contact { slip, needed_n_m: T::zero(), holds_n_m: T::zero() };
@@ -276,5 +280,18 @@ impl<T: Real> GearboxFilter<'_, T> {
             *x = *x - mass * *rate;
         }
         (row, rest - mass * rate)
+    }
+}
+
+impl<T: Real> Running<T> {
+    /// Whether the slip of a clutch by the model has another sign than that which its torque had, while a speed has not been read for long:
+    /// it was zero then, where a clutch that carries its load grips.
+    fn has_turned(&self, c: usize, clutch: &ShiftClutch<T>) -> bool {
+        if self.silent_s[TURBINE].at_least(self.silent_s[OUTPUT]) <= T::of(GAP_S) {
+            return false;
+        }
+        let slip = self.x.mean[TURBINE] - clutch.ratio * self.x.mean[OUTPUT];
+        let direction = self.torques.map_or(T::zero(), |torques| torques.clutches[c.min(1)].per_friction_n_m);
+        clutch.has_pressure() && slip * direction < T::zero()
     }
 }

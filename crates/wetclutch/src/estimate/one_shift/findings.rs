@@ -184,7 +184,8 @@ impl Findings {
 
     /// Most estimates have to be possible.
     fn check_estimates(&self) -> Result<(), Error> {
-        let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::HeldClutchSlips, Health::Flare];
+        // Where the speeds fit no phase, the gearbox filter gives the valve maps, and says so.
+        let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::Flare];
         let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
         let lost = self.without_command;
         if 2 * lost > self.rows && self.rows >= ENOUGH_ROWS {
@@ -227,6 +228,13 @@ impl Findings {
             }
             let meaning = health_meaning(*health);
             said.push(format!("{} of {} samples have {meaning}", grouped(*count), grouped(self.rows)));
+            if *health == Health::HeldClutchSlips && 10 * count > self.rows {
+                said.push(
+                    "warning: turbine and output speed fit the ratios of the vehicle file in few samples; in the others the estimate is that of \
+                     the valve maps\nhint: check the scale of both speeds and the ratios; `--observer kalman` does not need them as exact"
+                        .to_owned(),
+                );
+            }
         }
         let scores = self.errors.as_ref().map(ErrorScore::finish).unwrap_or_default();
         for score in scores.iter().filter(|score| score.samples > 0) {
