@@ -95,6 +95,7 @@ pub struct OneShiftState<T> {
     flares_s: T,
     /// For how long an earlier phase than that of the estimate has held, s.
     back_s: T,
+    /// The phase of the estimate.
     phase: Phase,
     supervisor: SupervisorState<T>,
 }

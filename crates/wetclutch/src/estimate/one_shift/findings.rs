@@ -202,17 +202,12 @@ impl Findings {
             return Ok(());
         }
         let worst = impossible.iter().max_by_key(|health| of(health)).map_or("", |health| health.name());
-        let why = self.ratios.contradiction().map_or_else(
-            || {
-                "\nhint: a channel with a wrong scale does this, another car than that of the vehicle file, and a log of other gears; \
-                 `wetclutch inspect` shows minimum and maximum values, and a channel map with `gearbox.ratios` distinguishes the gears"
-                    .to_owned()
-            },
-            |contradiction| format!(": {contradiction}"),
-        );
-        let (count, rows) = (grouped(count), grouped(self.rows));
         Err(Error::Input(format!(
-            "{count} of {rows} estimates are impossible for this car, most of them `{worst}`{why}"
+            "{} of {} estimates are impossible for this car, most of them `{worst}`\nhint: a channel with a wrong scale does this, \
+             another car than that of the vehicle file, and a log of other gears; `wetclutch inspect` shows minimum and maximum values, \
+             and a channel map with `gearbox.ratios` distinguishes the gears",
+            grouped(count),
+            grouped(self.rows)
         )))
     }
 
