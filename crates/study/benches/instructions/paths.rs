@@ -8,7 +8,7 @@ use car::{Experiment, GainMethod, ObserverKind, Vehicle};
 use config::ExperimentFile;
 use design::rigid::design_phase;
 use design::{design_rigid, kalman_filter, range, requirement, rigid_observer};
-use observer::{Estimator, Phase};
+use observer::{Estimator, Phase, one_shift_filter};
 use plant::{Contact, Direction, Inputs, Mode, Powertrain, Simulation, State};
 use study::{AnyObserver, Log, LogRow};
 use trace::{CsvRows, CsvWriter};
@@ -30,6 +30,7 @@ pub(crate) const PATHS: &[HotPath] = &[
     HotPath { name: "shift of 1.5 s from a warm state", units: 1, prepare: warm_shift },
     HotPath { name: "launch and shift of 9.5 s, recorded every 1 ms", units: 1, prepare: launch_and_shift },
     HotPath { name: "step of the Kalman filter", units: 200, prepare: kalman_step },
+    HotPath { name: "step of the gearbox filter, car of one shift", units: 200, prepare: one_shift_step },
     HotPath { name: "step of the rigid observer", units: 200, prepare: rigid_step },
     HotPath { name: "step of the range", units: 200, prepare: range_step },
     HotPath { name: "step of the gearbox filter", units: drive::SHIFT_STEPS, prepare: drive::shift },
@@ -100,6 +101,11 @@ fn steps(observer: impl Estimator<f64, State: 'static> + 'static) -> Box<dyn FnM
 fn kalman_step() -> Box<dyn FnMut()> {
     let sensors = ExperimentFile::bench().unwrap().experiment.sensors_given;
     steps(kalman_filter(&vehicle(), sensors.as_ref()))
+}
+
+fn one_shift_step() -> Box<dyn FnMut()> {
+    let sensors = ExperimentFile::bench().unwrap().experiment.sensors_given;
+    steps(one_shift_filter(&vehicle(), sensors.as_ref()))
 }
 
 fn rigid_step() -> Box<dyn FnMut()> {
