@@ -184,7 +184,7 @@ impl Findings {
 
     /// Most estimates have to be possible.
     fn check_estimates(&self) -> Result<(), Error> {
-        // Where the speeds fit no phase, the gearbox filter gives the valve maps, and says so.
+        // Where the speeds fit no phase, the estimate is less certain or that of the valve maps, with a warning.
         let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::Flare];
         let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
         let lost = self.without_command;
@@ -225,8 +225,8 @@ impl Findings {
             said.push(format!("{} of {} samples have {meaning}", grouped(*count), grouped(self.rows)));
             if *health == Health::HeldClutchSlips && 10 * count > self.rows {
                 said.push(
-                    "warning: turbine and output speed fit the ratios of the vehicle file in few samples; in the others the estimate is that of \
-                     the valve maps\nhint: check the scale of both speeds and the ratios; `--observer kalman` does not need them as exact"
+                    "warning: turbine and output speed contradict the ratios of the vehicle file in more than a tenth of the samples: there the \
+                     estimate is less certain, or that of the valve maps\nhint: check the scale of both speeds and the ratios; `--observer kalman` does not need them as exact"
                         .to_owned(),
                 );
             }
