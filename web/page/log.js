@@ -36,7 +36,9 @@ function logs(sensor, panel, result) {
     mapping.hidden = true;
     const answer = await estimated({ isLast: false });
     if (!answer.error) return;
-    const suggested = await sensor.readAside({ ask: "map", name: log.name, dbc }, log.bytes);
+    const asked = log;
+    const suggested = await sensor.readAside({ ask: "map", name: asked.name, dbc }, asked.bytes);
+    if (asked !== log) return;
     if (suggested.error) {
       messages.replaceChildren(failed(suggested));
       return;
