@@ -46,6 +46,7 @@ mod late;
 mod learnt;
 mod newest;
 mod noise;
+mod offgoing_command;
 mod one_shift;
 mod phases;
 mod pistons;
@@ -376,8 +377,10 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// The step with the noise of the readings as it was found.
     fn step_on_time(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
-        let factor = state.noise.factor();
-        if factor > T::one() { self.noisier(factor).step_as_is(state, input) } else { self.step_as_is(state, input) }
+        match state.noise.factors() {
+            Some(factors) => self.noisier(&factors).step_as_is(state, input),
+            None => self.step_as_is(state, input),
+        }
     }
 
     /// The step with the noise of the readings as it stands in the filter.

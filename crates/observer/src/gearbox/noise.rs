@@ -1,103 +1,238 @@
-//! How noisy the readings of turbine and output speed are, beside what is stated.
+//! How noisy the readings of the speeds are, beside what is stated.
 //!
-//! In a gear the slip `z = w_t - i w_o` is zero, or where a clutch slips it is smooth. The difference of two in a row is then the
-//! noise of the readings, whatever the car does (von Neumann's estimate of a variance):
+//! Differences of order `n` of what is smooth are the noise of the readings, whatever the car does (von Neumann's estimate of a variance):
 //!
 //! ```text
-//! q = mean of (z_k - z_{k-1})^2 / (2 var z)         var z = sigma_t^2 + i^2 sigma_o^2, as stated
+//! q = mean of (d^n z)^2 / (c var z)         c = 2, 6, 20 for n = 1, 2, 3
 //! ```
 //!
-//! `q` is 1 with the stated noise. Of `n` differences of white noise it has the standard deviation `q sqrt(3 / n)`. Only what lies
-//! two of these above 1 counts, so that readings as stated are used as stated. Neither state nor equations of the filter take part: a wrong model cannot take
-//! its error for noise. Readings near standstill are left out: a wheel that stands has none.
+//! | readings | `z` in a gear | `n` | is smooth because |
+//! |---|---|---|---|
+//! | turbine, output | slip `w_t - i w_o` | 1 | it is zero, or a clutch slips |
+//! | wheel | `w_w - w_o / i_f` | 2 | the drive shafts swing slowly |
+//! | engine | `w_e` | 3 | its torque has no corners for most of the time |
+//!
+//! `q` is 1 with the stated noise. Of `m` differences of white noise it has the standard deviation `q sqrt(3 / m)`, or `4` and `5` for the
+//! higher orders. Only what lies two of these above 1 counts, so that readings as stated are used as stated. Neither state nor equations of
+//! the filter take part: a wrong model cannot take its error for noise. Readings near standstill are left out: a wheel that stands has none.
+//!
+//! Readings in coarse steps have one error as long as they stand. Where a noise above the stated one is found, `n` equal readings in a row
+//! count as one: each has `n` times the variance.
 
 use car::Gear;
 use drivetrain::Real;
 
-use super::{GearboxFilter, GearboxState, Newest, OUTPUT, Reading, ShiftInput, TURBINE, square};
+use super::{GearboxFilter, GearboxState, Newest, OUTPUT, Reading, SPEEDS, ShiftInput, TURBINE, WHEEL, square};
 
 /// Differences in the mean at most: it follows a change of the noise within some seconds \[chosen\].
 const MAXIMUM: u16 = 400;
 /// Fewest differences from which the noise is taken: two standard deviations are then less than the value itself.
 const FEWEST: u16 = 16;
+/// Most readings in a row that count as the same \[chosen\].
+const LONGEST_SAME: u16 = 50;
+/// Highest order of a difference.
+const HIGHEST: usize = 3;
 /// Largest difference that is noise, in its standard deviations: an outlier counts as this.
 const OUTLIER: f64 = 5.0;
+/// Longest step over which differences are those of a smooth speed, s \[chosen\]: the drive shafts swing with up to 11 Hz.
+const LONGEST_STEP_S: f64 = 0.025;
+
+/// By what the stated standard deviations are multiplied, at least 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NoiseFactors<T> {
+    pub(super) turbine: T,
+    pub(super) output: T,
+    pub(super) wheel: T,
+    pub(super) engine: T,
+}
+
+impl<T: Real> NoiseFactors<T> {
+    fn stated() -> Self {
+        Self { turbine: T::one(), output: T::one(), wheel: T::one(), engine: T::one() }
+    }
+}
 
 /// Memory of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ReadingNoise<T> {
-    /// The slip in the step before, rad/s, and the gear that it is of.
-    before: Option<(T, Gear)>,
+    /// The gear of the slip in the step before.
+    gear: Gear,
+    slip: Differences<T, 1>,
+    wheel: Differences<T, 2>,
+    engine: Differences<T, 3>,
+    /// Readings of turbine, output, wheel and engine in a row that are the same.
+    same: [Same<T>; SPEEDS + 1],
+}
+
+/// Readings in a row that are the same: those of a coarse step have one error as long as they stand, and not one each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Same<T> {
+    value: T,
+    /// How many there are, and how many there were of the value before.
+    count: u16,
+    before: u16,
+}
+
+/// The differences of order `N` of a quantity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Differences<T, const N: usize> {
+    /// The newest differences of order 0 to `N - 1`; the rest is zero.
+    newest: [T; HIGHEST],
+    /// How many of these are known.
+    known: u8,
     /// Mean of the squared differences over what is stated.
     mean: T,
     /// How many are in the mean.
     count: u16,
-    /// By what the stated standard deviations are multiplied, at least 1.
+    /// By what the stated standard deviation is multiplied, at least 1.
     factor: T,
 }
 
 impl<T: Real> ReadingNoise<T> {
     /// The noise as stated.
     pub(super) fn stated() -> Self {
-        Self { before: None, mean: T::one(), count: 0, factor: T::one() }
+        Self {
+            gear: Gear::Neutral,
+            slip: Differences::stated(),
+            wheel: Differences::stated(),
+            engine: Differences::stated(),
+            same: [Same { value: T::zero(), count: 1, before: 1 }; SPEEDS + 1],
+        }
     }
 
-    /// By what the stated standard deviations of turbine and output readings are multiplied, at least 1.
-    pub(super) fn factor(&self) -> T {
-        self.factor
+    /// By what the stated standard deviations are multiplied; none where all are as stated.
+    pub(super) fn factors(&self) -> Option<NoiseFactors<T>> {
+        let factors = NoiseFactors {
+            turbine: self.slip.factor * self.same[TURBINE].root(),
+            output: self.slip.factor * self.same[OUTPUT].root(),
+            wheel: self.wheel.factor * self.same[WHEEL].root(),
+            engine: self.engine.factor * self.same[SPEEDS].root(),
+        };
+        let one = T::one();
+        (self.slip.factor > one || self.wheel.factor > one || self.engine.factor > one).then_some(factors)
     }
 
-    /// The next slip has none before it.
+    /// The next readings have none before them.
     pub(super) fn pause(&mut self) {
-        self.before = None;
+        (self.slip.known, self.wheel.known, self.engine.known) = (0, 0, 0);
+    }
+}
+
+impl<T: Real> Same<T> {
+    fn take(&mut self, value: T) {
+        if value == self.value {
+            self.count = LONGEST_SAME.min(self.count + 1);
+        } else {
+            *self = Self { value, count: 1, before: self.count };
+        }
     }
 
-    /// Takes the slip in a gear, rad/s, and its stated variance.
-    fn take(&mut self, slip: T, gear: Gear, variance: T) {
-        let before = self.before.replace((slip, gear));
-        let Some((before, _)) = before.filter(|&(_, of)| of == gear) else { return };
+    fn root(&self) -> T {
+        T::of(f64::from(self.count.max(self.before))).sqrt()
+    }
+}
+
+impl<T: Real, const N: usize> Differences<T, N> {
+    /// Variance of a difference over that of a reading, and the variance of the mean of many over its square and their inverse number.
+    const OF_ORDER: (f64, f64) = match N {
+        1 => (2.0, 3.0),
+        2 => (6.0, 4.0),
+        _ => (20.0, 5.0),
+    };
+
+    fn stated() -> Self {
+        Self { newest: [T::zero(); HIGHEST], known: 0, mean: T::one(), count: 0, factor: T::one() }
+    }
+
+    /// Takes the next value and the stated variance of its noise.
+    fn take(&mut self, value: T, variance: T) {
+        let (of_noise, of_mean) = Self::OF_ORDER;
+        let mut difference = value;
+        for (order, newest) in (0..).zip(self.newest.iter_mut().take(N)) {
+            let before = core::mem::replace(newest, difference);
+            if order >= self.known {
+                self.known = order + 1;
+                return;
+            }
+            difference = difference - before;
+        }
         let maximum = square(T::of(OUTLIER)) * self.mean.at_least(T::one());
-        let ratio = square(slip - before) / (T::of(2.0) * variance);
+        let ratio = square(difference) / (T::of(of_noise) * variance);
         if !ratio.is_finite() {
-            self.before = None;
+            self.known = 0;
             return;
         }
         self.count = MAXIMUM.min(self.count + 1);
         let count = T::of(f64::from(self.count));
         self.mean = self.mean + (ratio.at_most(maximum) - self.mean) / count;
         if self.count >= FEWEST {
-            let lower = self.mean * (T::one() - T::of(2.0) * (T::of(3.0) / count).sqrt());
+            let lower = self.mean * (T::one() - T::of(2.0) * (T::of(of_mean) / count).sqrt());
             self.factor = lower.at_least(T::one()).sqrt();
         }
     }
 }
 
 impl<T: Real> GearboxFilter<'_, T> {
-    /// The same filter with noisier readings of turbine and output.
-    pub(super) fn noisier(&self, factor: T) -> Self {
-        let mut readings = self.readings;
-        for k in [TURBINE, OUTPUT] {
+    /// The same filter with noisier readings.
+    pub(super) fn noisier(&self, factors: &NoiseFactors<T>) -> Self {
+        let (mut readings, mut engine) = (self.readings, self.engine);
+        for (k, factor) in [(TURBINE, factors.turbine), (OUTPUT, factors.output), (WHEEL, factors.wheel)] {
             readings[k].std_dev_rad_s = factor * readings[k].std_dev_rad_s;
         }
-        Self { readings, ..*self }
+        engine.1.reading_rad_s = factors.engine * engine.1.reading_rad_s;
+        Self { readings, engine, ..*self }
     }
 
-    /// Takes the readings of turbine and output that came together in a gear.
+    /// Takes the readings that came in a gear.
     pub(super) fn take_noise(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) {
+        // Of this filter, as it is used in the step.
+        let factors = state.noise.factors().unwrap_or_else(NoiseFactors::stated);
+        let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s, input.engine_rad_s];
+        for (same, reading) in state.noise.same.iter_mut().zip(given) {
+            if let Some(reading) = reading {
+                same.take(reading.value);
+            }
+        }
         let gear = input.gear.to;
-        let row = self.tables.gear(gear).filter(|_| input.gear.is_steady());
+        let row = self.tables.gear(gear).filter(|_| input.gear.is_steady() && input.dt_s <= T::of(LONGEST_STEP_S));
+        let Some(row) = row else { return state.noise.pause() };
+        let valid = |reading: &Option<Reading<T>>| {
+            reading.map(|reading| reading.value).filter(|&value| self.limits.speed_valid(value))
+        };
         let came = |k: usize, reading: &Option<Reading<T>>| {
             state.newest[k].filter(|newest| reading.is_some() && !newest.refused)
         };
         let moves = |output: &Newest<T>| output.value.abs() >= self.uncertainty.output_least_rad_s;
         let output = came(OUTPUT, &input.output_rad_s).filter(moves);
-        let together = came(TURBINE, &input.turbine_rad_s).zip(output);
-        let (Some(row), Some((turbine, output))) = (row, together) else { return state.noise.pause() };
-        let [of_turbine, of_output] = [TURBINE, OUTPUT].map(|k| square(self.readings[k].std_dev_rad_s));
-        let slip = turbine.value - row.ratio * output.value;
-        let stated = (of_turbine + square(row.ratio) * of_output) / square(state.noise.factor());
-        state.noise.take(slip, gear, stated);
+        let turbine = came(TURBINE, &input.turbine_rad_s);
+        let noise = &mut state.noise;
+        let of = |k: usize, factor: T| square(self.readings[k].std_dev_rad_s / factor);
+        let of_output = of(OUTPUT, factors.output);
+        match turbine.zip(output) {
+            Some((turbine, output)) => {
+                if core::mem::replace(&mut noise.gear, gear) != gear {
+                    noise.slip.known = 0;
+                }
+                let slip = turbine.value - row.ratio * output.value;
+                noise.slip.take(slip, of(TURBINE, factors.turbine) + square(row.ratio) * of_output);
+            }
+            None => noise.slip.known = 0,
+        }
+        match valid(&input.wheel_rad_s).zip(output) {
+            Some((wheel, output)) => {
+                let final_ratio = self.driveline.final_ratio;
+                let of_output = square(noise.slip.factor / final_ratio) * of_output;
+                noise.wheel.take(wheel - output.value / final_ratio, of(WHEEL, factors.wheel) + of_output);
+            }
+            None => noise.wheel.known = 0,
+        }
+        match valid(&input.engine_rad_s) {
+            Some(engine) => noise.engine.take(engine, square(self.engine.1.reading_rad_s / factors.engine)),
+            None => noise.engine.known = 0,
+        }
     }
 }
 
@@ -113,16 +248,12 @@ mod tests {
 
     /// The factor after readings with a multiple of the stated noise, about this slip at the time in s.
     fn factor(seed: u64, count: u32, times: f64, slip: impl Fn(f64) -> f64) -> f64 {
-        let (mut noise, mut random) = (ReadingNoise::stated(), Pcg64Mcg::new(u128::from(seed)));
+        let (mut noise, mut random) = (Differences::<f64, 1>::stated(), Pcg64Mcg::new(u128::from(seed)));
         for k in 0..count {
             let normal: f64 = StandardNormal.sample(&mut random);
-            noise.take(
-                slip(0.01 * f64::from(k)) + times * STATED_RAD_S * normal,
-                Gear::at(2),
-                STATED_RAD_S * STATED_RAD_S,
-            );
+            noise.take(slip(0.01 * f64::from(k)) + times * STATED_RAD_S * normal, STATED_RAD_S * STATED_RAD_S);
         }
-        noise.factor()
+        noise.factor
     }
 
     #[test]
@@ -151,17 +282,52 @@ mod tests {
     }
 
     #[test]
-    fn one_outlier_and_a_change_of_gear_are_no_noise() {
+    fn one_outlier_and_what_is_no_number_are_no_noise() {
         let outlier = |t: f64| if (t - 2.0).abs() < 0.004 { 50.0 } else { 0.0 };
         assert!(factor(1, 400, 1.0, outlier) < 1.1);
-        let mut noise = ReadingNoise::stated();
-        for k in 0..100_u8 {
-            let gear = Gear::at(usize::from(k / 20));
-            noise.take(100.0 * f64::from(k / 20), gear, STATED_RAD_S * STATED_RAD_S);
+        let mut noise = Differences::<f64, 1>::stated();
+        noise.take(f64::NAN, STATED_RAD_S * STATED_RAD_S);
+        noise.take(f64::INFINITY, 0.0);
+        assert_eq!(noise.factor, 1.0);
+    }
+
+    /// The factor by differences of order `N` of a value with so many times the stated noise.
+    fn of_order<const N: usize>(seed: u64, count: u32, times: f64, smooth: impl Fn(f64) -> f64) -> f64 {
+        let (mut noise, mut random) = (Differences::<f64, N>::stated(), Pcg64Mcg::new(u128::from(seed)));
+        for k in 0..count {
+            let normal: f64 = StandardNormal.sample(&mut random);
+            noise.take(smooth(0.01 * f64::from(k)) + times * STATED_RAD_S * normal, STATED_RAD_S * STATED_RAD_S);
         }
-        assert_eq!(noise.factor(), 1.0);
-        noise.take(f64::NAN, Gear::at(0), STATED_RAD_S * STATED_RAD_S);
-        noise.take(f64::INFINITY, Gear::at(0), 0.0);
-        assert_eq!(noise.factor(), 1.0);
+        noise.factor
+    }
+
+    #[test]
+    fn higher_differences_find_the_noise_of_a_speed_that_bends() {
+        // An engine that races in 0.5 s, and a wheel against the output while the shafts swing with 7 Hz.
+        let races = |t: f64| 200.0 + 100.0 * (6.0 * t).sin();
+        let swings = |t: f64| 0.3 * (core::f64::consts::TAU * 7.0 * t).sin();
+        for seed in 0..100 {
+            assert!(of_order::<3>(seed, 400, 1.0, races) < 1.15 && of_order::<2>(seed, 400, 1.0, swings) < 1.15);
+            for found in [of_order::<3>(seed, 400, 5.0, races), of_order::<2>(seed, 400, 5.0, swings)] {
+                assert!(found > 3.5 && found < 5.6, "{seed}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn readings_that_stand_count_as_one() {
+        let mut same = Same { value: 0.0, count: 1, before: 1 };
+        let mut root = |value: f64| {
+            same.take(value);
+            same.root()
+        };
+        assert_eq!([1.0, 2.0, 3.0].map(&mut root), [1.0; 3]);
+        assert_eq!([4.0, 4.0, 4.0, 4.0].map(&mut root), [1.0, 2.0_f64.sqrt(), 3.0_f64.sqrt(), 2.0]);
+        // The first of the next value, too: it is on the same side of the speed each time.
+        assert_eq!([5.0, 6.0].map(&mut root), [2.0, 1.0]);
+        for _ in 0..LONGEST_SAME + 10 {
+            root(7.0);
+        }
+        assert_eq!(root(7.0), f64::from(LONGEST_SAME).sqrt());
     }
 }

@@ -14,12 +14,15 @@
 use car::{Input, ShiftCommand};
 use drivetrain::{Driveline, Real, ReducedShift};
 
+use super::elements::ElementState;
+use super::offgoing_command::{OffgoingCommand, Seen};
 use super::{
     AccelerationReading, FrictionElement, GearRow, GearboxFilter, GearboxState, GearboxTables, MAX_ELEMENTS,
     ShiftEstimate, ShiftInput, ShiftPhase, ShiftRow, ShiftUncertainty, TurbineTorque,
 };
 use crate::{
-    EngineNoise, Estimate, Estimator, Health, InputLimits, Phase, Reading, SpeedReading, Supervisor, SupervisorState,
+    ChannelHealth, EngineNoise, Estimate, Estimator, Health, InputLimits, Phase, Reading, SpeedReading, Supervisor,
+    SupervisorState,
 };
 
 /// Place of the offgoing clutch among the elements, and of the gear before among the gears.
@@ -97,6 +100,7 @@ pub struct OneShiftState<T> {
     back_s: T,
     /// The phase of the estimate.
     phase: Phase,
+    offgoing: OffgoingCommand<T>,
     supervisor: SupervisorState<T>,
 }
 
@@ -237,6 +241,29 @@ impl<T: Real> OneShiftFilter<T> {
         set_unheard(&mut state.filter, std_dev_n_m);
     }
 
+    /// Follows whether the command of the offgoing clutch can be its own; one that cannot be is forgotten.
+    fn follow_offgoing(
+        &self,
+        state: &mut OneShiftState<T>,
+        found: &ShiftEstimate<T>,
+        [turbine, output]: [T; 2],
+        dt_s: T,
+    ) {
+        let slips = self.shift.offgoing_slip(turbine, output).abs() > self.supervisor.release_slip_rad_s;
+        let seen = match (state.stage, found.phase) {
+            (Stage::First, _) if found.turbine_n_m.is_some() && !slips => Seen::Holds,
+            (Stage::Up, Some(ShiftPhase::BothSlip)) if slips => Seen::Slips,
+            _ => Seen::Nothing,
+        };
+        let element = &self.tables.elements[OFFGOING];
+        let turbine_n_m = found.turbine_n_m.unwrap_or(T::zero());
+        let of_gear_n_m = self.tables.gears[OFFGOING].holding[OFFGOING] * turbine_n_m;
+        if state.offgoing.judge(element, seen, [turbine_n_m, of_gear_n_m], dt_s) {
+            state.filter.elements[OFFGOING] = Some(ElementState::new(element));
+            set_unheard(&mut state.filter, self.unheard.holds_n_m);
+        }
+    }
+
     /// The phase of the shift: by the clutch that holds, and by the readings where the filter does not run.
     fn phase(
         &self,
@@ -295,6 +322,7 @@ impl<T: Real> OneShiftState<T> {
     fn enter(&mut self, stage: Stage) {
         if stage != self.stage {
             (self.stage, self.holds_s) = (stage, T::zero());
+            self.offgoing.begin();
         }
     }
 }
@@ -361,6 +389,7 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
             flares_s: T::zero(),
             back_s: T::zero(),
             phase: Phase::BeforeShift,
+            offgoing: OffgoingCommand::nothing(),
             supervisor: SupervisorState::new(),
         }
     }
@@ -369,16 +398,20 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
         let dt_s = if input.dt_s >= T::zero() && input.dt_s.is_finite() { input.dt_s } else { T::zero() };
         self.take_command(state, input.command);
         let filter = self.filter();
-        let taken = self.shift_input(state, input);
+        let taken = Self::shift_input(state, input);
         let found = filter.step(&mut state.filter, &taken);
         Self::follow_shift(state, &found, dt_s);
         self.follow_unheard(state, &found, dt_s);
         let speeds = filter.measured(&state.filter.newest, None);
         let phase = self.phase(state, &found, speeds, dt_s);
+        self.follow_offgoing(state, &found, speeds, dt_s);
         let [pressure_pa, clutch_torque_n_m] = self.oncoming(&filter, state, (&taken, &found));
         let flare = if self.flares(state, &found, dt_s) { Health::Flare } else { Health::Good };
         let mut channels = found.channels;
         [channels.offgoing_command, channels.command] = [OFFGOING, ONCOMING].map(|at| found.commands[at]);
+        if input.offgoing_command.is_some() && taken.commands[OFFGOING].is_none() {
+            channels.offgoing_command = ChannelHealth::Refused;
+        }
         Estimate {
             pressure_pa,
             clutch_torque_n_m,
@@ -392,9 +425,9 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
 }
 
 impl<T: Real> OneShiftFilter<T> {
-    fn shift_input(&self, state: &OneShiftState<T>, input: &Input<T>) -> ShiftInput<T> {
+    fn shift_input(state: &mut OneShiftState<T>, input: &Input<T>) -> ShiftInput<T> {
         let mut commands = [None; MAX_ELEMENTS];
-        (commands[OFFGOING], commands[ONCOMING]) = (input.offgoing_command, input.command);
+        (commands[OFFGOING], commands[ONCOMING]) = (state.offgoing.take(input.offgoing_command), input.command);
         ShiftInput {
             dt_s: input.dt_s,
             engine_rad_s: input.engine_rad_s,

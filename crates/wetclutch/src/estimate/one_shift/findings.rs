@@ -47,6 +47,8 @@ const UNKNOWN_S: f64 = 0.2;
 const ENOUGH_ROWS: u64 = 100;
 /// The channels of an observer, and the role of each.
 const CHANNELS: usize = 7;
+/// The command of the offgoing clutch among them: an estimate does without it.
+const OFFGOING_COMMAND: usize = 5;
 
 impl Findings {
     pub(crate) fn new(vehicle: &Vehicle) -> Self {
@@ -168,7 +170,7 @@ impl Findings {
                     grouped(self.rows)
                 )));
             }
-            if 2 * taken < came {
+            if 2 * taken < came && at != OFFGOING_COMMAND {
                 return Err(Error::Input(format!(
                     "{} of {} readings of {name} were refused: they are impossible for this car, or contradict the other \
                      signals\nhint: check the unit, scale and sign of {name}, and whether the vehicle file is of this car; \
@@ -230,6 +232,15 @@ impl Findings {
                         .to_owned(),
                 );
             }
+        }
+        let (came, taken) = (self.came[OFFGOING_COMMAND], self.taken[OFFGOING_COMMAND]);
+        if 100 * (came - taken) > came {
+            said.push(format!(
+                "warning: {} of {} commands of the offgoing clutch were not used: they are impossible, or contradict the speeds: the clutch holds \
+                 where they ask for no pressure, or slips where they ask for much\nhint: check the channel of this command with `wetclutch inspect`",
+                grouped(came - taken),
+                grouped(came)
+            ));
         }
         let scores = self.errors.as_ref().map(ErrorScore::finish).unwrap_or_default();
         for score in scores.iter().filter(|score| score.samples > 0) {
