@@ -11,7 +11,8 @@
 //! Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from a turbine that is nearly as fast
 //! or faster: below that the idle control may hold the engine while the car comes to rest. An engine that is faster than any idle control
 //! holds it, [`IDLE_RAD_S`], parts from the turbine by the slip of the converter, but does not stand still to the last digit while the turbine
-//! changes by [`FROZEN_CHANGE_CONVERTER`].
+//! changes by [`FROZEN_CHANGE_CONVERTER`]. One that idles, read in steps of [`COARSE_RAD_S`] or more, may stand longer, until a faster turbine changes by
+//! [`FROZEN_CHANGE_IDLE`].
 
 use crate::Role;
 
@@ -34,6 +35,11 @@ const LATEST: f64 = 0.125;
 const STOPPED_CHANGE: f64 = 0.002;
 /// The same of an engine while the turbine changes behind a converter \[chosen\]: its load changes with the slip.
 pub const FROZEN_CHANGE_CONVERTER: f64 = 0.05;
+/// The same of an engine that idles while a coasting car turns the turbine faster, and that is read in steps of at least [`COARSE_RAD_S`]: an idle
+/// control holds it within such a step \[chosen\].
+pub const FROZEN_CHANGE_IDLE: f64 = 0.3;
+/// A step that hides what an idle control leaves, rad/s \[chosen\]: 1 rpm.
+pub const COARSE_RAD_S: f64 = 0.1;
 /// Maximum speed that an idle control holds, of a cold engine, rad/s \[chosen\]: 1500 rpm.
 pub const IDLE_RAD_S: f64 = 157.0;
 /// A turbine above this fraction of the engine's speed takes the engine along when it changes.
@@ -181,7 +187,12 @@ impl FrozenSpeed {
                 // Without one of both nothing has changed.
                 let (now, then) = (speeds[*partner as usize], still.others[*partner as usize]);
                 let is_tied = self.role != Role::EngineSpeed || then.max(now) > COUPLED * value;
-                let limit = if is_tied { limit } else { limit.max(FROZEN_CHANGE_CONVERTER) };
+                let idles = self.role == Role::EngineSpeed && value <= IDLE_RAD_S && self.quantum >= COARSE_RAD_S;
+                let limit = match (is_tied, idles) {
+                    (true, true) => limit.max(FROZEN_CHANGE_IDLE),
+                    (true, false) => limit,
+                    (false, _) => limit.max(FROZEN_CHANGE_CONVERTER),
+                };
                 (is_tied || value > IDLE_RAD_S) && (now - then).abs() > limit * then.abs().max(now.abs())
             });
         }

@@ -153,7 +153,9 @@ impl<T: Real> GearboxFilter<'_, T> {
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
-                        let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
+                        // A slip of a clutch that holds may be a wrong reading until it is believed.
+                        let is_doubted = estimate.holds && running.phase.is_in_doubt();
+                        let is_tied = !state.held_may_slip && shift.is_tied(c, since_s) && !is_doubted;
                         self.in_range(estimate, &state.elements, (&shift.clutches[c.min(1)], is_tied), &state.newest)
                     })
                 });
