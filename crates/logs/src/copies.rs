@@ -31,6 +31,8 @@ const LATEST: f64 = 0.125;
 /// Samples after which a noise is known, and after which equal ones are hardly a chance \[chosen\].
 const MANY: u32 = 200;
 const SURE: u32 = 5;
+/// Wrong readings in a row after which two speeds that agreed go on as before.
+const WRONG: u32 = 2;
 /// Of the changes of the difference of two fine speeds one in so many, and so many more, is that before, within this fraction of the speeds \[chosen\]: coarse
 /// ones often are.
 const FINE: u32 = 500;
@@ -125,6 +127,8 @@ struct Pair {
     newest: [Option<Stamped>; 2],
     /// Whether one of these is refused for another reason.
     is_fault: bool,
+    /// The time of a reading that was left out, s: that of the other speed is no partner of the next one.
+    left_out_s: f64,
     /// The readings at which they differed last.
     before: Option<[Stamped; 2]>,
     /// Change of the difference in the last sample, rad/s, and how many changes there were.
@@ -151,6 +155,21 @@ struct Pair {
     was_together: bool,
     /// Since when the second one has turned with the shaft behind it while both are equal, s.
     is_with_since_s: Option<f64>,
+    /// Samples in a row in which they agree to the last digit, and what was known of them when a wrong reading parted them, if one did.
+    agree: u32,
+    parted: Option<Parted>,
+}
+
+/// Two speeds that agreed for some time, until some samples ago.
+#[derive(Debug, Clone, Copy)]
+struct Parted {
+    samples: u32,
+    agree: u32,
+    before: Option<[Stamped; 2]>,
+    equal: u32,
+    jumped: Option<usize>,
+    needed: u32,
+    was_together: bool,
 }
 
 /// Whether two readings of about the same time are of two speeds.
@@ -199,6 +218,7 @@ impl Copies {
         let pair = Pair {
             newest: [None; 2],
             is_fault: false,
+            left_out_s: f64::NAN,
             before: None,
             change: 0.0,
             changes: 0,
@@ -214,6 +234,8 @@ impl Copies {
             together_since_s: None,
             was_together: false,
             is_with_since_s: None,
+            agree: 0,
+            parted: None,
         };
         let mut pairs = [pair; PAIRS.len()];
         pairs[LOCKED].together = [f64::INFINITY, LOCKED_RAD_S];
@@ -236,6 +258,10 @@ impl Copies {
         for &(n, which) in places {
             let (pair, of) = (&mut self.pairs[n], PAIRS[n]);
             if is_fault && MAY_JOIN.contains(&of) && !pair.is_fine() {
+                pair.leave_out(reading);
+                continue;
+            }
+            if pair.left_out_s == reading[1] && pair.newest[1 - which].is_none() {
                 continue;
             }
             pair.is_fault |= is_fault;
@@ -281,11 +307,20 @@ impl Copies {
 }
 
 impl Pair {
+    /// Leaves a reading out, and that of the other speed at the same time.
+    fn leave_out(&mut self, [_, time_s]: Stamped) {
+        self.left_out_s = time_s;
+        for newest in &mut self.newest {
+            *newest = newest.filter(|[_, then_s]| *then_s != time_s);
+        }
+    }
+
     /// Takes two readings, and whether they are equal.
     fn are_equal(&mut self, newest: [Stamped; 2]) -> bool {
         let is_fault = std::mem::take(&mut self.is_fault);
         let [[one, _], [other, _]] = newest;
         if (one - other).abs() > ROUNDING * other.abs() || one.abs() < STANDS_RAD_S {
+            self.part();
             // With a reading that is refused the difference says nothing.
             if is_fault {
                 (self.equal, self.jumped) = (0, None);
@@ -294,6 +329,10 @@ impl Pair {
             }
             self.is_with_since_s = None;
             return false;
+        }
+        self.agree = self.agree.saturating_add(1);
+        if self.join() {
+            return true;
         }
         let Some(before) = self.before else { return true };
         if self.equal == 0 {
@@ -304,6 +343,29 @@ impl Pair {
             self.was_together = self.is_open() && (is_settled || self.closes_at_once(before, newest));
         }
         self.equal = self.equal.saturating_add(1);
+        true
+    }
+
+    /// They differ in this sample: two that agreed for some time keep what was known of them for as long as it may be a wrong reading.
+    fn part(&mut self) {
+        let agree = core::mem::take(&mut self.agree);
+        if let Some(parted) = &mut self.parted {
+            parted.samples += 1;
+        } else if agree >= SURE {
+            let Self { before, equal, jumped, needed, was_together, .. } = *self;
+            self.parted = Some(Parted { samples: 1, agree, before, equal, jumped, needed, was_together });
+        }
+        self.parted = self.parted.filter(|parted| parted.samples <= WRONG);
+    }
+
+    /// They agree in this sample. Whether they did before some wrong readings, and go on as if these had not come.
+    fn join(&mut self) -> bool {
+        let Some(parted) = self.parted.take() else { return false };
+        let Parted { agree, before, equal, jumped, needed, was_together, .. } = parted;
+        self.agree = agree.saturating_add(1);
+        (self.before, self.equal, self.jumped) = (before, equal, jumped);
+        (self.needed, self.was_together) = (needed, was_together);
+        self.equal = if before.is_some() { equal.saturating_add(1) } else { equal };
         true
     }
 

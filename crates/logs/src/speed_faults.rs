@@ -78,6 +78,8 @@ const AT_ONCE_RAD_S: [f64; WATCHED] = [20.0, 20.0, 6.0, 2.0];
 #[derive(Debug, Clone, Copy)]
 pub struct SpeedFaults {
     believed: [Option<Latest>; WATCHED],
+    /// The two readings that were believed before it.
+    earlier: [[Option<Latest>; 2]; WATCHED],
     faults: [Option<Fault>; WATCHED],
     /// Whether a speed is believed again where its fault was: its next jump may be that to the right value.
     doubtful: [bool; WATCHED],
@@ -215,6 +217,7 @@ impl SpeedFaults {
     fn with(into_direct: IntoDirect) -> Self {
         Self {
             believed: [None; WATCHED],
+            earlier: [[None; 2]; WATCHED],
             faults: [None; WATCHED],
             doubtful: [false; WATCHED],
             output_over_wheel: f64::NAN,
@@ -295,6 +298,7 @@ impl SpeedFaults {
     pub fn disbelieve_after(&mut self, role: Role, rad_s: f64, time_s: f64) {
         if let Some(believed) = self.believed.get_mut(role as usize) {
             *believed = Some(Latest::first(rad_s, time_s));
+            self.earlier[role as usize] = [None; 2];
             self.faults[role as usize] = None;
         }
         if matches!(role, Role::OutputSpeed | Role::WheelSpeed) {
@@ -309,6 +313,7 @@ impl SpeedFaults {
 
     fn believe(&mut self, at: usize, rad_s: f64, time_s: f64) {
         let first = Latest::first(rad_s, time_s);
+        self.earlier[at] = [self.believed[at], self.earlier[at][0]];
         self.believed[at] = Some(self.believed[at].map_or(first, |before| before.then(rad_s, time_s)));
         if let Some(fault) = self.faults[at] {
             self.doubtful[at] = fault.goes_on(at, rad_s, time_s);
@@ -332,12 +337,21 @@ impl SpeedFaults {
 
     /// Whether a fault begins with a reading.
     fn begins(&self, at: usize, before: Latest, rad_s: f64, time_s: f64) -> bool {
-        let change = (rad_s - before.rad_s).abs();
         let (_, min_rad_s) = SHAFTS[at];
         let fell = rad_s.abs() <= FELL * before.rad_s.abs() && before.rad_s.abs() > min_rad_s;
         let is_sudden = time_s - before.time_s <= AT_ONCE_S && fell;
         let (rate, at_once) = TO_ANOTHER;
-        let to_another = change > rate * before.passed_s(time_s) + at_once && self.another(at, rad_s, time_s).is_some();
+        let change = (rad_s - before.rad_s).abs();
+        // From one or two wrong readings it comes back to where it was.
+        let comes_back = || {
+            self.earlier[at].into_iter().flatten().any(|earlier| {
+                let left = (before.rad_s - earlier.rad_s).abs();
+                time_s - earlier.time_s <= AT_ONCE_S && (rad_s - earlier.rad_s).abs() <= (1.0 - RETURNED) * left
+            })
+        };
+        let to_another = change > rate * before.passed_s(time_s) + at_once
+            && self.another(at, rad_s, time_s).is_some()
+            && !comes_back();
         jumps(at, before, rad_s, time_s)
             || (is_sudden && self.is_contradicted(at, before, time_s))
             || to_another

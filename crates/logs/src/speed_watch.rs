@@ -152,4 +152,54 @@ mod tests {
             assert!(last.is_some_and(|time_s| time_s > 4.8 && time_s < 5.1), "{noise_rad_s}: {last:?}");
         }
     }
+
+    /// Of a simulation, or of coarse channels: turbine and output agree to the last digit in the direct gear. Before, the turbine was refused until it
+    /// left the output.
+    #[test]
+    fn a_wrong_reading_in_the_direct_gear_is_no_end_of_a_copy() {
+        for (which, error_rad_s) in [(1, -20.0), (1, 20.0), (1, 2.0), (2, -20.0), (2, 3.0)] {
+            for count in [1, 2] {
+                let mut watch = SpeedWatch::of_gearbox(&[1.5, 1.0]);
+                let mut refused = Vec::new();
+                for row in 0..900_u32 {
+                    let time_s = 0.01 * f64::from(row);
+                    let output = 120.0 + 4.0 * (0.7 * time_s).sin();
+                    let turbine = output * (1.5 - 0.5 * ((time_s - 2.0) / 0.4).clamp(0.0, 1.0));
+                    let mut speeds = [turbine + 12.0, turbine, output, output / 3.0];
+                    if row >= 400 && row % 97 < count {
+                        speeds[which] += error_rad_s;
+                    }
+                    for (role, value) in Role::SPEEDS.into_iter().zip(speeds) {
+                        let (quality, _) = watch.judge(SpeedReading { role, value, time_s, may_be_held: false });
+                        if quality == Quality::Impossible {
+                            refused.push((row, role));
+                        }
+                    }
+                }
+                assert!(refused.iter().all(|(row, _)| row % 97 < count + 2), "{error_rad_s} {count}: {refused:?}");
+            }
+        }
+    }
+
+    /// Read in steps of 2 rpm it stands to the last digit, and the car turns the turbine faster; in fine ones it would not.
+    #[test]
+    fn an_idle_control_holds_an_engine_that_is_read_in_coarse_steps() {
+        for (step_rpm, expected) in [(2.0, false), (0.01, true)] {
+            let mut watch = SpeedWatch::of_gearbox(&[2.5, 1.0]);
+            let mut is_frozen = false;
+            for row in 0..900_u32 {
+                let time_s = 0.01 * f64::from(row);
+                let turbine = (220.0 - 8.0 * (time_s - 1.0).max(0.0).powi(2)).max(75.0);
+                let engine = (turbine - 16.0).max(84.8);
+                let step_rad_s = step_rpm * std::f64::consts::PI / 30.0;
+                let engine = (engine / step_rad_s).round() * step_rad_s;
+                let speeds = [engine, turbine, turbine, turbine / 3.0];
+                for (role, value) in Role::SPEEDS.into_iter().zip(speeds) {
+                    let (quality, _) = watch.judge(SpeedReading { role, value, time_s, may_be_held: false });
+                    is_frozen |= role == Role::EngineSpeed && quality == Quality::Frozen;
+                }
+            }
+            assert_eq!(is_frozen, expected, "{step_rpm} rpm");
+        }
+    }
 }
