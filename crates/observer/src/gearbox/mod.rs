@@ -377,10 +377,12 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// The step with the noise of the readings as it was found.
     fn step_on_time(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
-        match state.noise.factors() {
-            Some(factors) => self.noisier(&factors).step_as_is(state, input),
+        let estimate = match self.noisier(&state.noise) {
+            Some(noisier) => noisier.step_as_is(state, input),
             None => self.step_as_is(state, input),
-        }
+        };
+        self.take_noise(state, input);
+        estimate
     }
 
     /// The step with the noise of the readings as it stands in the filter.
@@ -413,7 +415,6 @@ impl<T: Real> GearboxFilter<'_, T> {
         channels.engine = self.take_engine(state, input, dt_s);
         channels.acceleration = self.judge_acceleration(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);
-        self.take_noise(state, input);
         self.take_skew(state, input, dt_s);
         health = health.max(self.take_gear(state, input.gear, dt_s));
         let side = self.input_side(state, input, dt_s);

@@ -16,13 +16,13 @@
 //! higher orders. Only what lies two of these above 1 counts, so that readings as stated are used as stated. Neither state nor equations of
 //! the filter take part: a wrong model cannot take its error for noise. Readings near standstill are left out: a wheel that stands has none.
 //!
-//! Readings in coarse steps have one error as long as they stand. Where a noise above the stated one is found, `n` equal readings in a row
-//! count as one: each has `n` times the variance.
+//! Readings in coarse steps `s` have an error of variance `s^2/12` beside the noise, and one error as long as they stand: `n` equal readings in a
+//! row count as one, each with `n` times that variance. The step is what all changes of a channel are multiples of.
 
 use car::Gear;
 use drivetrain::Real;
 
-use super::{GearboxFilter, GearboxState, Newest, OUTPUT, Reading, SPEEDS, ShiftInput, TURBINE, WHEEL, square};
+use super::{GearboxFilter, GearboxState, Newest, OUTPUT, Reading, SPEEDS, ShiftInput, TURBINE, square};
 
 /// Differences in the mean at most: it follows a change of the noise within some seconds \[chosen\].
 const MAXIMUM: u16 = 400;
@@ -30,27 +30,20 @@ const MAXIMUM: u16 = 400;
 const FEWEST: u16 = 16;
 /// Most readings in a row that count as the same \[chosen\].
 const LONGEST_SAME: u16 = 50;
+/// Changes that are multiples of one step, and those of them of a reading that stood, from which on the step is one of the channel \[chosen\].
+const MULTIPLES: u8 = 8;
+const REPEATS: u8 = 4;
+/// By this fraction of the step a change may be none: times and values are rounded.
+const ROUNDED: f64 = 0.02;
+/// Changes that are no multiples until the step is smaller: one wrong reading makes two of them. So many multiples make them none \[chosen\].
+const MISSES: u8 = 3;
+const FORGOTTEN: u8 = 16;
 /// Highest order of a difference.
 const HIGHEST: usize = 3;
 /// Largest difference that is noise, in its standard deviations: an outlier counts as this.
 const OUTLIER: f64 = 5.0;
 /// Longest step over which differences are those of a smooth speed, s \[chosen\]: the drive shafts swing with up to 11 Hz.
 const LONGEST_STEP_S: f64 = 0.025;
-
-/// By what the stated standard deviations are multiplied, at least 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct NoiseFactors<T> {
-    pub(super) turbine: T,
-    pub(super) output: T,
-    pub(super) wheel: T,
-    pub(super) engine: T,
-}
-
-impl<T: Real> NoiseFactors<T> {
-    fn stated() -> Self {
-        Self { turbine: T::one(), output: T::one(), wheel: T::one(), engine: T::one() }
-    }
-}
 
 /// Memory of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,18 +54,23 @@ pub(super) struct ReadingNoise<T> {
     slip: Differences<T, 1>,
     wheel: Differences<T, 2>,
     engine: Differences<T, 3>,
-    /// Readings of turbine, output, wheel and engine in a row that are the same.
-    same: [Same<T>; SPEEDS + 1],
+    /// Of turbine, output, wheel and engine.
+    steps: [Steps<T>; SPEEDS + 1],
 }
 
-/// Readings in a row that are the same: those of a coarse step have one error as long as they stand, and not one each.
+/// The step of a channel, and readings in a row that are the same: those of a coarse step have one error as long as they stand, and not one each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Same<T> {
+struct Steps<T> {
     value: T,
-    /// How many there are, and how many there were of the value before.
+    /// How many there are of this value, and how many there were of the one before.
     count: u16,
     before: u16,
+    /// What all changes were multiples of, rad/s; zero before the first.
+    step: T,
+    multiples: u8,
+    misses: u8,
+    repeats: u8,
 }
 
 /// The differences of order `N` of a quantity.
@@ -99,20 +97,13 @@ impl<T: Real> ReadingNoise<T> {
             slip: Differences::stated(),
             wheel: Differences::stated(),
             engine: Differences::stated(),
-            same: [Same { value: T::zero(), count: 1, before: 1 }; SPEEDS + 1],
+            steps: [Steps::nothing(); SPEEDS + 1],
         }
     }
 
-    /// By what the stated standard deviations are multiplied; none where all are as stated.
-    pub(super) fn factors(&self) -> Option<NoiseFactors<T>> {
-        let factors = NoiseFactors {
-            turbine: self.slip.factor * self.same[TURBINE].root(),
-            output: self.slip.factor * self.same[OUTPUT].root(),
-            wheel: self.wheel.factor * self.same[WHEEL].root(),
-            engine: self.engine.factor * self.same[SPEEDS].root(),
-        };
-        let one = T::one();
-        (self.slip.factor > one || self.wheel.factor > one || self.engine.factor > one).then_some(factors)
+    /// By what the standard deviations of the readings of turbine, output, wheel and engine are multiplied, at least 1.
+    fn factors(&self) -> [T; SPEEDS + 1] {
+        [self.slip.factor, self.slip.factor, self.wheel.factor, self.engine.factor]
     }
 
     /// The next readings have none before them.
@@ -121,17 +112,43 @@ impl<T: Real> ReadingNoise<T> {
     }
 }
 
-impl<T: Real> Same<T> {
+impl<T: Real> Steps<T> {
+    fn nothing() -> Self {
+        Self { value: T::zero(), count: 0, before: 1, step: T::zero(), multiples: 0, misses: 0, repeats: 0 }
+    }
+
     fn take(&mut self, value: T) {
-        if value == self.value {
-            self.count = LONGEST_SAME.min(self.count + 1);
-        } else {
-            *self = Self { value, count: 1, before: self.count };
+        let change = (value - self.value).abs();
+        if self.count == 0 || change == T::zero() {
+            (self.value, self.count) = (value, LONGEST_SAME.min(self.count + 1));
+            return;
+        }
+        (self.value, self.count, self.before) = (value, 1, self.count);
+        let nearest = (change / self.step + T::of(0.5)).floor() * self.step;
+        let left = (change - nearest).abs();
+        if nearest > T::zero() && left <= T::of(ROUNDED) * self.step {
+            self.multiples = self.multiples.checked_add(1).unwrap_or(u8::MAX - FORGOTTEN + 1);
+            self.repeats = self.repeats.saturating_add(u8::from(self.before > 1));
+            if self.multiples % FORGOTTEN == 0 {
+                self.misses = 0;
+            }
+            return;
+        }
+        self.misses = MISSES.min(self.misses + 1);
+        if self.misses >= MISSES || self.step == T::zero() {
+            // A comparison with NaN is false: then this is the first step.
+            self.step = if left > T::zero() { left } else { change };
+            (self.multiples, self.repeats) = (0, 0);
         }
     }
 
-    fn root(&self) -> T {
-        T::of(f64::from(self.count.max(self.before))).sqrt()
+    /// Variance of one reading by the step, and that of readings that stand, as if each had an error of its own.
+    fn variances(&self) -> [T; 2] {
+        if self.multiples < MULTIPLES || self.repeats < REPEATS {
+            return [T::zero(); 2];
+        }
+        let of_one = square(self.step) / T::of(12.0);
+        [of_one, of_one * T::of(f64::from(self.count.max(self.before)))]
     }
 }
 
@@ -176,24 +193,28 @@ impl<T: Real, const N: usize> Differences<T, N> {
 }
 
 impl<T: Real> GearboxFilter<'_, T> {
-    /// The same filter with noisier readings.
-    pub(super) fn noisier(&self, factors: &NoiseFactors<T>) -> Self {
-        let (mut readings, mut engine) = (self.readings, self.engine);
-        for (k, factor) in [(TURBINE, factors.turbine), (OUTPUT, factors.output), (WHEEL, factors.wheel)] {
-            readings[k].std_dev_rad_s = factor * readings[k].std_dev_rad_s;
+    /// The same filter with noisier readings; none where all are as stated.
+    pub(super) fn noisier(&self, noise: &ReadingNoise<T>) -> Option<Self> {
+        let (factors, steps) = (noise.factors(), noise.steps.each_ref().map(Steps::variances));
+        let is_as_stated = |(factor, [_, of_steps]): (&T, &[T; 2])| *factor <= T::one() && *of_steps <= T::zero();
+        if factors.iter().zip(&steps).all(is_as_stated) {
+            return None;
         }
-        engine.1.reading_rad_s = factors.engine * engine.1.reading_rad_s;
-        Self { readings, engine, ..*self }
+        let (mut readings, mut engine) = (self.readings, self.engine);
+        let [turbine, output, wheel] = readings.each_mut().map(|reading| &mut reading.std_dev_rad_s);
+        let std_devs = [turbine, output, wheel, &mut engine.1.reading_rad_s];
+        for (std_dev, (factor, [_, of_steps])) in std_devs.into_iter().zip(factors.into_iter().zip(steps)) {
+            *std_dev = factor * (square(*std_dev) + of_steps).sqrt();
+        }
+        Some(Self { readings, engine, ..*self })
     }
 
-    /// Takes the readings that came in a gear.
+    /// Takes the readings of a step after it. The filter is that of the readings as stated.
     pub(super) fn take_noise(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) {
-        // Of this filter, as it is used in the step.
-        let factors = state.noise.factors().unwrap_or_else(NoiseFactors::stated);
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s, input.engine_rad_s];
-        for (same, reading) in state.noise.same.iter_mut().zip(given) {
-            if let Some(reading) = reading {
-                same.take(reading.value);
+        for (steps, reading) in state.noise.steps.iter_mut().zip(given) {
+            if let Some(reading) = reading.filter(|reading| self.limits.speed_valid(reading.value)) {
+                steps.take(reading.value);
             }
         }
         let gear = input.gear.to;
@@ -209,15 +230,18 @@ impl<T: Real> GearboxFilter<'_, T> {
         let output = came(OUTPUT, &input.output_rad_s).filter(moves);
         let turbine = came(TURBINE, &input.turbine_rad_s);
         let noise = &mut state.noise;
-        let of = |k: usize, factor: T| square(self.readings[k].std_dev_rad_s / factor);
-        let of_output = of(OUTPUT, factors.output);
+        let [of_turbine, of_output, of_wheel, of_engine] = {
+            let [turbine, output, wheel] = self.readings.each_ref().map(|sensor| sensor.std_dev_rad_s);
+            let stated = [turbine, output, wheel, self.engine.1.reading_rad_s];
+            core::array::from_fn(|k| square(stated[k]) + noise.steps[k].variances()[0])
+        };
         match turbine.zip(output) {
             Some((turbine, output)) => {
                 if core::mem::replace(&mut noise.gear, gear) != gear {
                     noise.slip.known = 0;
                 }
                 let slip = turbine.value - row.ratio * output.value;
-                noise.slip.take(slip, of(TURBINE, factors.turbine) + square(row.ratio) * of_output);
+                noise.slip.take(slip, of_turbine + square(row.ratio) * of_output);
             }
             None => noise.slip.known = 0,
         }
@@ -225,12 +249,12 @@ impl<T: Real> GearboxFilter<'_, T> {
             Some((wheel, output)) => {
                 let final_ratio = self.driveline.final_ratio;
                 let of_output = square(noise.slip.factor / final_ratio) * of_output;
-                noise.wheel.take(wheel - output.value / final_ratio, of(WHEEL, factors.wheel) + of_output);
+                noise.wheel.take(wheel - output.value / final_ratio, of_wheel + of_output);
             }
             None => noise.wheel.known = 0,
         }
         match valid(&input.engine_rad_s) {
-            Some(engine) => noise.engine.take(engine, square(self.engine.1.reading_rad_s / factors.engine)),
+            Some(engine) => noise.engine.take(engine, of_engine),
             None => noise.engine.known = 0,
         }
     }
@@ -314,20 +338,43 @@ mod tests {
         }
     }
 
+    /// The standard deviations of one reading and of the newest one as it counts, after these readings every 10 ms.
+    fn by_steps(reading: impl Fn(f64) -> f64, count: u32) -> [f64; 2] {
+        let mut steps = Steps::nothing();
+        (0..count).for_each(|k| steps.take(reading(0.01 * f64::from(k))));
+        steps.variances().map(f64::sqrt)
+    }
+
     #[test]
-    fn readings_that_stand_count_as_one() {
-        let mut same = Same { value: 0.0, count: 1, before: 1 };
-        let mut root = |value: f64| {
-            same.take(value);
-            same.root()
-        };
-        assert_eq!([1.0, 2.0, 3.0].map(&mut root), [1.0; 3]);
-        assert_eq!([4.0, 4.0, 4.0, 4.0].map(&mut root), [1.0, 2.0_f64.sqrt(), 3.0_f64.sqrt(), 2.0]);
-        // The first of the next value, too: it is on the same side of the speed each time.
-        assert_eq!([5.0, 6.0].map(&mut root), [2.0, 1.0]);
-        for _ in 0..LONGEST_SAME + 10 {
-            root(7.0);
+    fn the_step_of_a_channel_is_found_and_counts_for_as_long_as_a_reading_stands() {
+        let speed = |t: f64| 100.0 + 30.0 * (0.7 * t).sin();
+        for step in [0.1047, 1.0, 2.618] {
+            let coarse = |t: f64| (speed(t) / step).round() * step;
+            let [one, _] = by_steps(coarse, 600);
+            assert!((one / (step / 12.0_f64.sqrt()) - 1.0).abs() < 0.03, "{step}: {one}");
+            // At the top it stands, and so many readings have one error.
+            let stands = by_steps(|t| coarse(t.min(2.0)), 240);
+            assert!(stands[1] > 6.0 * one && stands[1] <= one * f64::from(LONGEST_SAME).sqrt() + 1e-9, "{stands:?}");
         }
-        assert_eq!(root(7.0), f64::from(LONGEST_SAME).sqrt());
+    }
+
+    #[test]
+    fn fine_readings_have_no_step() {
+        let mut random = Pcg64Mcg::new(3);
+        let mut steps = Steps::nothing();
+        for k in 0..400_u32 {
+            let normal: f64 = StandardNormal.sample(&mut random);
+            steps.take(100.0 + 0.2 * f64::from(k) + 0.02 * normal);
+            assert_eq!(steps.variances(), [0.0; 2], "{k}");
+        }
+        // A ramp without noise, after a standstill.
+        assert_eq!(by_steps(|t| (30.0 * (t - 1.0)).max(0.0), 300), [0.0; 2]);
+    }
+
+    #[test]
+    fn one_wrong_reading_does_not_hide_the_step() {
+        let speed = |t: f64| (100.0 + 20.0 * t + if (t - 3.0).abs() < 0.004 { 0.37 } else { 0.0 }) / 0.5;
+        let [one, _] = by_steps(|t| if (t - 3.0).abs() < 0.004 { 0.5 * speed(t) } else { speed(t).round() * 0.5 }, 400);
+        assert!((one - 0.5 / 12.0_f64.sqrt()).abs() < 1e-6, "{one}");
     }
 }
