@@ -129,7 +129,7 @@ impl<T: Real> Steps<T> {
         if nearest > T::zero() && left <= T::of(ROUNDED) * self.step {
             self.multiples = self.multiples.checked_add(1).unwrap_or(u8::MAX - FORGOTTEN + 1);
             self.repeats = self.repeats.saturating_add(u8::from(self.before > 1));
-            if self.multiples % FORGOTTEN == 0 {
+            if self.multiples.is_multiple_of(FORGOTTEN) {
                 self.misses = 0;
             }
             return;
