@@ -2,6 +2,7 @@
 
 use drivetrain::{Clutch, Real};
 
+use super::believed::{Belief, Compared, Seen, UnheardTorque};
 use super::pistons::Pistons;
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
@@ -134,8 +135,13 @@ pub(super) struct ElementState<T> {
     lag: T,
     delay_s: T,
     newest: Option<NewestCommand<T>>,
-    /// Standard deviation of its torque while no command comes, N m; zero of an element that needs its commands.
-    pub(super) unheard_n_m: T,
+    /// Whether its command can be its own.
+    pub(super) belief: Belief<T>,
+    /// What is known of its torque while no command comes, and the standard deviation now, N m.
+    unheard: UnheardTorque<T>,
+    unheard_n_m: T,
+    /// Whether it is no fault that no command ever comes.
+    is_optional: bool,
     /// Where the piston has a stroke, once a command has come.
     pistons: Option<Pistons<T>>,
     range: Option<PressureRange<T>>,
@@ -143,6 +149,7 @@ pub(super) struct ElementState<T> {
 
 impl<T: Real> ElementState<T> {
     pub(super) fn new(element: &FrictionElement<T>) -> Self {
+        let unheard = UnheardTorque::of(element);
         Self {
             commands: Commands::new(),
             valve_pa: T::zero(),
@@ -152,10 +159,42 @@ impl<T: Real> ElementState<T> {
             lag: T::one(),
             delay_s: element.valve.delay_s,
             newest: None,
-            unheard_n_m: T::zero(),
+            belief: Belief::new(),
+            unheard,
+            unheard_n_m: unheard.holds_n_m,
+            is_optional: false,
             pistons: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, element.limits.command_max)),
         }
+    }
+
+    /// Takes what is stated of its torque without commands: that none ever comes is no fault.
+    pub(super) fn take_unheard(&mut self, unheard: &UnheardTorque<T>) {
+        (self.unheard, self.unheard_n_m, self.is_optional) = (*unheard, unheard.holds_n_m, true);
+    }
+
+    /// Compares its command with what is seen of it.
+    pub(super) fn judge(&mut self, element: &FrictionElement<T>, seen: Seen<T>, dt_s: T) {
+        let Some(newest) = self.newest.as_ref().filter(|_| !self.belief.is_wrong()) else { return };
+        let compared = Compared { element, asked_pa: newest.settled_pa, since_s: newest.alike_s, seen };
+        let (range, budget) = (&mut self.range, &element.budget);
+        let capacity_n_m = || {
+            let (range, budget) = (range.as_ref()?, budget.as_ref()?);
+            let [_, max_n_m] = pressure_and_torque(&element.clutch, budget, range, None).1;
+            Some([capacity_min_n_m(&element.clutch, budget, range), max_n_m])
+        };
+        if self.belief.is_refuted(&compared, capacity_n_m, dt_s)
+            && let (Some(range), Some(budget)) = (range, budget)
+        {
+            range.forget(budget, element.limits.command_max);
+        }
+    }
+
+    /// Follows what is known of its torque without a command, while it is let go or not.
+    pub(super) fn follow_unheard(&mut self, is_let_go: bool, dt_s: T) {
+        let UnheardTorque { holds_n_m, open_n_m, release_s } = self.unheard;
+        self.unheard_n_m =
+            if is_let_go { open_n_m + (self.unheard_n_m - open_n_m) * (-dt_s / release_s).exp() } else { holds_n_m };
     }
 
     /// Goes on with what is learnt of lag and delay. A lag has a length, and no command arrives before it was sent.
@@ -183,11 +222,13 @@ impl<T: Real> ElementState<T> {
             self.pass(element, dt_s);
         }
         let usable = command.and_then(|reading| element.limits.usable(&reading));
+        let asked_pa = |reading: &Reading<T>| element.valve.valve.settled_pressure(reading.value);
+        let usable = usable.filter(|reading| self.belief.takes(element, || asked_pa(reading)));
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
             range.step(budget, dt_s, usable, element.limits.command_max);
         }
         match (command, usable) {
-            (None, _) if self.newest.is_none() && self.unheard_n_m > T::zero() => ChannelHealth::Unused,
+            (None, _) if self.newest.is_none() && self.is_optional => ChannelHealth::Unused,
             (None, _) if self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S)) => ChannelHealth::Lost,
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,
@@ -262,6 +303,7 @@ impl<T: Real> ElementState<T> {
             }
         }
         let settled_pa = element.valve.valve.settled_pressure(reading.value);
+        self.belief.has_changed = true;
         if self.newest.is_none() {
             // The first command is taken to have stood for long.
             self.valve_pa = element.limits.possible_pressure(settled_pa);
@@ -325,8 +367,9 @@ impl<T: Real> ElementState<T> {
     }
 
     /// Whether its torque is known by the speeds alone, as no command comes: it walks, and only a slip shows that it no longer holds.
-    fn is_unheard(&self) -> bool {
-        self.unheard_n_m > T::zero() && self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S))
+    pub(super) fn is_unheard(&self) -> bool {
+        let is_lost = || self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S));
+        self.belief.is_wrong() || is_lost()
     }
 
     /// The pressure on the plates, by what is known of its errors. The plates do not pull: near the kiss point the mean of the

@@ -300,6 +300,16 @@ impl<T: Real> GearboxFilter<'_, T> {
         let nothing = (zero, zero, zero, [zero; 3]);
         let (valve_pa, pressure_pa, both, [drag, drag_std_dev, variance]) =
             self.element(elements, clutch.element).map_or(nothing, |(memory, element)| {
+                let slip = clutch.alpha * (x.mean[TURBINE] - clutch.ratio * x.mean[OUTPUT]);
+                if memory.is_unheard() {
+                    // By the torque: without a command nothing else is known of it.
+                    let (plates, at_element) = (&element.clutch, T::one() / clutch.alpha.abs());
+                    let pressure_pa = plates.pressure_for(at_element * torque, slip);
+                    let per_pa = plates.torque_per_force(slip) * plates.piston_area_m2;
+                    let variance = square(at_element * std_dev / per_pa);
+                    let possible_pa = element.limits.possible_pressure(pressure_pa);
+                    return (memory.pressure_pa(), possible_pa, zero, [zero, zero, variance]);
+                }
                 let modelled_pa = memory.pressure_pa();
                 let gain = modelled_pa * element.gain_error(x.mean[FRICTION[c]], x.mean[KISS[c]]);
                 // The error of the pressure itself.
@@ -314,7 +324,6 @@ impl<T: Real> GearboxFilter<'_, T> {
                 // Of one that holds the speeds show nothing of it.
                 let unseen = if holds { square(of_itself) } else { zero };
                 pressure[PRESSURE[c]] = if holds { zero } else { of_itself };
-                let slip = clutch.alpha * (x.mean[TURBINE] - clutch.ratio * x.mean[OUTPUT]);
                 let drag =
                     [element.drag_n_m(slip), element.uncertainty.drag_n_m].map(|drag| if holds { zero } else { drag });
                 let variance = x.variance(&pressure) + left + unseen;

@@ -32,6 +32,7 @@
 mod acceleration;
 mod at_turbine;
 mod begin;
+mod believed;
 mod beyond_bounds;
 mod bias;
 mod correct;
@@ -46,7 +47,6 @@ mod late;
 mod learnt;
 mod newest;
 mod noise;
-mod offgoing_command;
 mod one_shift;
 mod phases;
 mod pistons;
@@ -86,12 +86,13 @@ use turbine::InputSide;
 
 pub use acceleration::AccelerationReading;
 pub use at_turbine::ClutchesAtTurbine;
+pub use believed::UnheardTorque;
 pub use beyond_bounds::{BeyondBounds, CarQuantity, Elements};
 pub use estimate::{ClutchEstimate, ShiftEstimate};
 pub use input_clutch::InputClutch;
 pub use late::LONGEST_DELAY_S;
 pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
-pub use one_shift::{OneShiftFilter, OneShiftState, OneShiftTables, UnheardTorque};
+pub use one_shift::{OneShiftFilter, OneShiftState, OneShiftTables};
 pub use phases::ShiftPhase;
 pub use pistons::Piston;
 pub use tables::{
@@ -410,7 +411,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         channels.offgoing_command = ChannelHealth::Unused;
         self.take_fills(state);
         let commands = self.pass_elements(state, input, dt_s);
-        channels.command = self.of_commands(&commands, input.gear);
+        channels.command = self.of_commands(&commands, &state.elements, input.gear);
         channels.engine_torque = self.take_reported(state, input, dt_s);
         channels.engine = self.take_engine(state, input, dt_s);
         channels.acceleration = self.judge_acceleration(state, input, dt_s);
@@ -448,6 +449,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         self.conclude(state, input, (&channels, &commands), health, turbine_n_m);
         state.estimate.input_clutch = input_clutch.filter(|clutch| clutch.torque_n_m.is_finite());
         state.estimate.at_turbine = at_turbine;
+        self.follow_commands(state, dt_s);
         state.estimate
     }
 

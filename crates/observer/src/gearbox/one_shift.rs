@@ -14,15 +14,12 @@
 use car::{Input, ShiftCommand};
 use drivetrain::{Driveline, Real, ReducedShift};
 
-use super::elements::ElementState;
-use super::offgoing_command::{OffgoingCommand, Seen};
 use super::{
     AccelerationReading, FrictionElement, GearRow, GearboxFilter, GearboxState, GearboxTables, MAX_ELEMENTS,
-    ShiftEstimate, ShiftInput, ShiftPhase, ShiftRow, ShiftUncertainty, TurbineTorque,
+    ShiftEstimate, ShiftInput, ShiftPhase, ShiftRow, ShiftUncertainty, TurbineTorque, UnheardTorque,
 };
 use crate::{
-    ChannelHealth, EngineNoise, Estimate, Estimator, Health, InputLimits, Phase, Reading, SpeedReading, Supervisor,
-    SupervisorState,
+    EngineNoise, Estimate, Estimator, Health, InputLimits, Phase, Reading, SpeedReading, Supervisor, SupervisorState,
 };
 
 /// Place of the offgoing clutch among the elements, and of the gear before among the gears.
@@ -75,18 +72,6 @@ struct Parameters<T> {
     limits: InputLimits<T>,
 }
 
-/// What is known of the torque of the offgoing clutch while its command does not come: it walks while the clutch holds, and fades once it
-/// has let go.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UnheardTorque<T> {
-    /// Standard deviation while it holds, N m.
-    pub holds_n_m: T,
-    /// The same of what is left when it is open, N m.
-    pub open_n_m: T,
-    /// Time constant from the one to the other, s.
-    pub release_s: T,
-}
-
 /// Memory of a [`OneShiftFilter`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OneShiftState<T> {
@@ -100,7 +85,6 @@ pub struct OneShiftState<T> {
     back_s: T,
     /// The phase of the estimate.
     phase: Phase,
-    offgoing: OffgoingCommand<T>,
     supervisor: SupervisorState<T>,
 }
 
@@ -228,42 +212,6 @@ impl<T: Real> OneShiftFilter<T> {
         }
     }
 
-    /// Follows what is known of the torque of the offgoing clutch without its command.
-    fn follow_unheard(&self, state: &mut OneShiftState<T>, found: &ShiftEstimate<T>, dt_s: T) {
-        let UnheardTorque { holds_n_m, open_n_m, release_s } = self.unheard;
-        let std_dev_n_m = match found.phase {
-            Some(ShiftPhase::BothSlip) => {
-                let now = state.filter.elements[OFFGOING].map_or(open_n_m, |element| element.unheard_n_m);
-                open_n_m + (now - open_n_m) * (-dt_s / release_s).exp()
-            }
-            _ => holds_n_m,
-        };
-        set_unheard(&mut state.filter, std_dev_n_m);
-    }
-
-    /// Follows whether the command of the offgoing clutch can be its own; one that cannot be is forgotten.
-    fn follow_offgoing(
-        &self,
-        state: &mut OneShiftState<T>,
-        found: &ShiftEstimate<T>,
-        [turbine, output]: [T; 2],
-        dt_s: T,
-    ) {
-        let slips = self.shift.offgoing_slip(turbine, output).abs() > self.supervisor.release_slip_rad_s;
-        let seen = match (state.stage, found.phase) {
-            (Stage::First, _) if found.turbine_n_m.is_some() && !slips => Seen::Holds,
-            (Stage::Up, Some(ShiftPhase::BothSlip)) if slips => Seen::Slips,
-            _ => Seen::Nothing,
-        };
-        let element = &self.tables.elements[OFFGOING];
-        let turbine_n_m = found.turbine_n_m.unwrap_or(T::zero());
-        let of_gear_n_m = self.tables.gears[OFFGOING].holding[OFFGOING] * turbine_n_m;
-        if state.offgoing.judge(element, seen, [turbine_n_m, of_gear_n_m], dt_s) {
-            state.filter.elements[OFFGOING] = Some(ElementState::new(element));
-            set_unheard(&mut state.filter, self.unheard.holds_n_m);
-        }
-    }
-
     /// The phase of the shift: by the clutch that holds, and by the readings where the filter does not run.
     fn phase(
         &self,
@@ -305,24 +253,10 @@ impl<T: Real> OneShiftFilter<T> {
     }
 }
 
-impl<T: Real> UnheardTorque<T> {
-    fn cast<U: Real>(&self) -> UnheardTorque<U> {
-        let to = |x: T| U::of(x.to_f64_exact());
-        UnheardTorque { holds_n_m: to(self.holds_n_m), open_n_m: to(self.open_n_m), release_s: to(self.release_s) }
-    }
-}
-
-fn set_unheard<T: Real>(filter: &mut GearboxState<T>, std_dev_n_m: T) {
-    if let Some(offgoing) = &mut filter.elements[OFFGOING] {
-        offgoing.unheard_n_m = std_dev_n_m;
-    }
-}
-
 impl<T: Real> OneShiftState<T> {
     fn enter(&mut self, stage: Stage) {
         if stage != self.stage {
             (self.stage, self.holds_s) = (stage, T::zero());
-            self.offgoing.begin();
         }
     }
 }
@@ -381,7 +315,9 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
 
     fn start(&self) -> OneShiftState<T> {
         let mut filter = self.filter().start();
-        set_unheard(&mut filter, self.unheard.holds_n_m);
+        if let Some(offgoing) = &mut filter.elements[OFFGOING] {
+            offgoing.take_unheard(&self.unheard);
+        }
         OneShiftState {
             filter,
             stage: Stage::First,
@@ -389,7 +325,6 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
             flares_s: T::zero(),
             back_s: T::zero(),
             phase: Phase::BeforeShift,
-            offgoing: OffgoingCommand::nothing(),
             supervisor: SupervisorState::new(),
         }
     }
@@ -401,17 +336,12 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
         let taken = Self::shift_input(state, input);
         let found = filter.step(&mut state.filter, &taken);
         Self::follow_shift(state, &found, dt_s);
-        self.follow_unheard(state, &found, dt_s);
         let speeds = filter.measured(&state.filter.newest, None);
         let phase = self.phase(state, &found, speeds, dt_s);
-        self.follow_offgoing(state, &found, speeds, dt_s);
         let [pressure_pa, clutch_torque_n_m] = self.oncoming(&filter, state, (&taken, &found));
         let flare = if self.flares(state, &found, dt_s) { Health::Flare } else { Health::Good };
         let mut channels = found.channels;
         [channels.offgoing_command, channels.command] = [OFFGOING, ONCOMING].map(|at| found.commands[at]);
-        if input.offgoing_command.is_some() && taken.commands[OFFGOING].is_none() {
-            channels.offgoing_command = ChannelHealth::Refused;
-        }
         Estimate {
             pressure_pa,
             clutch_torque_n_m,
@@ -425,9 +355,9 @@ impl<T: Real> Estimator<T> for OneShiftFilter<T> {
 }
 
 impl<T: Real> OneShiftFilter<T> {
-    fn shift_input(state: &mut OneShiftState<T>, input: &Input<T>) -> ShiftInput<T> {
+    fn shift_input(state: &OneShiftState<T>, input: &Input<T>) -> ShiftInput<T> {
         let mut commands = [None; MAX_ELEMENTS];
-        (commands[OFFGOING], commands[ONCOMING]) = (state.offgoing.take(input.offgoing_command), input.command);
+        (commands[OFFGOING], commands[ONCOMING]) = (input.offgoing_command, input.command);
         ShiftInput {
             dt_s: input.dt_s,
             engine_rad_s: input.engine_rad_s,

@@ -1,9 +1,9 @@
 //! What a step gives: commands, readings, and from them slip and torque at the gearbox input.
 
 use super::{
-    ChannelHealth, Channels, Engine, FIRST_S, GearboxFilter, GearboxState, InputSide, LOST_S, MAX_ELEMENTS, Newest,
-    OUTPUT, Reading, Running, SPEEDS, ShiftElement, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, WHEEL, pieces,
-    square,
+    ChannelHealth, Channels, ElementState, Engine, FIRST_S, GearboxFilter, GearboxState, InputSide, LOST_S,
+    MAX_ELEMENTS, Newest, OUTPUT, Reading, Running, SPEEDS, ShiftElement, ShiftInput, Slip, SpeedReading, TURBINE,
+    Verdict, WHEEL, pieces, square,
 };
 use car::ShiftCommand;
 use drivetrain::Real;
@@ -35,18 +35,29 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// The health of all commands together: a refused one first, then a lost one of an element that shifts, which is what the
-    /// estimate rests on.
-    pub(super) fn of_commands(&self, each: &[ChannelHealth; MAX_ELEMENTS], gear: ShiftCommand) -> ChannelHealth {
+    /// estimate rests on. One that the speeds have refuted counts in the shifts of its element alone.
+    pub(super) fn of_commands(
+        &self,
+        each: &[ChannelHealth; MAX_ELEMENTS],
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        gear: ShiftCommand,
+    ) -> ChannelHealth {
         let is = |health: ChannelHealth| each.contains(&health);
-        let lost = || {
+        let shifts = |which: ChannelHealth| {
             let shift = self.tables.commanded(gear);
             let elements = shift.map(|shift| shift.clutches.map(|clutch| clutch.element));
             let places = elements.into_iter().flatten().filter_map(ShiftElement::place);
-            places.into_iter().any(|place| each.get(place) == Some(&ChannelHealth::Lost))
+            places.into_iter().any(|place| each.get(place) == Some(&which))
         };
-        if is(ChannelHealth::Refused) {
+        let refused = || {
+            let impossible = |(health, memory): (&ChannelHealth, &Option<ElementState<T>>)| {
+                *health == ChannelHealth::Refused && memory.as_ref().is_none_or(|memory| !memory.belief.is_wrong())
+            };
+            each.iter().zip(elements).any(impossible) || shifts(ChannelHealth::Refused)
+        };
+        if is(ChannelHealth::Refused) && refused() {
             ChannelHealth::Refused
-        } else if is(ChannelHealth::Lost) && lost() {
+        } else if is(ChannelHealth::Lost) && shifts(ChannelHealth::Lost) {
             ChannelHealth::Lost
         } else if is(ChannelHealth::Good) {
             ChannelHealth::Good

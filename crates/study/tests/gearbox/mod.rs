@@ -10,6 +10,7 @@ mod beyond_bounds;
 mod bounds;
 mod cars;
 mod command_delay;
+mod commands;
 mod drives;
 mod engine_torque;
 mod faults;

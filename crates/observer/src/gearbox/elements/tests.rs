@@ -84,6 +84,7 @@ fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
 fn an_element_holds_what_it_carries_by_the_estimate() {
     let (element, shift) = (element(), ShiftClutch { element: ShiftElement::Friction(0), alpha: -1.4, ratio: 2.0 });
     let mut state = ElementState::new(&element);
+    state.step(&element, Some(Reading::now(0.0)), 0.0);
     for (valve_pa, factor, pressure, kiss) in [
         (2e5, 0.0, 0.0, 0.0),
         (2e5, 0.8, 0.5, -0.7),
