@@ -21,7 +21,6 @@ fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
             "element_int_current cannot be in A: ",
         ),
         (text.replacen("output_speed_rad_s", "other_rad_s", 1), "there is no column `output_speed_rad_s`"),
-        (text.replacen("element_int_current_a", "int", 1), "there is no column `element_int_current_a`"),
         (text.replacen("target_gear", "goal", 1), "there is no column `target_gear`"),
         (
             first.replacen(",1,1,", ",9,1,", 1),
@@ -373,15 +372,29 @@ fn a_followed_drive_that_becomes_shorter_ends_there_and_says_so() {
     assert!(said.contains("warning: the log became shorter or was replaced by another file"), "{said}");
 }
 
+/// Without commands of the valves the torques are by the speeds alone; a map still needs the speeds and the gear.
 #[test]
-fn a_map_without_any_command_of_a_valve_says_what_can_be_done_without() {
+fn a_log_without_commands_of_the_valves_is_estimated_by_its_speeds() {
     let folder = simulated("no-commands");
+    let text = folder.read("sim/short_measured.csv");
+    for (log, names) in [
+        (text.replace("_current_a", "_x"), "FWD, DIR, REV, INT, LR"),
+        (text.replacen("element_int_current_a", "x", 1), "INT"),
+    ] {
+        folder.write("log.csv", log);
+        let output = estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]);
+        let said = said(&output);
+        assert!(said.contains("warning: the log has no command of ") && said.contains(names), "{said}");
+        assert!(!said.contains("below its kiss point"), "{said}");
+        assert_eq!(folder.read("out.csv").lines().count(), text.lines().count());
+    }
     let map = ["engine_speed", "turbine_speed"].map(|role| format!("[channel.{role}]\nname = \"{role}_rad_s\"\n"));
     let map = folder.write("map.toml", map.concat());
     let error = refused(&estimate(&folder, "sim/short_measured.csv", &["--map", &map]));
-    assert!(error.contains("has no command of a valve: without them no pressure can be estimated"), "{error}");
-    assert!(error.contains("\nhint: an estimate of this car needs turbine_speed, output_speed, gear"), "{error}");
-    assert!(error.contains("`wetclutch inspect` with the map and --shifts finds the shifts"), "{error}");
+    assert!(
+        error.contains("the channel map has no output_speed, gear, target_gear\nhint: an estimate of this car needs"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -127,7 +127,7 @@ fn logs_that_cannot_be_fitted_are_refused_with_a_reason() {
     let fitted = folder.path("fitted.toml");
     for (case, text, vehicle, expected) in [
         ("no shift", lines(600), CAR.to_owned(), "have no shift between two gears that can be fitted"),
-        ("no command", text.replace("element_c_current_a", "x"), CAR.to_owned(), "element_c_current"),
+        ("no command", text.replace("_current_a", "_x"), CAR.to_owned(), "commands of its elements are missing"),
         ("no turbine", text.replace("turbine_speed_rad_s", "x"), CAR.to_owned(), "turbine_speed"),
         (
             "wrong ratios",

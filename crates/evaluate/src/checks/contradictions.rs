@@ -27,6 +27,8 @@ pub(crate) struct CommandCheck<'c> {
     places: Vec<(usize, usize)>,
     /// Pressures by the valve model, Pa, below which an element presses by no means, and above which it does, by their place.
     limits_pa: Vec<[f64; 2]>,
+    /// Whether a command of each has come.
+    heard: [bool; MAX_ELEMENTS],
     gear: Option<Gear>,
     since_s: f64,
     of_gears: Vec<OfGear>,
@@ -58,7 +60,7 @@ impl<'c> CommandCheck<'c> {
             ];
         }
         let of_gears = vec![OfGear::default(); car.gearbox.gears.len()];
-        Self { car, places, limits_pa, gear: None, since_s: f64::NAN, of_gears }
+        Self { car, places, limits_pa, heard: [false; MAX_ELEMENTS], gear: None, since_s: f64::NAN, of_gears }
     }
 
     /// The gear in which the most rows contradict the command of this element, in a sentence.
@@ -100,6 +102,9 @@ impl Check for CommandCheck<'_> {
     fn row(&mut self, row: &CheckedRow<'_>) {
         let (time_s, valve_pa) = (row.step.time_s, &row.estimate.valve_pa);
         let gear = Some(row.step.input.gear).filter(|gear| gear.is_steady()).map(|gear| gear.from);
+        for (heard, command) in self.heard.iter_mut().zip(&row.step.input.commands) {
+            *heard |= command.is_some();
+        }
         let [_, turbine, output] = row.came_rad_s;
         let ratio = gear.and_then(|gear| self.car.ratio(gear)).unwrap_or(f64::NAN);
         let in_gear = ratio * output;
@@ -111,7 +116,8 @@ impl Check for CommandCheck<'_> {
         let place = gear.and_then(Gear::place).filter(|_| is_steady);
         let Some(of_gear) = place.and_then(|place| self.of_gears.get_mut(place)) else { return };
         of_gear.rows += 1;
-        for (place, ([opens_pa, presses_pa], valve_pa)) in self.limits_pa.iter().zip(valve_pa).enumerate() {
+        let limits_pa = self.limits_pa.iter().zip(valve_pa).enumerate().filter(|(place, _)| self.heard[*place]);
+        for (place, ([opens_pa, presses_pa], valve_pa)) in limits_pa {
             of_gear.opens[place] += u64::from(valve_pa < opens_pa);
             of_gear.presses[place] += u64::from(valve_pa > presses_pa);
         }

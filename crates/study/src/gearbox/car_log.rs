@@ -79,10 +79,12 @@ impl Columns {
             let place = tables.place(element)?;
             let found = |name: &str, value| ReadingColumn { value, age: rows.find(&command_age(name)) };
             let pressure = pressure_command_column(&car.gearbox.elements[element].name);
-            Some(match (rows.find(&name), rows.find(&pressure)) {
-                (None, Some(value)) => Ok((place, found(&pressure, value), Some(element))),
-                _ => rows.require(&name).map(|value| (place, found(&name, value), None)),
-            })
+            // Without a command the speeds alone tell its torque.
+            match (rows.find(&name), rows.find(&pressure)) {
+                (Some(value), _) => Some((place, found(&name, value), None)),
+                (None, Some(value)) => Some((place, found(&pressure, value), Some(element))),
+                (None, None) => None,
+            }
         });
         let pressures = element_pressures(car).filter_map(|(element, name)| {
             let age = rows.find(&command_age(&name));
@@ -105,7 +107,7 @@ impl Columns {
             lock_up: rows.find(signal::LOCK_UP_APPLIED),
             gear: rows.require(signal::GEAR)?,
             target: rows.require(signal::TARGET_GEAR)?,
-            commands: commands.collect::<Result<_, _>>()?,
+            commands: commands.collect(),
             pedals: [signal::THROTTLE, signal::BRAKE].map(|name| rows.find(name)),
             vehicle: rows.find(signal::VEHICLE_SPEED),
             oil: rows.find(signal::OIL_TEMPERATURE),

@@ -290,30 +290,23 @@ fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(),
     let mut needed = vec![Role::TurbineSpeed, Role::OutputSpeed, Role::Gear, Role::TargetGear];
     needed.extend(car.converter.is_none().then_some(Role::EngineTorque));
     let commands = element_commands(car).into_iter().filter(|(at, _)| tables.place(*at).is_some());
-    let keys: Vec<String> =
-        needed.iter().map(|role| role.name().to_owned()).chain(commands.map(|(_, name)| key_of(&name))).collect();
     let has = |key: &str| map.channels.iter().any(|entry| entry.key() == key);
     let pressure_of = |key: &str| {
         Role::of_element(key).map(|(_, element)| Role::ElementPressureCommand.name().replace("NAME", element))
     };
-    let both = keys.iter().find_map(|key| Some((key, pressure_of(key).filter(|pressure| has(key) && has(pressure))?)));
+    let both = commands.map(|(_, name)| key_of(&name)).find_map(|key| {
+        let pressure = pressure_of(&key).filter(|pressure| has(&key) && has(pressure))?;
+        Some((key, pressure))
+    });
     if let Some((key, pressure)) = both {
         return Err(LogError::map(format!(
             "the channel map has {key} and {pressure}, which are commands of one valve\nhint: leave {pressure} out: the command of the valve itself is better"
         )));
     }
-    let is_there = |key: &str| has(key) || pressure_of(key).is_some_and(|pressure| has(&pressure));
-    let missing: Vec<&str> = keys.iter().map(String::as_str).filter(|key| !is_there(key)).collect();
+    let keys: Vec<&str> = needed.iter().map(|role| role.name()).collect();
+    let missing: Vec<&str> = keys.iter().copied().filter(|key| !has(key)).collect();
     if missing.is_empty() {
         return Ok(());
-    }
-    if !car.gearbox.has_ratios_alone() && !map.channels.iter().any(|entry| entry.role.is_command()) {
-        return Err(LogError::map(format!(
-            "the channel map has no command of a valve: without them no pressure can be estimated\nhint: an estimate of this car needs {}; add \
-             `[channel.NAME]` for each if the log has them, or element_NAME_pressure_command where it has the pressure that is asked of an element. Without them, `wetclutch inspect` with the map and --shifts finds the shifts, and with -o \
-             PAGE.html fits the converter and gives the torque at the turbine",
-            keys.join(", ")
-        )));
     }
     Err(LogError::map(format!(
         "the channel map has no {}\nhint: an estimate of this car needs {}; add `[channel.{}]` or --channel {2}=NAME",

@@ -9,6 +9,7 @@ use evaluate::checks::Unusable;
 use logs::Role;
 use logs::plausibility::Seen;
 use observer::ShiftTables;
+use observer::gearbox::MAX_ELEMENTS;
 use observer::{Health, Reading};
 use report::tables::health_meaning;
 use study::gearbox::car_log::{CarLog, LogStep};
@@ -75,6 +76,34 @@ pub(crate) fn refused(unusable: Unusable, path: &Path) -> Error {
     ))
 }
 
+/// Of which elements a command came.
+#[derive(Default)]
+pub(crate) struct HeardCommands([bool; MAX_ELEMENTS]);
+
+impl HeardCommands {
+    pub(crate) fn push(&mut self, step: &LogStep) {
+        for (heard, command) in self.0.iter_mut().zip(&step.input.commands) {
+            *heard |= command.is_some();
+        }
+    }
+
+    /// Says of which elements none came.
+    pub(crate) fn warning(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<String> {
+        let unheard = element_commands(car).into_iter().filter_map(|(element, _)| {
+            let heard = self.0.get(tables.place(element)?)?;
+            (!heard).then(|| car.gearbox.elements[element].name.as_str())
+        });
+        let names: Vec<&str> = unheard.collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "warning: the log has no command of {}: torques there are by the speeds alone, pressures by the torques, and ranges are wide\nhint: add \
+                 the commands of their valves if the log has them, `element_NAME_current_a` in a table or `[channel.element_NAME_current]` in a channel map",
+                names.join(", ")
+            )
+        })
+    }
+}
+
 /// The columns of a table of a drive, to tell wrong units and empty columns.
 pub(crate) struct Columns {
     /// Of the four speeds, the engine torque, each command and then each measured pressure.
@@ -114,7 +143,7 @@ impl Columns {
                 CommandKind::DutyCycle => (Role::ElementDuty, column),
             };
             let name = column.rsplit_once('_').map_or(column.as_str(), |(name, _)| name).to_owned();
-            let watched = WatchedColumn { role, name, is_in_si: log.is_in_si(&column), is_needed: true };
+            let watched = WatchedColumn { role, name, is_in_si: log.is_in_si(&column), is_needed: false };
             let pressure_of = (role == Role::ElementPressureCommand).then_some(valve);
             Some(((tables.place(element)?, pressure_of), watched))
         });

@@ -21,7 +21,7 @@ use study::gearbox::gear_numbers::GearNumbers;
 use trace::signal::ACCELERATION_READING;
 use trace::{Cell, ColumnKind, ShownPath as _};
 
-use self::checks::{RowTimes, refused};
+use self::checks::{HeardCommands, RowTimes, refused};
 use self::columns::{Knows, Row, Same, Value, before_readings, chosen, columns, measured};
 pub use self::columns::{is_car_column, is_measured_column};
 pub use self::learnt::LearntOfDrive;
@@ -152,6 +152,7 @@ pub fn estimate(
     let mut passing = Passing::new(Selection::of(&options.shifts));
     let mut checks = source.columns(car, tables);
     let mut times = RowTimes::default();
+    let mut heard = HeardCommands::default();
     // Without a page no shift is drawn.
     let max_drawn = if options.with_page { MAX_DRAWN } else { 0 };
     let mut write = |step: &LogStep, filtered: &Filtered| {
@@ -174,6 +175,7 @@ pub fn estimate(
         let next = source.next_step();
         if let Ok(Some(step)) = &next {
             times.push(step);
+            heard.push(step);
             if let Some(checks) = &mut checks {
                 checks.push(step);
             }
@@ -199,6 +201,9 @@ pub fn estimate(
     let origin_s = shown_from_s(times.first_s());
     let median_s = times.check(path, !log.map.channels.is_empty())?;
     source.finish(say)?;
+    if let Some(warning) = heard.warning(car, tables) {
+        say(&warning);
+    }
     say_end_of_followed(options, path, say);
     checks.map_or(Ok(()), |checks| checks.check())?;
     check_speeds(&drive.shifts, (setup, path), say)?;
