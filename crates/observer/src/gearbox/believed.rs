@@ -12,11 +12,12 @@
 //! | the same | it would hold, and the command has not changed for 0.1 s | 25 ms |
 //!
 //! Such a command is not used until it has changed by more than its noise. The torque of an element without a command, of this kind or because none
-//! comes, is by the speeds alone ([`UnheardTorque`]).
+//! comes, is by the speeds alone: a state, with a standard deviation by the turbine torque while it holds or closes.
 
 use drivetrain::Real;
 
 use super::{FrictionElement, GearboxFilter, GearboxState, OUTPUT, ShiftElement, ShiftPhase, ShiftRow};
+use car::ShiftCommand;
 
 /// Time for which an element has to hold against its command, s \[chosen\]: longer than a valve needs.
 const HOLDS_S: f64 = 0.1;
@@ -43,14 +44,14 @@ const HELD_N_M: f64 = 20.0;
 /// Part of the turbine torque from which on an element carries torque in a gear.
 const CARRIES: f64 = 0.05;
 
-/// Standard deviation of the torque of an element without a command, over the largest that it can hold \[chosen\], that of what is left of it when it
-/// is let go, over this, and the time constant from the one to the other, s.
-const UNHEARD: f64 = 0.15;
-const LEFT: f64 = 0.02;
-const RELEASE_S: f64 = 0.1;
+/// Standard deviation of the torque of an element without a command at the turbine, over the turbine torque, and beside it, N m \[chosen\]: a controller
+/// asks for about what is needed. That of what is left of it when it is open, over this, and the time constant from the one to the other, s.
+const UNHEARD: (f64, f64) = (0.5, 20.0);
+pub(super) const LEFT: f64 = 0.02;
+pub(super) const TURNS_S: f64 = 0.1;
 
-/// What is known of the torque of an element while no command of it comes: it walks while the element holds or grips, and fades once it has been let
-/// go.
+/// What a vehicle file states of the torque of its offgoing clutch while no command of it comes: it walks while the clutch holds, and fades once it has
+/// let go.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UnheardTorque<T> {
@@ -63,12 +64,6 @@ pub struct UnheardTorque<T> {
 }
 
 impl<T: Real> UnheardTorque<T> {
-    /// Of an element of which nothing else is stated.
-    pub(super) fn of(element: &FrictionElement<T>) -> Self {
-        let holds_n_m = T::of(UNHEARD) * element.clutch.static_capacity(element.limits.pressure_max_pa);
-        Self { holds_n_m, open_n_m: T::of(LEFT) * holds_n_m, release_s: T::of(RELEASE_S) }
-    }
-
     /// The same in another precision.
     pub(super) fn cast<U: Real>(&self) -> UnheardTorque<U> {
         let to = |x: T| U::of(x.to_f64_exact());
@@ -201,8 +196,22 @@ impl<T: Real> GearboxFilter<'_, T> {
             memory.belief.has_changed &= !begins;
             let seen = shown.as_ref().map_or(Seen::Nothing, |shown| self.seen(shown, at));
             memory.judge(element, seen, dt_s);
-            memory.follow_unheard(matches!(seen, Seen::LetGo(_) | Seen::Slips(_)), dt_s);
+            let lets_go = matches!(seen, Seen::LetGo(_) | Seen::Slips(_));
+            let full_n_m = shown.as_ref().map(|shown| self.unheard_n_m(shown, gears, at));
+            memory.follow_unheard(full_n_m, lets_go, dt_s);
         }
+    }
+
+    /// Standard deviation of the torque of the element at this place without a command, N m; zero of one that is open.
+    fn unheard_n_m(&self, shown: &Shown<'_, T>, gears: ShiftCommand, at: usize) -> T {
+        let at_turbine_n_m = T::of(UNHEARD.0) * shown.turbine_n_m.abs() + T::of(UNHEARD.1);
+        if let Some(shift) = shown.shift {
+            let own = shift.clutches.iter().find(|clutch| clutch.element.place() == Some(at));
+            return own.map_or(T::zero(), |clutch| at_turbine_n_m / clutch.alpha.abs());
+        }
+        let gear = gears.from.place().and_then(|gear| self.tables.gears.get(gear));
+        let holding = gear.and_then(|gear| gear.holding.get(at)).map_or(T::zero(), |holding| holding.abs());
+        if holding > T::of(CARRIES) { holding * at_turbine_n_m } else { T::zero() }
     }
 
     fn shown(&self, state: &GearboxState<T>) -> Option<Shown<'_, T>> {

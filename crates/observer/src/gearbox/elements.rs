@@ -2,7 +2,7 @@
 
 use drivetrain::{Clutch, Real};
 
-use super::believed::{Belief, Compared, Seen, UnheardTorque};
+use super::believed::{Belief, Compared, LEFT, Seen, TURNS_S, UnheardTorque};
 use super::pistons::Pistons;
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
@@ -137,11 +137,10 @@ pub(super) struct ElementState<T> {
     newest: Option<NewestCommand<T>>,
     /// Whether its command can be its own.
     pub(super) belief: Belief<T>,
-    /// What is known of its torque while no command comes, and the standard deviation now, N m.
-    unheard: UnheardTorque<T>,
+    /// Standard deviation of its torque while no command comes, N m.
     unheard_n_m: T,
-    /// Whether it is no fault that no command ever comes.
-    is_optional: bool,
+    /// What is stated of that torque: that none ever comes is no fault then.
+    stated: Option<UnheardTorque<T>>,
     /// Where the piston has a stroke, once a command has come.
     pistons: Option<Pistons<T>>,
     range: Option<PressureRange<T>>,
@@ -149,7 +148,6 @@ pub(super) struct ElementState<T> {
 
 impl<T: Real> ElementState<T> {
     pub(super) fn new(element: &FrictionElement<T>) -> Self {
-        let unheard = UnheardTorque::of(element);
         Self {
             commands: Commands::new(),
             valve_pa: T::zero(),
@@ -160,17 +158,16 @@ impl<T: Real> ElementState<T> {
             delay_s: element.valve.delay_s,
             newest: None,
             belief: Belief::new(),
-            unheard,
-            unheard_n_m: unheard.holds_n_m,
-            is_optional: false,
+            unheard_n_m: T::zero(),
+            stated: None,
             pistons: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, element.limits.command_max)),
         }
     }
 
-    /// Takes what is stated of its torque without commands: that none ever comes is no fault.
-    pub(super) fn take_unheard(&mut self, unheard: &UnheardTorque<T>) {
-        (self.unheard, self.unheard_n_m, self.is_optional) = (*unheard, unheard.holds_n_m, true);
+    /// Takes what is stated of its torque without commands.
+    pub(super) fn take_unheard(&mut self, stated: &UnheardTorque<T>) {
+        (self.unheard_n_m, self.stated) = (stated.holds_n_m, Some(*stated));
     }
 
     /// Compares its command with what is seen of it.
@@ -190,11 +187,17 @@ impl<T: Real> ElementState<T> {
         }
     }
 
-    /// Follows what is known of its torque without a command, while it is let go or not.
-    pub(super) fn follow_unheard(&mut self, is_let_go: bool, dt_s: T) {
-        let UnheardTorque { holds_n_m, open_n_m, release_s } = self.unheard;
-        self.unheard_n_m =
-            if is_let_go { open_n_m + (self.unheard_n_m - open_n_m) * (-dt_s / release_s).exp() } else { holds_n_m };
+    /// Follows the standard deviation of its torque without a command, N m: to that of one that holds or closes, if it is known, or of one that is let
+    /// go.
+    pub(super) fn follow_unheard(&mut self, full_n_m: Option<T>, lets_go: bool, dt_s: T) {
+        let (end_n_m, time_s) = match (&self.stated, full_n_m) {
+            (Some(stated), _) if lets_go => (stated.open_n_m, stated.release_s),
+            (Some(stated), _) => return self.unheard_n_m = stated.holds_n_m,
+            (None, Some(full_n_m)) if lets_go => (T::of(LEFT) * full_n_m, T::of(TURNS_S)),
+            (None, Some(full_n_m)) => (full_n_m, T::of(TURNS_S)),
+            (None, None) => return,
+        };
+        self.unheard_n_m = end_n_m + (self.unheard_n_m - end_n_m) * (-dt_s / time_s).exp();
     }
 
     /// Goes on with what is learnt of lag and delay. A lag has a length, and no command arrives before it was sent.
@@ -228,7 +231,7 @@ impl<T: Real> ElementState<T> {
             range.step(budget, dt_s, usable, element.limits.command_max);
         }
         match (command, usable) {
-            (None, _) if self.newest.is_none() && self.is_optional => ChannelHealth::Unused,
+            (None, _) if self.newest.is_none() && self.stated.is_some() => ChannelHealth::Unused,
             (None, _) if self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S)) => ChannelHealth::Lost,
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,

@@ -81,7 +81,7 @@ fn a_clutch_whose_command_fails_is_told_by_the_speeds() {
             let limit = |clutch: usize| match fault {
                 // Until the slip is believed the clutch is taken to hold.
                 Fault::Frozen if which == offgoing && clutch == 0 => 0.6 * by_valve[0],
-                _ => 1.2 * right[clutch] + 16.0,
+                _ => 1.2 * right[clutch] + 14.0,
             };
             let is_within = [0, 1].iter().all(|&clutch| found[clutch] < limit(clutch));
             assert!(is_within, "car {at} {fault:?} {which:?}: {found:?}");
