@@ -194,11 +194,16 @@ impl<T: Real> GearboxFilter<'_, T> {
         for (at, (memory, element)) in state.elements.iter_mut().zip(self.tables.elements).enumerate() {
             let Some(memory) = memory else { continue };
             memory.belief.has_changed &= !begins;
-            let seen = shown.as_ref().map_or(Seen::Nothing, |shown| self.seen(shown, at));
-            memory.judge(element, seen, dt_s);
-            let lets_go = matches!(seen, Seen::LetGo(_) | Seen::Slips(_));
-            let full_n_m = shown.as_ref().map(|shown| self.unheard_n_m(shown, gears, at));
-            memory.follow_unheard(full_n_m, lets_go, dt_s);
+            let Some(shown) = &shown else { continue };
+            let asks = memory.asks(element);
+            let seen = self.seen(shown, at, asks);
+            match asks {
+                Some(_) => memory.judge(element, seen, dt_s),
+                None => {
+                    let lets_go = matches!(seen, Seen::LetGo(_) | Seen::Slips(_));
+                    memory.follow_unheard(self.unheard_n_m(shown, gears, at), lets_go, dt_s);
+                }
+            }
         }
     }
 
@@ -218,10 +223,9 @@ impl<T: Real> GearboxFilter<'_, T> {
         let (gears, since_s) = state.gears;
         let (phase, turbine_n_m) = (state.estimate.phase?, state.estimate.turbine_n_m?);
         let shift = self.tables.commanded(gears);
-        let slips = shift.is_some_and(|shift| {
-            let slip = self.slip(shift.clutches[0].ratio, self.measured(&state.newest, None));
-            phase == ShiftPhase::BothSlip && self.are_read(&state.newest) && slip.is_over()
-        });
+        let slips = shift
+            .filter(|_| phase == ShiftPhase::BothSlip && self.are_read(&state.newest))
+            .is_some_and(|shift| self.slip(shift.clutches[0].ratio, self.measured(&state.newest, None)).is_over());
         let is_doubted = phase == ShiftPhase::OffgoingHolds
             && state.running.as_ref().is_some_and(|running| running.phase.is_doubted_again());
         let lets_go = phase == ShiftPhase::BothSlip || is_doubted;
@@ -231,38 +235,38 @@ impl<T: Real> GearboxFilter<'_, T> {
         Some(Shown { turbine_n_m, shift, since_s, lets_go, slips, gear })
     }
 
-    /// What is seen of the element at this place. Beside a one-way clutch nothing: that holds without it, and overruns with it.
-    fn seen(&self, shown: &Shown<'_, T>, at: usize) -> Seen<T> {
+    /// What is seen of the element at this place that its command, which asks for pressure or not, may contradict. Beside a one-way clutch nothing: that
+    /// holds without it, and overruns with it.
+    fn seen(&self, shown: &Shown<'_, T>, at: usize, asks: Option<bool>) -> Seen<T> {
         let torque_n_m = |gear: usize| {
             let holding = self.tables.gears.get(gear).and_then(|row| row.holding.get(at).copied());
             holding.unwrap_or(T::zero()).abs() * shown.turbine_n_m.abs()
         };
-        let is_at = |element: ShiftElement| element.place() == Some(at);
-        if let Some(shift) = shown.shift
-            && shown.since_s > T::of(FILLS_S)
-            && is_at(shift.clutches[1].element)
-            && !shift.clutches[1].element.is_one_sided()
-        {
-            return Seen::Closes;
-        }
-        if let Some(shift) = shown.shift.filter(|_| shown.lets_go) {
-            let offgoing = shift.clutches[0].element;
-            return match is_at(offgoing) && !offgoing.is_one_sided() {
-                false => Seen::Nothing,
-                true if shown.slips => Seen::Slips(torque_n_m(shift.from)),
-                true => Seen::LetGo(torque_n_m(shift.from)),
+        let is_at = |element: ShiftElement| element.place() == Some(at) && !element.is_one_sided();
+        if let Some(shift) = shown.shift {
+            let [offgoing, oncoming] = shift.clutches.each_ref().map(|clutch| is_at(clutch.element));
+            return match () {
+                () if oncoming && shown.since_s > T::of(FILLS_S) => Seen::Closes,
+                () if !(offgoing && shown.lets_go) => Seen::Nothing,
+                () if shown.slips => Seen::Slips(torque_n_m(shift.from)),
+                () => Seen::LetGo(torque_n_m(shift.from)),
             };
         }
-        let Some(gear) = shown.gear else { return Seen::Nothing };
-        let mut clutches = self.tables.shifts.iter().flat_map(|shift| &shift.clutches);
-        if clutches.any(|clutch| clutch.element.is_one_sided() && is_at(clutch.element)) {
+        let (Some(gear), Some(asks)) = (shown.gear, asks) else { return Seen::Nothing };
+        let torque_n_m = torque_n_m(gear);
+        let holds = torque_n_m > T::of(CARRIES) * shown.turbine_n_m.abs();
+        if asks == holds {
             return Seen::Nothing;
         }
-        let torque_n_m = torque_n_m(gear);
-        if torque_n_m > T::of(CARRIES) * shown.turbine_n_m.abs() {
-            return Seen::Holds(torque_n_m);
+        let mut clutches = self.tables.shifts.iter().flat_map(|shift| &shift.clutches);
+        if clutches.any(|clutch| clutch.element.is_one_sided() && clutch.element.place() == Some(at)) {
+            return Seen::Nothing;
         }
         let engages = |shift: &ShiftRow<T>| shift.from == gear && is_at(shift.clutches[1].element);
-        if self.tables.shifts.iter().any(engages) { Seen::IsOpen } else { Seen::Nothing }
+        match holds {
+            true => Seen::Holds(torque_n_m),
+            false if self.tables.shifts.iter().any(engages) => Seen::IsOpen,
+            false => Seen::Nothing,
+        }
     }
 }

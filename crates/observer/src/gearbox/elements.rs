@@ -172,7 +172,7 @@ impl<T: Real> ElementState<T> {
 
     /// Compares its command with what is seen of it.
     pub(super) fn judge(&mut self, element: &FrictionElement<T>, seen: Seen<T>, dt_s: T) {
-        let Some(newest) = self.newest.as_ref().filter(|_| !self.belief.is_wrong()) else { return };
+        let Some(newest) = &self.newest else { return };
         let compared = Compared { element, asked_pa: newest.settled_pa, since_s: newest.alike_s, seen };
         let (range, budget) = (&mut self.range, &element.budget);
         let capacity_n_m = || {
@@ -187,17 +187,21 @@ impl<T: Real> ElementState<T> {
         }
     }
 
-    /// Follows the standard deviation of its torque without a command, N m: to that of one that holds or closes, if it is known, or of one that is let
-    /// go.
-    pub(super) fn follow_unheard(&mut self, full_n_m: Option<T>, lets_go: bool, dt_s: T) {
-        let (end_n_m, time_s) = match (&self.stated, full_n_m) {
-            (Some(stated), _) if lets_go => (stated.open_n_m, stated.release_s),
-            (Some(stated), _) => return self.unheard_n_m = stated.holds_n_m,
-            (None, Some(full_n_m)) if lets_go => (T::of(LEFT) * full_n_m, T::of(TURNS_S)),
-            (None, Some(full_n_m)) => (full_n_m, T::of(TURNS_S)),
-            (None, None) => return,
+    /// Follows the standard deviation of its torque without a command: to that of one that holds or closes, N m, or of one that is let go.
+    pub(super) fn follow_unheard(&mut self, full_n_m: T, lets_go: bool, dt_s: T) {
+        let (end_n_m, time_s) = match (&self.stated, lets_go) {
+            (Some(stated), true) => (stated.open_n_m, stated.release_s),
+            (Some(stated), false) => return self.unheard_n_m = stated.holds_n_m,
+            (None, true) => (T::of(LEFT) * full_n_m, T::of(TURNS_S)),
+            (None, false) => (full_n_m, T::of(TURNS_S)),
         };
         self.unheard_n_m = end_n_m + (self.unheard_n_m - end_n_m) * (-dt_s / time_s).exp();
+    }
+
+    /// Whether its command asks for pressure; none without a command.
+    pub(super) fn asks(&self, element: &FrictionElement<T>) -> Option<bool> {
+        let newest = self.newest.filter(|_| !self.is_unheard())?;
+        Some(newest.settled_pa > element.clutch.kiss_pressure())
     }
 
     /// Goes on with what is learnt of lag and delay. A lag has a length, and no command arrives before it was sent.
