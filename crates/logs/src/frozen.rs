@@ -187,7 +187,9 @@ impl FrozenSpeed {
                 // Without one of both nothing has changed.
                 let (now, then) = (speeds[*partner as usize], still.others[*partner as usize]);
                 let is_tied = self.role != Role::EngineSpeed || then.max(now) > COUPLED * value;
-                let idles = self.role == Role::EngineSpeed && value <= IDLE_RAD_S && self.quantum >= COARSE_RAD_S;
+                let may_idle = self.role == Role::EngineSpeed && value <= IDLE_RAD_S && self.quantum >= COARSE_RAD_S;
+                // Behind a lock-up clutch, or without a converter, both are equal.
+                let idles = may_idle && COUPLED * then > value;
                 let limit = match (is_tied, idles) {
                     (true, true) => limit.max(FROZEN_CHANGE_IDLE),
                     (true, false) => limit,

@@ -118,7 +118,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             self.tables.out_of(gear.from).and_then(|shift| self.element(&state.elements, shift.clutches[0].element));
         found.is_some_and(|(memory, element)| {
             let kiss_pa = element.clutch.kiss_pressure();
-            memory.lower_pa() < kiss_pa + element.above_kiss_pa()
+            !memory.is_unheard() && memory.lower_pa() < kiss_pa + element.above_kiss_pa()
         })
     }
 

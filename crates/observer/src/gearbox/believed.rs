@@ -1,14 +1,14 @@
 //! Whether the command that comes for an element can be its own.
 //!
-//! A channel that has died or frozen gives a command for ever, and the speeds contradict it, for all errors within the budget:
+//! A channel that has died or frozen gives a command for ever, and the speeds contradict it, but in the last row but one for all errors within the budget:
 //!
 //! | the element | with its command | for |
 //! |---|---|---|
 //! | holds torque in a gear | it can hold less than half of that | 0.1 s |
 //! | is open in a gear: a shift from it would engage it | it would carry torque | 0.3 s |
-//! | is to close in a shift | it carries nothing, and the command has not changed since the shift began | 0.3 s |
+//! | closes in a shift: it grips, or pulls the turbine against its torque | it carries nothing, and the command has not changed since the shift began | 0 |
 //! | is let go in a shift | it would hold, and the command has not changed since the shift began | 0 |
-//! | is let go in a shift and slips | it has pressure, and the command has not changed since the shift began | 25 ms |
+//! | is let go in a shift and slips | it would hold half the torque of the gear by its maps, and the command has not changed since the shift began | 25 ms |
 //! | the same | it would hold, and the command has not changed for 0.1 s | 25 ms |
 //!
 //! Such a command is not used until it has changed by more than its noise. The torque of an element without a command, of this kind or because none
@@ -16,15 +16,16 @@
 
 use drivetrain::Real;
 
-use super::{FrictionElement, GearboxFilter, GearboxState, OUTPUT, ShiftElement, ShiftPhase, ShiftRow};
+use super::{
+    FrictionElement, GearboxFilter, GearboxState, OUTPUT, PRESSURE, Running, ShiftElement, ShiftEstimate, ShiftPhase,
+    ShiftRow,
+};
 use car::ShiftCommand;
 
 /// Time for which an element has to hold against its command, s \[chosen\]: longer than a valve needs.
 const HOLDS_S: f64 = 0.1;
 /// Time for which the gear has to hold against the command of an open element, s \[chosen\].
 const OPEN_S: f64 = 0.3;
-/// Time within which a clutch that is to close is filled, s \[chosen\].
-const FILLS_S: f64 = 0.3;
 /// Time for which it has to slip, s: longer than wrong readings show it.
 const SLIPS_S: f64 = 0.025;
 /// Time since a change of gears in which commands and readings may be of both, s \[chosen\].
@@ -78,9 +79,9 @@ pub(super) enum Seen<T> {
     Holds(T),
     /// It is open in a gear that holds.
     IsOpen,
-    /// It is to close in a shift that has begun some time ago.
+    /// It closes in a shift: it grips, or nothing else can pull the turbine to the new gear.
     Closes,
-    /// It is let go in a shift, by the estimate, or by two readings of its slip; the torque that it held in the gear, N m.
+    /// It is let go in a shift, by the estimate; the torque that it held in the gear, N m.
     LetGo(T),
     /// It is let go in a shift and slips by the readings; the torque that it held in the gear, N m.
     Slips(T),
@@ -92,8 +93,8 @@ pub(super) enum Seen<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Belief<T> {
-    /// Whether it has changed since the shift began.
-    pub(super) has_changed: bool,
+    /// The pressure for which it asked before the shift began, Pa; none without a command then.
+    begun_pa: Option<T>,
     contradicted_s: T,
     /// The pressure for which what is wrong asks, Pa; none while nothing is wrong.
     wrong_pa: Option<T>,
@@ -109,9 +110,14 @@ pub(super) struct Compared<'e, T> {
     pub(super) seen: Seen<T>,
 }
 
+/// Whether two pressures for which a command asks, Pa, differ by more than the noise of one that stands.
+fn is_another<T: Real>(element: &FrictionElement<T>, asked_pa: T, before_pa: T) -> bool {
+    (asked_pa - before_pa).abs() > T::of(ALIVE) * element.limits.pressure_max_pa
+}
+
 impl<T: Real> Belief<T> {
     pub(super) fn new() -> Self {
-        Self { has_changed: true, contradicted_s: T::zero(), wrong_pa: None }
+        Self { begun_pa: None, contradicted_s: T::zero(), wrong_pa: None }
     }
 
     /// Whether the command is wrong.
@@ -119,10 +125,15 @@ impl<T: Real> Belief<T> {
         self.wrong_pa.is_some()
     }
 
+    /// A shift begins, before which the command asked for this pressure, Pa.
+    pub(super) fn begin_shift(&mut self, asked_pa: Option<T>) {
+        self.begun_pa = asked_pa;
+    }
+
     /// Whether a command that asks for this pressure, Pa, is used: not what has turned out to be wrong.
     pub(super) fn takes(&mut self, element: &FrictionElement<T>, asked_pa: impl FnOnce() -> T) -> bool {
         let Some(wrong_pa) = self.wrong_pa else { return true };
-        let is_alive = (asked_pa() - wrong_pa).abs() > T::of(ALIVE) * element.limits.pressure_max_pa;
+        let is_alive = is_another(element, asked_pa(), wrong_pa);
         if is_alive {
             self.wrong_pa = None;
         }
@@ -139,12 +150,13 @@ impl<T: Real> Belief<T> {
     ) -> bool {
         let nominal = |pressure_pa: T| element.clutch.static_capacity(pressure_pa);
         let asks = *asked_pa > element.clutch.kiss_pressure();
+        let has_changed = self.begun_pa.is_none_or(|begun_pa| is_another(element, *asked_pa, begun_pa));
         let may_be = match seen {
             Seen::Holds(torque_n_m) => !asks && *torque_n_m > T::of(HELD_N_M),
             Seen::IsOpen => asks && nominal(*asked_pa) > T::of(OPEN_PART) * nominal(element.limits.pressure_max_pa),
-            Seen::Closes => !asks && !self.has_changed,
-            Seen::LetGo(_) => asks && !self.has_changed,
-            Seen::Slips(_) => asks && (!self.has_changed || *since_s > T::of(STANDS_S)),
+            Seen::Closes => !asks && !has_changed,
+            Seen::LetGo(_) => asks && !has_changed,
+            Seen::Slips(_) => asks && (!has_changed || *since_s > T::of(STANDS_S)),
             Seen::Nothing => false,
         };
         let (contradicts, longest_s) = if may_be {
@@ -156,8 +168,9 @@ impl<T: Real> Belief<T> {
                 Seen::IsOpen => (min_n_m > T::of(HELD_N_M), OPEN_S),
                 Seen::Closes => (max_n_m < T::of(HELD_N_M), 0.0),
                 Seen::LetGo(torque_n_m) => (would_hold(torque_n_m), 0.0),
-                Seen::Slips(torque_n_m) if self.has_changed => (would_hold(torque_n_m), SLIPS_S),
-                Seen::Slips(torque_n_m) => (true, if would_hold(torque_n_m) { 0.0 } else { SLIPS_S }),
+                Seen::Slips(torque_n_m) if has_changed => (would_hold(torque_n_m), SLIPS_S),
+                Seen::Slips(torque_n_m) if would_hold(torque_n_m) => (true, 0.0),
+                Seen::Slips(torque_n_m) => (nominal(*asked_pa) > T::of(TORQUE.0) * torque_n_m, SLIPS_S),
                 Seen::Nothing => (false, 0.0),
             }
         } else {
@@ -175,34 +188,39 @@ impl<T: Real> Belief<T> {
 /// What a step has shown, for each element.
 struct Shown<'a, T> {
     turbine_n_m: T,
-    /// The shift that is commanded, and since when, s.
+    /// The shift that is commanded.
     shift: Option<&'a ShiftRow<T>>,
-    since_s: T,
-    /// Whether the offgoing clutch of it has let go, by the estimate or by two readings, and slips by the readings.
+    /// Whether the offgoing clutch of it has been let go, by the estimate, and slips by the readings.
     lets_go: bool,
     slips: bool,
+    /// Whether the oncoming clutch of it holds, or pulls the turbine to the new gear against its torque.
+    is_pulled: bool,
     /// The place of the gear that holds.
     gear: Option<usize>,
+    /// Whether an element that a shift from this gear engages asks for pressure.
+    fills: bool,
 }
 
 impl<T: Real> GearboxFilter<'_, T> {
     /// Compares the commands with the speeds after a step, and follows the torques of elements without one.
     pub(super) fn follow_commands(&self, state: &mut GearboxState<T>, dt_s: T) {
-        let (gears, since_s) = state.gears;
-        let begins = since_s <= T::zero() && !gears.is_steady();
-        let shown = self.shown(state);
+        let (gears, _) = state.gears;
+        let Some(shown) = self.shown(state) else { return };
         for (at, (memory, element)) in state.elements.iter_mut().zip(self.tables.elements).enumerate() {
             let Some(memory) = memory else { continue };
-            memory.belief.has_changed &= !begins;
-            let Some(shown) = &shown else { continue };
             let asks = memory.asks(element);
-            let seen = self.seen(shown, at, asks);
+            let seen = self.seen(&shown, at, asks);
             match asks {
                 Some(_) => memory.judge(element, seen, dt_s),
                 None => {
                     let lets_go = matches!(seen, Seen::LetGo(_) | Seen::Slips(_));
-                    memory.follow_unheard(self.unheard_n_m(shown, gears, at), lets_go, dt_s);
+                    memory.follow_unheard(self.unheard_n_m(&shown, gears, at), lets_go, dt_s);
                 }
+            }
+            if memory.has_switched() {
+                let full_n_m = self.unheard_n_m(&shown, gears, at);
+                let full_n_m = memory.is_unheard().then(|| memory.begin_unheard(full_n_m));
+                take_switch(&mut state.running, &state.estimate, (at, full_n_m));
             }
         }
     }
@@ -223,16 +241,39 @@ impl<T: Real> GearboxFilter<'_, T> {
         let (gears, since_s) = state.gears;
         let (phase, turbine_n_m) = (state.estimate.phase?, state.estimate.turbine_n_m?);
         let shift = self.tables.commanded(gears);
-        let slips = shift
-            .filter(|_| phase == ShiftPhase::BothSlip && self.are_read(&state.newest))
-            .is_some_and(|shift| self.slip(shift.clutches[0].ratio, self.measured(&state.newest, None)).is_over());
-        let is_doubted = phase == ShiftPhase::OffgoingHolds
-            && state.running.as_ref().is_some_and(|running| running.phase.is_doubted_again());
-        let lets_go = phase == ShiftPhase::BothSlip || is_doubted;
+        let is_read = self.are_read(&state.newest);
+        let slipping = shift.filter(|_| phase == ShiftPhase::BothSlip && is_read).map(|shift| {
+            let speeds = self.measured(&state.newest, None);
+            let [from, to] = shift.clutches.each_ref().map(|clutch| clutch.ratio);
+            // Towards the new gear, and against a torque that drives the turbine the other way.
+            let way = (to - from) * speeds[OUTPUT];
+            let slip = self.slip(from, speeds);
+            let is_against = turbine_n_m.abs() > T::of(HELD_N_M) && turbine_n_m * way < T::zero();
+            [slip.is_over(), slip.is_over() && slip.value * way > T::zero() && is_against]
+        });
+        let [slips, pulls] = slipping.unwrap_or([false; 2]);
+        let holds = phase == ShiftPhase::OncomingHolds;
+        let (lets_go, is_pulled) = (phase == ShiftPhase::BothSlip || holds, pulls || holds);
         let moves = state.newest[OUTPUT].is_some_and(|output| output.value.abs() > self.uncertainty.output_least_rad_s);
-        let is_settled = moves && self.are_read(&state.newest) && !state.slips && since_s > T::of(SETTLES_S);
+        let is_settled = moves && is_read && !state.slips && since_s > T::of(SETTLES_S);
         let gear = gears.from.place().filter(|_| phase == ShiftPhase::InGear && gears.is_steady() && is_settled);
-        Some(Shown { turbine_n_m, shift, since_s, lets_go, slips, gear })
+        let fills = gear.filter(|&gear| self.is_held_without_pressure(state, gear)).is_some_and(|gear| {
+            let mut from = self.tables.shifts.iter().filter(|shift| shift.from == gear);
+            from.any(|shift| {
+                let found = self.element(&state.elements, shift.clutches[1].element);
+                found.and_then(|(memory, element)| memory.asks(element)) == Some(true)
+            })
+        });
+        Some(Shown { turbine_n_m, shift, lets_go, slips, is_pulled, gear, fills })
+    }
+
+    /// Whether an element carries torque in a gear whose command asks for no pressure.
+    fn is_held_without_pressure(&self, state: &GearboxState<T>, gear: usize) -> bool {
+        let Some(row) = self.tables.gears.get(gear) else { return false };
+        let of_elements = state.elements.iter().zip(self.tables.elements).zip(&row.holding);
+        of_elements.into_iter().any(|((memory, element), holding)| {
+            holding.abs() > T::of(CARRIES) && memory.as_ref().and_then(|memory| memory.asks(element)) == Some(false)
+        })
     }
 
     /// What is seen of the element at this place that its command, which asks for pressure or not, may contradict. Beside a one-way clutch nothing: that
@@ -246,7 +287,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         if let Some(shift) = shown.shift {
             let [offgoing, oncoming] = shift.clutches.each_ref().map(|clutch| is_at(clutch.element));
             return match () {
-                () if oncoming && shown.since_s > T::of(FILLS_S) => Seen::Closes,
+                () if oncoming && shown.is_pulled => Seen::Closes,
                 () if !(offgoing && shown.lets_go) => Seen::Nothing,
                 () if shown.slips => Seen::Slips(torque_n_m(shift.from)),
                 () => Seen::LetGo(torque_n_m(shift.from)),
@@ -264,9 +305,26 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         let engages = |shift: &ShiftRow<T>| shift.from == gear && is_at(shift.clutches[1].element);
         match holds {
+            // The log may say too late that a shift has begun.
+            true if shown.fills => Seen::Nothing,
             true => Seen::Holds(torque_n_m),
             false if self.tables.shifts.iter().any(engages) => Seen::IsOpen,
             false => Seen::Nothing,
         }
     }
+}
+
+/// Begins the state of the pressure of an element of a shift anew where its command goes or comes back: it is then the torque over the standard
+/// deviation of that, N m, or the error of the pressure.
+fn take_switch<T: Real>(
+    running: &mut Option<Running<T>>,
+    estimate: &ShiftEstimate<T>,
+    (at, full_n_m): (usize, Option<T>),
+) {
+    let Some(running) = running else { return };
+    let Some(shift) = &running.shift else { return };
+    let Some(c) = shift.clutches.iter().position(|clutch| clutch.element.place() == Some(at)) else { return };
+    let torque_n_m = estimate.clutches.map_or(T::zero(), |clutches| clutches[c.min(1)].torque_n_m.abs());
+    let mean = full_n_m.filter(|full_n_m| *full_n_m > T::zero()).map_or(T::zero(), |full_n_m| torque_n_m / full_n_m);
+    running.x.renew(PRESSURE[c.min(1)], mean, T::one());
 }

@@ -139,6 +139,8 @@ pub(super) struct ElementState<T> {
     pub(super) belief: Belief<T>,
     /// Standard deviation of its torque while no command comes, N m.
     unheard_n_m: T,
+    /// Whether none came or was used in the step before.
+    was_unheard: bool,
     /// What is stated of that torque: that none ever comes is no fault then.
     stated: Option<UnheardTorque<T>>,
     /// Where the piston has a stroke, once a command has come.
@@ -159,6 +161,7 @@ impl<T: Real> ElementState<T> {
             newest: None,
             belief: Belief::new(),
             unheard_n_m: T::zero(),
+            was_unheard: true,
             stated: None,
             pistons: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, element.limits.command_max)),
@@ -196,6 +199,23 @@ impl<T: Real> ElementState<T> {
             (None, false) => (full_n_m, T::of(TURNS_S)),
         };
         self.unheard_n_m = end_n_m + (self.unheard_n_m - end_n_m) * (-dt_s / time_s).exp();
+    }
+
+    /// Whether it has no command from this step on, or has one again.
+    pub(super) fn has_switched(&mut self) -> bool {
+        let is_unheard = self.is_unheard();
+        core::mem::replace(&mut self.was_unheard, is_unheard) != is_unheard
+    }
+
+    /// Its torque begins without a command, with this standard deviation, N m, if none is stated. Returns that.
+    pub(super) fn begin_unheard(&mut self, full_n_m: T) -> T {
+        self.unheard_n_m = self.stated.as_ref().map_or(full_n_m, |stated| stated.holds_n_m);
+        self.unheard_n_m
+    }
+
+    /// A shift begins, before the command of its first row.
+    pub(super) fn begin_shift(&mut self) {
+        self.belief.begin_shift(self.newest.map(|newest| newest.settled_pa));
     }
 
     /// Whether its command asks for pressure; none without a command.
@@ -310,7 +330,6 @@ impl<T: Real> ElementState<T> {
             }
         }
         let settled_pa = element.valve.valve.settled_pressure(reading.value);
-        self.belief.has_changed = true;
         if self.newest.is_none() {
             // The first command is taken to have stood for long.
             self.valve_pa = element.limits.possible_pressure(settled_pa);

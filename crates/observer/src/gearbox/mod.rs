@@ -404,6 +404,9 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         state.fading_s = state.fading_s + dt_s;
         let since_s = if state.gears.0 == input.gear { state.gears.1 + dt_s } else { T::zero() };
+        if state.gears.0 != input.gear && !input.gear.is_steady() {
+            state.elements.iter_mut().flatten().for_each(ElementState::begin_shift);
+        }
         state.gears = (input.gear, since_s);
         let mut health = Health::Good;
         let mut channels = Channels::all(ChannelHealth::Absent);

@@ -26,7 +26,7 @@ use super::{GearboxFilter, GearboxState, Newest, OUTPUT, Reading, SPEEDS, ShiftI
 
 /// Differences in the mean at most: it follows a change of the noise within some seconds \[chosen\].
 const MAXIMUM: u16 = 400;
-/// Fewest differences from which the noise is taken: two standard deviations are then less than the value itself.
+/// Fewest differences from which the noise is taken: of the slip two standard deviations are then less than the value itself.
 const FEWEST: u16 = 16;
 /// Most readings in a row that count as the same \[chosen\].
 const LONGEST_SAME: u16 = 50;
@@ -42,7 +42,7 @@ const FORGOTTEN: u8 = 16;
 const HIGHEST: usize = 3;
 /// Largest difference that is noise, in its standard deviations: an outlier counts as this.
 const OUTLIER: f64 = 5.0;
-/// Longest step over which differences are those of a smooth speed, s \[chosen\]: the drive shafts swing with up to 11 Hz.
+/// Longest step over which the differences of wheel and engine speed are those of a smooth speed, s \[chosen\].
 const LONGEST_STEP_S: f64 = 0.025;
 
 /// Memory of the noise.
@@ -138,7 +138,7 @@ impl<T: Real> Steps<T> {
         if self.misses >= MISSES || self.step == T::zero() {
             // A comparison with NaN is false: then this is the first step.
             self.step = if left > T::zero() { left } else { change };
-            (self.multiples, self.repeats) = (0, 0);
+            (self.multiples, self.misses, self.repeats) = (0, 0, 0);
         }
     }
 
@@ -218,7 +218,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             }
         }
         let gear = input.gear.to;
-        let row = self.tables.gear(gear).filter(|_| input.gear.is_steady() && input.dt_s <= T::of(LONGEST_STEP_S));
+        let row = self.tables.gear(gear).filter(|_| input.gear.is_steady());
         let Some(row) = row else { return state.noise.pause() };
         let valid = |reading: &Option<Reading<T>>| {
             reading.map(|reading| reading.value).filter(|&value| self.limits.speed_valid(value))
@@ -245,17 +245,21 @@ impl<T: Real> GearboxFilter<'_, T> {
             }
             None => noise.slip.known = 0,
         }
-        match valid(&input.wheel_rad_s).zip(output) {
+        // Over longer steps such speeds bend.
+        let bends = input.dt_s > T::of(LONGEST_STEP_S);
+        match valid(&input.wheel_rad_s).zip(output).filter(|_| !bends) {
             Some((wheel, output)) => {
                 let final_ratio = self.driveline.final_ratio;
                 let of_output = square(noise.slip.factor / final_ratio) * of_output;
                 noise.wheel.take(wheel - output.value / final_ratio, of_wheel + of_output);
             }
-            None => noise.wheel.known = 0,
+            None if bends => noise.wheel.known = 0,
+            None => {}
         }
-        match valid(&input.engine_rad_s) {
+        match valid(&input.engine_rad_s).filter(|_| !bends) {
             Some(engine) => noise.engine.take(engine, of_engine),
-            None => noise.engine.known = 0,
+            None if bends => noise.engine.known = 0,
+            None => {}
         }
     }
 }

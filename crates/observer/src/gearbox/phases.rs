@@ -190,11 +190,6 @@ impl<T: Real> PhaseMemory<T> {
         self.new_slip.count > 0
     }
 
-    /// The same for the second reading in a row.
-    pub(super) fn is_doubted_again(&self) -> bool {
-        self.new_slip.count > 1
-    }
-
     /// The phase after this sample, in which turbine and output were read or not.
     pub(super) fn step(&mut self, contacts: &[Contact<T>; 2], read: [bool; 2]) {
         let [off, on] = contacts;

@@ -1,7 +1,7 @@
 //! A log of a drive of a car with any gearbox as a table: its columns, and what the filter is shown of a row.
 //!
-//! The columns have the names of `wetclutch simulate`. Time, turbine and output speed, gear, target gear and the command of every
-//! element's valve are needed, without a converter the reported engine torque too. With one the estimate is the open loop where there is no
+//! The columns have the names of `wetclutch simulate`. Time, turbine and output speed, gear and target gear are needed, without a converter the reported
+//! engine torque too; an element without a command has the torque that the speeds show. With a converter the estimate is the open loop where there is no
 //! engine speed. True values and measured
 //! pressures are compared where the log has them.
 

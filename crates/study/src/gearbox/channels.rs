@@ -1,7 +1,7 @@
 //! A log of a drive of a car with any gearbox, of any format, by a channel map: each channel with a clock of its own.
 //!
-//! Turbine and output speed, gear, target gear and the command of every element's valve are needed, without a converter the engine torque
-//! too. With one the estimate is the open loop where there is no engine speed. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
+//! Turbine and output speed, gear and target gear are needed, without a converter the engine torque too; an element without a command has the torque that
+//! the speeds show. With a converter the estimate is the open loop where there is no engine speed. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
 
 use car::Car;
 use car::columns::{element_column, element_commands, element_pressures, pressure_command_column};
