@@ -131,7 +131,9 @@ def test_whatever_comes_in_ends_in_an_estimate_or_an_error(times: list[Any], spe
         found = wc.estimate(car, data)
     except wc.InputError:
         return
-    assert found.rows.rows == rows
+    # Rows with the time of the row before are left out, with a warning.
+    left_out = [finding for finding in found.findings if "have the time of the row before and are not used" in finding]
+    assert found.rows.rows == rows or (left_out and 0 < found.rows.rows < rows)
 
 
 def test_the_same_seed_gives_the_same_drive(car: wc.Car, drive_file: str, run: wc.Simulation) -> None:
