@@ -7,8 +7,8 @@
 //! | holds torque in a gear | it can hold less than half of that | 0.1 s |
 //! | is open in a gear: a shift from it would engage it | it would carry torque | 0.3 s |
 //! | closes in a shift: it grips, or pulls the turbine against its torque | it carries nothing, and the command has not changed since the shift began | 0 |
-//! | is let go in a shift | it would hold, and the command has not changed since the shift began | 0 |
-//! | is let go in a shift and slips | it would hold half the torque of the gear by its maps, and the command has not changed since the shift began | 25 ms |
+//! | is released in a shift | it would hold, and the command has not changed since the shift began | 0 |
+//! | is released in a shift and slips | it would hold half the torque of the gear by its maps, and the command has not changed since the shift began | 25 ms |
 //! | the same | it would hold, and the command has not changed for 0.1 s | 25 ms |
 //!
 //! Such a command is not used until it has changed by more than its noise. The torque of an element without a command, of this kind or because none
@@ -30,7 +30,7 @@ const OPEN_S: f64 = 0.3;
 const SLIPS_S: f64 = 0.025;
 /// Time since a change of gears in which commands and readings may be of both, s \[chosen\].
 const SETTLES_S: f64 = 0.3;
-/// Time for which a command of a clutch that is let go does not stand, s \[chosen\].
+/// Time for which a command of a clutch that is released does not stand, s \[chosen\].
 const STANDS_S: f64 = 0.1;
 /// Factors on the torque of an element in a gear, by errors of the turbine torque, below which it holds it and above which it does not \[chosen\].
 const TORQUE: (f64, f64) = (0.5, 1.3);
@@ -52,7 +52,7 @@ pub(super) const LEFT: f64 = 0.02;
 pub(super) const TURNS_S: f64 = 0.1;
 
 /// What a vehicle file states of the torque of its offgoing clutch while no command of it comes: it walks while the clutch holds, and fades once it has
-/// let go.
+/// been released.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UnheardTorque<T> {
@@ -81,9 +81,9 @@ pub(super) enum Seen<T> {
     IsOpen,
     /// It closes in a shift: it grips, or nothing else can pull the turbine to the new gear.
     Closes,
-    /// It is let go in a shift, by the estimate; the torque that it held in the gear, N m.
-    LetGo(T),
-    /// It is let go in a shift and slips by the readings; the torque that it held in the gear, N m.
+    /// It is released in a shift, by the estimate; the torque that it held in the gear, N m.
+    Released(T),
+    /// It is released in a shift and slips by the readings; the torque that it held in the gear, N m.
     Slips(T),
     /// Nothing of its command.
     Nothing,
@@ -155,7 +155,7 @@ impl<T: Real> Belief<T> {
             Seen::Holds(torque_n_m) => !asks && *torque_n_m > T::of(HELD_N_M),
             Seen::IsOpen => asks && nominal(*asked_pa) > T::of(OPEN_PART) * nominal(element.limits.pressure_max_pa),
             Seen::Closes => !asks && !has_changed,
-            Seen::LetGo(_) => asks && !has_changed,
+            Seen::Released(_) => asks && !has_changed,
             Seen::Slips(_) => asks && (!has_changed || *since_s > T::of(STANDS_S)),
             Seen::Nothing => false,
         };
@@ -167,7 +167,7 @@ impl<T: Real> Belief<T> {
                 Seen::Holds(torque_n_m) => (max_n_m < T::of(TORQUE.0) * torque_n_m, HOLDS_S),
                 Seen::IsOpen => (min_n_m > T::of(HELD_N_M), OPEN_S),
                 Seen::Closes => (max_n_m < T::of(HELD_N_M), 0.0),
-                Seen::LetGo(torque_n_m) => (would_hold(torque_n_m), 0.0),
+                Seen::Released(torque_n_m) => (would_hold(torque_n_m), 0.0),
                 Seen::Slips(torque_n_m) if has_changed => (would_hold(torque_n_m), SLIPS_S),
                 Seen::Slips(torque_n_m) if would_hold(torque_n_m) => (true, 0.0),
                 Seen::Slips(torque_n_m) => (nominal(*asked_pa) > T::of(TORQUE.0) * torque_n_m, SLIPS_S),
@@ -190,8 +190,8 @@ struct Shown<'a, T> {
     turbine_n_m: T,
     /// The shift that is commanded.
     shift: Option<&'a ShiftRow<T>>,
-    /// Whether the offgoing clutch of it has been let go, by the estimate, and slips by the readings.
-    lets_go: bool,
+    /// Whether the offgoing clutch of it has been released, by the estimate, and slips by the readings.
+    is_released: bool,
     slips: bool,
     /// Whether the oncoming clutch of it holds, or pulls the turbine to the new gear against its torque.
     is_pulled: bool,
@@ -213,8 +213,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             match asks {
                 Some(_) => memory.judge(element, seen, dt_s),
                 None => {
-                    let lets_go = matches!(seen, Seen::LetGo(_) | Seen::Slips(_));
-                    memory.follow_unheard(self.unheard_n_m(&shown, gears, at), lets_go, dt_s);
+                    let is_released = matches!(seen, Seen::Released(_) | Seen::Slips(_));
+                    memory.follow_unheard(self.unheard_n_m(&shown, gears, at), is_released, dt_s);
                 }
             }
             if memory.has_switched() {
@@ -253,7 +253,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         });
         let [slips, pulls] = slipping.unwrap_or([false; 2]);
         let holds = phase == ShiftPhase::OncomingHolds;
-        let (lets_go, is_pulled) = (phase == ShiftPhase::BothSlip || holds, pulls || holds);
+        let (is_released, is_pulled) = (phase == ShiftPhase::BothSlip || holds, pulls || holds);
         let moves = state.newest[OUTPUT].is_some_and(|output| output.value.abs() > self.uncertainty.output_least_rad_s);
         let is_settled = moves && is_read && !state.slips && since_s > T::of(SETTLES_S);
         let gear = gears.from.place().filter(|_| phase == ShiftPhase::InGear && gears.is_steady() && is_settled);
@@ -264,7 +264,7 @@ impl<T: Real> GearboxFilter<'_, T> {
                 found.and_then(|(memory, element)| memory.asks(element)) == Some(true)
             })
         });
-        Some(Shown { turbine_n_m, shift, lets_go, slips, is_pulled, gear, fills })
+        Some(Shown { turbine_n_m, shift, is_released, slips, is_pulled, gear, fills })
     }
 
     /// Whether an element carries torque in a gear whose command asks for no pressure.
@@ -286,11 +286,13 @@ impl<T: Real> GearboxFilter<'_, T> {
         let is_at = |element: ShiftElement| element.place() == Some(at) && !element.is_one_sided();
         if let Some(shift) = shown.shift {
             let [offgoing, oncoming] = shift.clutches.each_ref().map(|clutch| is_at(clutch.element));
-            return match () {
-                () if oncoming && shown.is_pulled => Seen::Closes,
-                () if !(offgoing && shown.lets_go) => Seen::Nothing,
-                () if shown.slips => Seen::Slips(torque_n_m(shift.from)),
-                () => Seen::LetGo(torque_n_m(shift.from)),
+            if oncoming && shown.is_pulled {
+                return Seen::Closes;
+            }
+            return match (offgoing && shown.is_released, shown.slips) {
+                (false, _) => Seen::Nothing,
+                (true, true) => Seen::Slips(torque_n_m(shift.from)),
+                (true, false) => Seen::Released(torque_n_m(shift.from)),
             };
         }
         let (Some(gear), Some(asks)) = (shown.gear, asks) else { return Seen::Nothing };

@@ -190,9 +190,9 @@ impl<T: Real> ElementState<T> {
         }
     }
 
-    /// Follows the standard deviation of its torque without a command: to that of one that holds or closes, N m, or of one that is let go.
-    pub(super) fn follow_unheard(&mut self, full_n_m: T, lets_go: bool, dt_s: T) {
-        let (end_n_m, time_s) = match (&self.stated, lets_go) {
+    /// Follows the standard deviation of its torque without a command: to that of one that holds or closes, N m, or of one that is released.
+    pub(super) fn follow_unheard(&mut self, full_n_m: T, is_released: bool, dt_s: T) {
+        let (end_n_m, time_s) = match (&self.stated, is_released) {
             (Some(stated), true) => (stated.open_n_m, stated.release_s),
             (Some(stated), false) => return self.unheard_n_m = stated.holds_n_m,
             (None, true) => (T::of(LEFT) * full_n_m, T::of(TURNS_S)),
