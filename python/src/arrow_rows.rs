@@ -1,5 +1,7 @@
 //! Arrow data as the rows of a log, read where they stand.
 
+use std::ops::Range;
+
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
@@ -57,13 +59,18 @@ impl ArrowRows {
     }
 
     fn values(&self, column: usize) -> Values {
-        let cells = (0..self.rows()).map(|row| self.cell(row, column));
-        match self.is_words[column] {
-            true => Values::Words(cells.map(|cell| if let Cell::Word(word) = cell { word } else { "" }).collect()),
-            false => Values::Numbers(
-                cells.map(|cell| if let Cell::Number(number) = cell { number } else { f64::NAN }).collect(),
-            ),
+        let mut numbers = Vec::new();
+        if self.numbers(0..self.rows(), column, &mut numbers) {
+            return Values::Numbers(numbers);
         }
+        let cells = (0..self.rows()).map(|row| self.cell(row, column));
+        Values::Words(cells.map(|cell| if let Cell::Word(word) = cell { word } else { "" }).collect())
+    }
+
+    /// The batch of a row, and its first row.
+    fn batch_of(&self, row: usize) -> (usize, usize) {
+        let batch = self.ends.partition_point(|end| *end <= row);
+        (batch, batch.checked_sub(1).map_or(0, |before| self.ends[before]))
     }
 }
 
@@ -77,9 +84,22 @@ impl TableRows for ArrowRows {
     }
 
     fn cell(&self, row: usize, column: usize) -> Cell<'_> {
-        let batch = self.ends.partition_point(|end| *end <= row);
-        let begin = batch.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let (batch, begin) = self.batch_of(row);
         self.batches[batch][column].get(row - begin)
+    }
+
+    fn numbers(&self, rows: Range<usize>, column: usize, numbers: &mut Vec<f64>) -> bool {
+        if self.is_words[column] {
+            return false;
+        }
+        let Range { mut start, end } = rows;
+        while start < end {
+            let (batch, begin) = self.batch_of(start);
+            let to = end.min(self.ends[batch]);
+            self.batches[batch][column].append(start - begin..to - begin, numbers);
+            start = to;
+        }
+        true
     }
 }
 
@@ -149,6 +169,17 @@ impl Cells {
             }
             _ => return None,
         })
+    }
+
+    /// Appends the numbers of some rows, NaN where there is none.
+    fn append(&self, rows: Range<usize>, numbers: &mut Vec<f64>) {
+        match self {
+            Self::Float64(array) if array.null_count() == 0 => numbers.extend_from_slice(&array.values()[rows]),
+            _ => numbers.extend(rows.map(|row| match self.get(row) {
+                Cell::Number(number) => number,
+                _ => f64::NAN,
+            })),
+        }
     }
 
     /// The cell of a row: an empty word or no number where there is none.

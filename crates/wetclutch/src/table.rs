@@ -1,6 +1,7 @@
 //! Tables in memory: columns of numbers and of words.
 
 use std::io::Read as _;
+use std::ops::Range;
 use std::sync::Arc;
 
 use trace::{Cell, TableRows, Unit};
@@ -122,6 +123,11 @@ impl TableRows for Table {
             Values::Numbers(numbers) => Cell::Number(numbers.get(row).copied().unwrap_or(f64::NAN)),
             Values::Words(words) => Cell::Word(words.get(row).unwrap_or_default()),
         }
+    }
+
+    fn numbers(&self, rows: Range<usize>, column: usize, numbers: &mut Vec<f64>) -> bool {
+        let Values::Numbers(all) = &self.columns[column].values else { return false };
+        all.get(rows).inspect(|some| numbers.extend_from_slice(some)).is_some()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Where the rows of a log come from: a text, or a table in memory.
 
 use std::borrow::Cow;
+use std::cell;
 use std::sync::Arc;
 
 use super::records::{RecordError, Records};
@@ -14,24 +15,70 @@ pub(super) enum Source {
     Table(TableSource),
 }
 
+/// Rows of a table whose numbers are fetched at once \[chosen\].
+const BLOCK: usize = 256;
+
 /// A table in memory, and how many of its rows were passed.
 pub(super) struct TableSource {
     table: Arc<dyn TableRows>,
-    columns: usize,
+    columns: Vec<Fetched>,
+    /// The first row of which numbers are fetched.
+    begin: usize,
     passed: usize,
+}
+
+/// The numbers of a column in the block of rows that is read; none of a column that was not read yet, or has words.
+#[derive(Default)]
+struct Fetched {
+    is_read: cell::Cell<bool>,
+    numbers: Vec<f64>,
 }
 
 impl TableSource {
     pub(super) fn new(table: Arc<dyn TableRows>) -> Self {
-        Self { columns: table.names().len(), table, passed: 0 }
+        let columns = table.names().iter().map(|_| Fetched::default()).collect();
+        Self { columns, table, begin: 0, passed: 0 }
+    }
+
+    /// Goes on to the next row; false where there is none.
+    fn advance(&mut self) -> bool {
+        let rows = self.table.rows();
+        if self.passed >= rows {
+            return false;
+        }
+        if self.passed - self.begin == BLOCK {
+            self.begin = self.passed;
+            for (place, column) in self.columns.iter_mut().enumerate().filter(|(_, column)| column.is_read.get()) {
+                column.numbers.clear();
+                self.table.numbers(self.begin..rows.min(self.begin + BLOCK), place, &mut column.numbers);
+            }
+        }
+        self.passed += 1;
+        true
     }
 
     /// What stands in a column of the row; nothing before the first row.
-    #[inline]
     fn cell(&self, column: usize) -> Cell<'_> {
         match self.passed.checked_sub(1) {
-            Some(row) if column < self.columns => self.table.cell(row, column),
+            Some(row) if column < self.columns.len() => self.table.cell(row, column),
             _ => Cell::Word(""),
+        }
+    }
+
+    /// The number in a column of the row, see [`Source::number`].
+    #[inline]
+    fn number(&self, column: usize) -> Option<f64> {
+        if let Some(fetched) = self.columns.get(column) {
+            if let Some(number) = fetched.numbers.get((self.passed - self.begin).wrapping_sub(1)) {
+                return Some(*number);
+            }
+            fetched.is_read.set(true);
+        }
+        match self.cell(column) {
+            Cell::Number(number) => Some(number),
+            Cell::Whole(whole) => Some(whole as f64),
+            Cell::Word(word) => number(word.as_bytes()),
+            Cell::SameWord | Cell::SameWords => None,
         }
     }
 }
@@ -53,11 +100,7 @@ impl Source {
     pub(super) fn advance(&mut self) -> Result<bool, RecordError> {
         match self {
             Self::Text(records) => records.advance(),
-            Self::Table(source) => {
-                let is_there = source.passed < source.table.rows();
-                source.passed += usize::from(is_there);
-                Ok(is_there)
-            }
+            Self::Table(source) => Ok(source.advance()),
         }
     }
 
@@ -65,7 +108,7 @@ impl Source {
     pub(super) fn len(&self) -> usize {
         match self {
             Self::Text(records) => records.len(),
-            Self::Table(source) => source.columns,
+            Self::Table(source) => source.columns.len(),
         }
     }
 
@@ -90,12 +133,7 @@ impl Source {
     pub(super) fn number(&self, column: usize) -> Option<f64> {
         match self {
             Self::Text(records) => number(records.cell(column).unwrap_or_default()),
-            Self::Table(source) => match source.cell(column) {
-                Cell::Number(number) => Some(number),
-                Cell::Whole(whole) => Some(whole as f64),
-                Cell::Word(word) => number(word.as_bytes()),
-                Cell::SameWord | Cell::SameWords => None,
-            },
+            Self::Table(source) => source.number(column),
         }
     }
 
