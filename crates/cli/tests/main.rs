@@ -26,6 +26,7 @@ mod fit;
 mod fit_gearbox;
 mod from_log;
 mod garage;
+mod gear_ratios;
 mod hostile_files;
 mod json;
 mod late_commands;

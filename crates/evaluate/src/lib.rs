@@ -22,6 +22,7 @@ pub mod logged;
 pub mod logged_shifts;
 pub mod measured;
 mod plate_temperature;
+mod ratio_errors;
 pub mod recording;
 pub mod score;
 mod scored_shift;

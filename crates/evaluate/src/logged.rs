@@ -7,7 +7,7 @@ use observer::{ShiftTables, gearbox_filter};
 use crate::drive::ScoredDrive;
 use crate::learning_count::LearningCount;
 use crate::logged_shifts::LoggedShifts;
-use crate::{EvaluateError, LogStep, late_speeds};
+use crate::{EvaluateError, LogStep, late_speeds, ratio_errors};
 
 /// A log on its way through the filter, and what it says of its shifts. Both take each row in turn, and the filter needs nothing of the shifts: it may be
 /// rows ahead of them.
@@ -72,7 +72,8 @@ impl<'c> LoggedDrive<'c> {
 
     /// The drive.
     pub fn finish(self) -> ScoredDrive {
-        self.shifts.finish(self.filter.late_readings())
+        let found = self.filter.not_as_stated(self.shifts.car());
+        self.shifts.finish(found)
     }
 }
 
@@ -114,9 +115,12 @@ impl<'c> LoggedFilter<'c> {
         (&self.filter, self.state.learnt(), self.learning)
     }
 
-    /// Readings that come later than is stated, in sentences.
-    fn late_readings(&self) -> Vec<String> {
+    /// Readings that are not as is stated, in sentences: late ones, and speeds that do not have the ratios of the gears.
+    fn not_as_stated(&self, car: &Car) -> Vec<String> {
+        let gears = car.gearbox.gears.iter().enumerate();
+        let ratios = gears.filter_map(|(place, gear)| Some((gear.name.as_str(), self.state.ratio_error(place)?)));
         let speeds = late_speeds::warnings(self.state.speeds_late_s(), self.filter.longest_found_s());
-        speeds.chain(late_speeds::acceleration_warning(self.state.acceleration_late_s())).collect()
+        let acceleration = late_speeds::acceleration_warning(self.state.acceleration_late_s());
+        speeds.chain(acceleration).chain(ratio_errors::warning(ratios)).collect()
     }
 }

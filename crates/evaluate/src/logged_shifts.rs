@@ -323,8 +323,12 @@ impl<'c> LoggedShifts<'c> {
         self.passing.draw_at_most(maximum, is_wanted);
     }
 
-    /// The drive behind its last row, with what the filter found of late readings.
-    pub(crate) fn finish(mut self, late: Vec<String>) -> ScoredDrive {
+    pub(crate) fn car(&self) -> &'c Car {
+        self.car
+    }
+
+    /// The drive behind its last row, with what the filter found of the readings.
+    pub(crate) fn finish(mut self, of_readings: Vec<String>) -> ScoredDrive {
         let jerk_m_s3 = self.jerk.ended(f64::INFINITY);
         self.passing.take_jerk(jerk_m_s3);
         let comfort = self.felt.finish();
@@ -337,7 +341,7 @@ impl<'c> LoggedShifts<'c> {
         }
         let of_car = self.beyond_bounds.warning(self.car, self.tables);
         let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings());
-        let warnings = warnings.chain(late).chain(of_car).collect();
+        let warnings = warnings.chain(of_readings).chain(of_car).collect();
         ScoredDrive { warnings, ..self.passing.drive }
     }
 }

@@ -52,6 +52,7 @@ mod phases;
 mod pistons;
 mod powertrain;
 mod predict;
+mod ratios;
 mod readings;
 mod reported;
 mod running;
@@ -79,6 +80,7 @@ use newest::Newest;
 use noise::ReadingNoise;
 use phases::{Contact, PhaseMemory, Slip};
 use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, output_rate, tied};
+use ratios::RatioErrors;
 use reported::Compared;
 use skew::Skew;
 use timing::Timing;
@@ -242,6 +244,7 @@ pub struct GearboxState<T> {
     newest: [Option<Newest<T>>; SPEEDS],
     noise: ReadingNoise<T>,
     skew: Skew<T>,
+    ratios: RatioErrors<T>,
     /// The steps whose readings are late, if the readings are.
     late: Late<T>,
     /// The longitudinal acceleration against the torque, once a reading came.
@@ -349,6 +352,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             newest: [None; SPEEDS],
             noise: ReadingNoise::stated(),
             skew: Skew::nothing(),
+            ratios: RatioErrors::nothing(),
             late: Late::nothing(),
             by_torque: None,
             felt: None,
@@ -398,6 +402,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         let dt_s = dt_s.at_most(T::of(LONGEST_S));
         let of_one_time = state.skew.taken_off(input);
         let input = of_one_time.as_ref().unwrap_or(input);
+        let at_ratios = self.at_ratios(state, input);
+        let input = at_ratios.as_ref().unwrap_or(input);
         if dt_s > T::of(LOST_S) {
             // Too long to be predicted.
             state.lose();
@@ -420,6 +426,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         channels.acceleration = self.judge_acceleration(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);
         self.take_skew(state, input, dt_s);
+        self.take_ratio(state, input, dt_s);
         health = health.max(self.take_gear(state, input.gear, dt_s));
         let side = self.input_side(state, input, dt_s);
         let torque = side.as_ref().and_then(|side| self.turbine.at(side));
@@ -461,6 +468,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         state.newest = [None; SPEEDS];
         state.noise.pause();
         state.skew.pause();
+        state.ratios.pause();
         state.engine = None;
         state.reported = None;
         if let Some(by_torque) = &mut state.by_torque {

@@ -78,6 +78,14 @@ impl<T: Real> Newest<T> {
         distance > T::of(STD_DEVS) * noise
     }
 
+    /// Takes the readings times a factor.
+    pub(super) fn scale(&mut self, factor: T) {
+        self.value = factor * self.value;
+        for (value, _) in self.before.iter_mut().flatten() {
+            *value = factor * *value;
+        }
+    }
+
     /// Lets time pass.
     pub(super) fn pass(&mut self, dt_s: T) {
         self.age_s = self.age_s + dt_s;

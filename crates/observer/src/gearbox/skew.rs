@@ -137,6 +137,12 @@ impl<T: Real> Skew<T> {
         self.late_s
     }
 
+    /// Forgets what turbine and output speed have shown, of which at most this skew is taken off, s.
+    pub(super) fn forget_turbine(&mut self, max_s: T) {
+        self.turbine = Delay::nothing();
+        self.take_off(max_s);
+    }
+
     /// Takes what is found off from now on, at most this skew of turbine and output, s.
     fn take_off(&mut self, max_s: T) {
         let zero = T::zero();

@@ -1,0 +1,334 @@
+//! By how much turbine over output speed differs from the ratio of each gear, found while that gear holds.
+//!
+//! A vehicle file has ratios of a few digits, and a sensor may be described with a wrong scale. In a gear whose ratio is `(1 + e) i`, with a turbine
+//! speed that is late by `d` against the output,
+//!
+//! ```text
+//! w_t - i w_o = e i w_o - d i w_o'
+//! ```
+//!
+//! Least squares over the time in the gears give `e` of each, with one `d` of all as another unknown. Turbine readings are divided by `1 + e`, in a shift by what lies between
+//! those of both gears, as far as the ratio has come. A gear that was not driven yet is taken to have the mean of the others, as by a
+//! sensor's scale. An element that slips does not turn in proportion to the speed, or by more than a ratio errs.
+
+use car::ShiftCommand;
+use drivetrain::Real;
+
+use super::{FIRST_S, GearboxFilter, GearboxState, OUTPUT, ShiftInput, TURBINE, square};
+
+/// Gears whose ratios are followed \[chosen\]; those beyond are as the tables have them.
+const GEARS: usize = 12;
+/// Largest error of a ratio that is taken off, as a fraction \[chosen\]: two digits of a ratio of 0.5 have half of it.
+const LARGEST: f64 = 0.02;
+/// Standard deviation of the error before the gear is driven, as a fraction \[chosen\].
+const UNKNOWN: f64 = 0.005;
+/// Standard deviations of it above which it is shown. Standard deviation below which it is known, and smallest error that is taken off \[chosen\]: at 300 rad/s 0.15 rad/s, half of what counts as a slip
+/// of noiseless speeds.
+const SHOWN: f64 = 4.0;
+const KNOWN: f64 = 2e-4;
+const SMALLEST: f64 = 5e-4;
+/// Change of an error that is known from which on it is taken anew \[chosen\].
+const CHANGED: f64 = 2.5e-4;
+/// Time for which the speeds are those of a gear before they are compared, how long they are, and how long they count, s \[chosen\].
+const SETTLED_S: f64 = 0.3;
+const COMPARED_S: f64 = 0.5;
+const MEMORY_S: f64 = 60.0;
+/// Root mean square of what the error does not explain, in thresholds of a slip, above which an element slips \[chosen\].
+const UNEXPLAINED: f64 = 0.5;
+/// Time constant with which slip and rate of the output speed are low-passed before they are compared, s \[chosen\].
+const SMOOTH_S: f64 = 0.1;
+/// Time between two readings, s \[chosen\].
+const READ_S: f64 = 0.01;
+
+/// What the readings in gears have shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct RatioErrors<T> {
+    /// Output speed and slip of the gear, low-passed, rad/s, and for how long they are those of the gear, s.
+    smooth: Option<[T; 3]>,
+    gears: [Compared<T>; GEARS],
+    /// The gear that was driven last, and what the others show of the skew.
+    last: usize,
+    skew_of_others: [T; 2],
+    /// The error of each gear, as a fraction, once it is known.
+    found: [Option<T>; GEARS],
+    /// That of the other gears.
+    others: T,
+    /// Whether one of them is not zero.
+    differs: bool,
+    /// Places of the gears between which the speeds are, and how far they have come from the first to the second, from 0 to 1.
+    between: [Option<u8>; 2],
+    way: T,
+}
+
+/// Least squares for `slip = e x + d rate` in a gear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Compared<T> {
+    time_s: T,
+    /// Sums of the weights, and of them times `x x`, `x rate`, `rate rate`, and the slip times `x`, `rate` and itself.
+    weight: T,
+    sums: [T; 6],
+    /// Whether both explain the slip.
+    explains: bool,
+}
+
+impl<T: Real> Compared<T> {
+    fn nothing() -> Self {
+        Self { time_s: T::zero(), weight: T::zero(), sums: [T::zero(); 6], explains: false }
+    }
+
+    /// Takes `x`, the rate and the slip over a step, with the variance of the slip.
+    fn take(&mut self, [x, rate, slip]: [T; 3], dt_s: T, variance: T) {
+        // A reading that is repeated in faster rows counts once.
+        let weight = (dt_s / T::of(READ_S)).at_most(T::one()) / variance;
+        let products = [x * x, x * rate, rate * rate, x * slip, rate * slip, slip * slip];
+        for (sum, product) in self.sums.iter_mut().zip(products) {
+            *sum = *sum + weight * product;
+        }
+        self.weight = self.weight + weight;
+        self.time_s = self.time_s + dt_s;
+        let kept = T::of(MEMORY_S) / self.time_s;
+        if kept < T::one() {
+            self.sums = self.sums.map(|sum| kept * sum);
+            self.weight = kept * self.weight;
+            self.time_s = T::of(MEMORY_S);
+        }
+    }
+
+    /// Information on the error.
+    fn of_error(&self) -> T {
+        self.sums[0] + T::of(1.0 / (UNKNOWN * UNKNOWN))
+    }
+
+    /// Information on the skew `d`, and that times its value.
+    fn of_skew(&self) -> [T; 2] {
+        let [_, mixed, rates, by_x, by_rate, _] = self.sums;
+        let per = mixed / self.of_error();
+        [rates - per * mixed, by_rate - per * by_x]
+    }
+
+    /// The error `e` once it is known, with what other gears show of the skew; `largest_rad_s` bounds the root mean square of what both do not explain.
+    fn error(&mut self, others: [T; 2], largest_rad_s: T) -> Option<T> {
+        let [_, mixed, _, by_x, by_rate, slips] = self.sums;
+        let (here, of_error) = (self.of_skew(), self.of_error());
+        let (skew, skew_s) = (others[0] + here[0], (others[1] + here[1]) / (others[0] + here[0]));
+        let error = (by_x - mixed * skew_s) / of_error;
+        let std_dev = (of_error.recip() + square(mixed / of_error) / skew).sqrt();
+        let unexplained = (slips - error * by_x - skew_s * by_rate) / self.weight;
+        // A comparison with NaN is false.
+        self.explains = unexplained <= square(largest_rad_s);
+        let is_known = self.explains
+            && self.time_s >= T::of(COMPARED_S)
+            && std_dev <= T::of(KNOWN).at_least(error.abs() / T::of(SHOWN))
+            && error.abs() <= T::of(LARGEST);
+        is_known.then_some(if error.abs() >= T::of(SMALLEST) { error } else { T::zero() })
+    }
+}
+
+impl<T: Real> RatioErrors<T> {
+    pub(super) fn nothing() -> Self {
+        Self {
+            smooth: None,
+            gears: [Compared::nothing(); GEARS],
+            last: GEARS,
+            skew_of_others: [T::zero(); 2],
+            found: [None; GEARS],
+            others: T::zero(),
+            differs: false,
+            between: [None; 2],
+            way: T::zero(),
+        }
+    }
+
+    /// Forgets the readings before a gap in them, and not what they have shown.
+    pub(super) fn pause(&mut self) {
+        self.smooth = None;
+    }
+
+    /// What the gears but this one show of the skew, which is at most so large, s.
+    fn skew_of_others(&mut self, place: usize, max_s: T) -> [T; 2] {
+        if place != self.last {
+            self.last = place;
+            // Of one that may be any up to the largest.
+            let mut sum = [T::of(3.0) / square(max_s.at_least(T::of(1e-3))), T::zero()];
+            for (_, gear) in self.gears.iter().enumerate().filter(|(other, gear)| *other != place && gear.explains) {
+                sum = core::array::from_fn(|k| sum[k] + gear.of_skew()[k]);
+            }
+            self.skew_of_others = sum;
+        }
+        self.skew_of_others
+    }
+
+    fn of(&self, place: Option<u8>) -> T {
+        place.and_then(|place| *self.found.get(usize::from(place))?).unwrap_or(self.others)
+    }
+
+    /// The error now.
+    fn now(&self) -> T {
+        let [from, to] = self.between.map(|place| self.of(place));
+        from + self.way * (to - from)
+    }
+
+    /// Keeps what is known of a gear. Whether that is new.
+    fn keep(&mut self, place: usize, error: T) -> bool {
+        let Some(found) = self.found.get_mut(place) else { return false };
+        let before = found.unwrap_or(self.others);
+        if found.is_some() && (error - before).abs() < T::of(CHANGED) {
+            return false;
+        }
+        *found = Some(error);
+        let (mut sum, mut count) = (T::zero(), T::zero());
+        for error in self.found.iter().flatten() {
+            (sum, count) = (sum + *error, count + T::one());
+        }
+        self.others = sum / count;
+        self.differs = self.found.iter().flatten().any(|error| *error != T::zero());
+        (error - before).abs() >= T::of(CHANGED)
+    }
+}
+
+impl<T: Real> GearboxState<T> {
+    /// By how much turbine over output speed has shown to be above the ratio of the gear at this place, as a fraction; `None` where it is not known.
+    pub fn ratio_error(&self, place: usize) -> Option<T> {
+        self.ratios.found.get(place).copied().flatten()
+    }
+}
+
+impl<T: Real> GearboxFilter<'_, T> {
+    /// The input with a turbine speed as the ratios of the tables would have it, if those are known to be others.
+    pub(super) fn at_ratios(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> Option<ShiftInput<T>> {
+        let ratios = &mut state.ratios;
+        if !ratios.differs {
+            return None;
+        }
+        self.follow_ratio(ratios, input);
+        let mut input = *input;
+        if let Some(turbine) = &mut input.turbine_rad_s {
+            turbine.value = turbine.value / (T::one() + ratios.now());
+        }
+        Some(input)
+    }
+
+    /// Follows between which gears the speeds are, and how far they have come.
+    fn follow_ratio(&self, ratios: &mut RatioErrors<T>, input: &ShiftInput<T>) {
+        let ShiftCommand { from, to } = input.gear;
+        let [from, to] = [from, to].map(|gear| gear.place().and_then(|place| u8::try_from(place).ok()));
+        if !input.gear.is_steady() || !ratios.between.contains(&to) {
+            ratios.between = [from, to];
+        }
+        let ratio = |place: Option<u8>| self.tables.gears.get(usize::from(place?)).map(|gear| gear.ratio);
+        let ([Some(from), Some(to)], Some(turbine), Some(output)) =
+            (ratios.between.map(ratio), input.turbine_rad_s, input.output_rad_s)
+        else {
+            return;
+        };
+        let way = (turbine.value - from * output.value) / ((to - from) * output.value);
+        // In one gear, and at rest, it is no number.
+        ratios.way = if way.is_finite() { way.at_least(T::zero()).at_most(T::one()) } else { T::zero() };
+    }
+
+    /// Takes what a step of this time, s, has shown of the ratio of a gear. The filter may not run yet: another ratio looks like a slip.
+    pub(super) fn take_ratio(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>, dt_s: T) {
+        let is_in_gear = input.gear.is_steady() && dt_s <= T::of(FIRST_S);
+        let gear = input.gear.to.place().filter(|place| is_in_gear && *place < GEARS);
+        let Some((place, row)) = gear.and_then(|place| Some((place, self.tables.gears.get(place)?))) else {
+            state.ratios.pause();
+            return;
+        };
+        let found = self.compared(state, (place, row.ratio), dt_s);
+        let before = state.ratios.now();
+        if found.is_some_and(|error| state.ratios.keep(place, error)) {
+            self.follow_ratio(&mut state.ratios, input);
+            let factor = (T::one() + before) / (T::one() + state.ratios.now());
+            if let Some(turbine) = &mut state.newest[TURBINE] {
+                turbine.scale(factor);
+            }
+            // It was found with another ratio.
+            state.skew.forget_turbine(self.uncertainty.channel_skew_s);
+        }
+    }
+
+    fn compared(&self, state: &mut GearboxState<T>, (place, ratio): (usize, T), dt_s: T) -> Option<T> {
+        let before = state.ratios.smooth.take();
+        let fresh = |k: usize| {
+            let newest = state.newest[k].as_ref()?;
+            (!newest.refused && newest.age_s <= T::of(FIRST_S)).then_some(newest)
+        };
+        let (turbine, output) = (fresh(TURBINE)?, fresh(OUTPUT)?);
+        if output.value.abs() <= self.uncertainty.output_least_rad_s {
+            return None;
+        }
+        let older_s = turbine.age_s.at_least(output.age_s);
+        let (turbine, now) = (turbine.reached(older_s)?, output.reached(older_s)?);
+        let slip = self.slip(ratio, [turbine, now]);
+        // As it would be with nothing taken off.
+        let value = slip.value + state.ratios.now() * turbine;
+        let [mean, slip_before, since_s] = before.unwrap_or([now, value, T::zero()]);
+        let fraction = dt_s / (dt_s + T::of(SMOOTH_S));
+        let mean = mean + fraction * (now - mean);
+        let rate = ratio * (now - mean) / T::of(SMOOTH_S);
+        let [late, earlier, _] = state.skew.late_s();
+        let (value, max_s) = (value - (late - earlier) * rate, self.uncertainty.channel_skew_s);
+        let x = ratio * mean;
+        let largest = slip.threshold() + T::of(2.0) * max_s * rate.abs() + T::of(LARGEST) * x.abs();
+        if value.is_finite() && value.abs() <= largest {
+            let smooth = slip_before + fraction * (value - slip_before);
+            state.ratios.smooth = Some([mean, smooth, (since_s + dt_s).at_most(T::of(SETTLED_S))]);
+            if since_s < T::of(SETTLED_S) {
+                return None;
+            }
+            let others = state.ratios.skew_of_others(place, max_s);
+            let gear = state.ratios.gears.get_mut(place)?;
+            gear.take([x, rate, smooth], dt_s, square(slip.std_dev));
+            return gear.error(others, T::of(UNEXPLAINED) * slip.threshold());
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What 20 s of pulling away and coasting by turns show of a slip, rad/s, of speed and rate.
+    fn found(slip: impl Fn(f64, f64, f64) -> f64) -> Option<f64> {
+        let mut compared = Compared::nothing();
+        for row in 0..2000 {
+            let time_s = 0.01 * f64::from(row);
+            let (speed, rate) = (200.0 + 60.0 * (0.5 * time_s).sin(), 30.0 * (0.5 * time_s).cos());
+            compared.take([speed, rate, slip(time_s, speed, rate)], 0.01, 0.15 * 0.15);
+        }
+        compared.error([3e4, 0.0], 0.4)
+    }
+
+    #[test]
+    fn an_error_in_proportion_to_the_speed_is_one_of_the_ratio() {
+        for error in [-0.01, -0.003, 0.003, 0.01] {
+            for skew_s in [-0.01, 0.0, 0.01] {
+                let of = found(|_, speed, rate| error * speed - skew_s * rate).unwrap();
+                assert!((of - error).abs() < 1e-4, "{error} {skew_s}: {of}");
+            }
+        }
+        assert_eq!(found(|_, _, rate| -0.01 * rate), Some(0.0));
+        assert_eq!(found(|_, speed, _| 3e-4 * speed), Some(0.0));
+    }
+
+    #[test]
+    fn a_slip_is_none() {
+        // That grows with the torque, that comes and goes, and a large one.
+        assert_eq!(found(|_, speed, _| 2.0 - 0.01 * (speed - 200.0) - 0.008 * speed), None);
+        assert_eq!(found(|time_s, _, _| if time_s % 4.0 < 2.0 { 2.0 } else { 0.0 }), None);
+        assert_eq!(found(|_, speed, _| 0.03 * speed), None);
+    }
+
+    #[test]
+    fn a_gear_that_was_not_driven_has_the_mean_of_the_others() {
+        let mut ratios = RatioErrors::nothing();
+        assert!(ratios.keep(0, 0.004) && ratios.keep(1, 0.002) && !ratios.keep(1, 0.0021));
+        assert_eq!([0, 1, 2, 99].map(|place| ratios.of(Some(place))), [0.004, 0.002, 0.003, 0.003]);
+        assert!(ratios.keep(2, 0.0) && !ratios.keep(99, 0.01) && ratios.differs);
+        (ratios.between, ratios.way) = ([Some(0), Some(1)], 0.25);
+        assert_eq!(ratios.now(), 0.0035);
+    }
+}
