@@ -48,6 +48,9 @@ fn speeds_that_come_late_are_found_in_the_gears() {
         ("output", 0.01, 1.8),
         ("turbine", 0.02, 3.5),
         ("output", 0.02, 3.5),
+        // Stated, they cost 8.8 N m: the filter is ahead of its readings by four rows.
+        ("turbine", 0.04, 12.0),
+        ("output", 0.04, 12.0),
         ("wheel", 0.03, 1.5),
     ] {
         let (late, said_ms) = error_n_m(&folder, sensors, Some((channel, late_s)));

@@ -9,7 +9,7 @@
 //! filter's state carried on by the commands since. It costs a step for each row within `D`. A reading compared with `w - age w'`
 //! instead would be wrong by the swing of the drive shafts, which turns by 80 degrees in 20 ms.
 
-use super::{GearboxFilter, GearboxState, LOST_S, MAX_ELEMENTS, Reading, ShiftEstimate, ShiftInput};
+use super::{GearboxFilter, GearboxState, LOST_S, MAX_ELEMENTS, Reading, SPEEDS, ShiftEstimate, ShiftInput};
 use drivetrain::Real;
 
 /// The longest delay that the gearbox filter takes off the readings, s; what is beyond stays their age.
@@ -106,6 +106,15 @@ impl<T: Real> GearboxFilter<'_, T> {
         let others = [turbine.delay_s, output.delay_s, wheel.delay_s, self.acceleration.delay_s];
         let longest = others.into_iter().fold(self.engine.0.delay_s, |longest, delay_s| longest.at_least(delay_s));
         (longest >= T::of(SHORTEST_S)).then(|| longest.at_most(T::of(LONGEST_DELAY_S)))
+    }
+
+    /// The same filter of turbine, output and wheel speeds that are later by these times, s.
+    pub(super) fn later_by(&self, delays_s: [T; SPEEDS]) -> Self {
+        let mut readings = self.readings;
+        for (reading, delay_s) in readings.iter_mut().zip(delays_s) {
+            reading.delay_s = reading.delay_s + delay_s;
+        }
+        Self { readings, ..*self }
     }
 
     /// The same filter of readings that are not late.

@@ -374,6 +374,14 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// Takes what came since the step before and returns the estimate for now. Never panics; allocates nothing.
     pub fn step(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
+        match state.skew.delays_s() {
+            Some(delays_s) => self.later_by(delays_s).step_stated(state, input),
+            None => self.step_stated(state, input),
+        }
+    }
+
+    /// The step with readings as late as is stated.
+    fn step_stated(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
         match self.longest_delay_s() {
             Some(longest_s) => self.step_late(state, input, longest_s),
             None => self.step_on_time(state, input),

@@ -30,12 +30,13 @@ const SMALLEST: f64 = 5e-4;
 /// Change of an error that is known from which on it is taken anew \[chosen\].
 const CHANGED: f64 = 2.5e-4;
 /// Time for which the speeds are those of a gear before they are compared, how long they are, and how long they count, s \[chosen\].
-const SETTLED_S: f64 = 0.3;
+const SETTLED_S: f64 = 0.4;
 const COMPARED_S: f64 = 0.5;
 const MEMORY_S: f64 = 60.0;
 /// Root mean square of what the error does not explain, in thresholds of a slip, above which an element slips \[chosen\].
 const UNEXPLAINED: f64 = 0.5;
-/// Time constant with which slip and rate of the output speed are low-passed before they are compared, s \[chosen\].
+/// Time constant with which slip and output speed are low-passed twice before they are compared, s \[chosen\]: the noise of the output speed is in slip and
+/// rate, and would look like a skew.
 const SMOOTH_S: f64 = 0.1;
 /// Time between two readings, s \[chosen\].
 const READ_S: f64 = 0.01;
@@ -44,8 +45,8 @@ const READ_S: f64 = 0.01;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct RatioErrors<T> {
-    /// Output speed and slip of the gear, low-passed, rad/s, and for how long they are those of the gear, s.
-    smooth: Option<[T; 3]>,
+    /// The speeds, as long as they are those of a gear.
+    smooth: Option<Smooth<T>>,
     gears: [Compared<T>; GEARS],
     /// The gear that was driven last, and what the others show of the skew.
     last: usize,
@@ -59,6 +60,15 @@ pub(super) struct RatioErrors<T> {
     /// Places of the gears between which the speeds are, and how far they have come from the first to the second, from 0 to 1.
     between: [Option<u8>; 2],
     way: T,
+}
+
+/// Output speed and slip of the gear, low-passed once and twice, rad/s, and for how long they are those of the gear, s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Smooth<T> {
+    output: [T; 2],
+    slip: [T; 2],
+    since_s: T,
 }
 
 /// Least squares for `slip = e x + d rate` in a gear.
@@ -78,11 +88,11 @@ impl<T: Real> Compared<T> {
         Self { time_s: T::zero(), weight: T::zero(), sums: [T::zero(); 6], explains: false }
     }
 
-    /// Takes `x`, the rate and the slip over a step, with the variance of the slip.
-    fn take(&mut self, [x, rate, slip]: [T; 3], dt_s: T, variance: T) {
+    /// Takes `x`, the rate and the slip over a step, with the variances of slip and rate.
+    fn take(&mut self, [x, rate, slip]: [T; 3], dt_s: T, [variance, of_rate]: [T; 2]) {
         // A reading that is repeated in faster rows counts once.
         let weight = (dt_s / T::of(READ_S)).at_most(T::one()) / variance;
-        let products = [x * x, x * rate, rate * rate, x * slip, rate * slip, slip * slip];
+        let products = [x * x, x * rate, rate * rate - of_rate, x * slip, rate * slip, slip * slip];
         for (sum, product) in self.sums.iter_mut().zip(products) {
             *sum = *sum + weight * product;
         }
@@ -105,7 +115,7 @@ impl<T: Real> Compared<T> {
     fn of_skew(&self) -> [T; 2] {
         let [_, mixed, rates, by_x, by_rate, _] = self.sums;
         let per = mixed / self.of_error();
-        [rates - per * mixed, by_rate - per * by_x]
+        [(rates - per * mixed).at_least(T::zero()), by_rate - per * by_x]
     }
 
     /// The error `e` once it is known, with what other gears show of the skew; `largest_rad_s` bounds the root mean square of what both do not explain.
@@ -264,23 +274,30 @@ impl<T: Real> GearboxFilter<'_, T> {
         let slip = self.slip(ratio, [turbine, now]);
         // As it would be with nothing taken off.
         let value = slip.value + state.ratios.now() * turbine;
-        let [mean, slip_before, since_s] = before.unwrap_or([now, value, T::zero()]);
+        let mut smooth = before.unwrap_or(Smooth { output: [now; 2], slip: [value; 2], since_s: T::zero() });
         let fraction = dt_s / (dt_s + T::of(SMOOTH_S));
-        let mean = mean + fraction * (now - mean);
-        let rate = ratio * (now - mean) / T::of(SMOOTH_S);
+        let pass = |of: &mut [T; 2], now: T| {
+            of[0] = of[0] + fraction * (now - of[0]);
+            of[1] = of[1] + fraction * (of[0] - of[1]);
+        };
+        pass(&mut smooth.output, now);
+        let rate = ratio * (smooth.output[0] - smooth.output[1]) / T::of(SMOOTH_S);
         let [late, earlier, _] = state.skew.late_s();
         let (value, max_s) = (value - (late - earlier) * rate, self.uncertainty.channel_skew_s);
-        let x = ratio * mean;
+        let x = ratio * smooth.output[1];
         let largest = slip.threshold() + T::of(2.0) * max_s * rate.abs() + T::of(LARGEST) * x.abs();
-        if value.is_finite() && value.abs() <= largest {
-            let smooth = slip_before + fraction * (value - slip_before);
-            state.ratios.smooth = Some([mean, smooth, (since_s + dt_s).at_most(T::of(SETTLED_S))]);
-            if since_s < T::of(SETTLED_S) {
+        // A comparison with NaN is false.
+        if value.abs() <= largest {
+            pass(&mut smooth.slip, value);
+            smooth.since_s = smooth.since_s + dt_s;
+            state.ratios.smooth = Some(smooth);
+            if smooth.since_s < T::of(SETTLED_S) {
                 return None;
             }
             let others = state.ratios.skew_of_others(place, max_s);
+            let of_rate = T::of(0.5) * fraction * square(ratio * self.readings[OUTPUT].std_dev_rad_s / T::of(SMOOTH_S));
             let gear = state.ratios.gears.get_mut(place)?;
-            gear.take([x, rate, smooth], dt_s, square(slip.std_dev));
+            gear.take([x, rate, smooth.slip[1]], dt_s, [square(slip.std_dev), of_rate]);
             return gear.error(others, T::of(UNEXPLAINED) * slip.threshold());
         }
         None
@@ -297,7 +314,7 @@ mod tests {
         for row in 0..2000 {
             let time_s = 0.01 * f64::from(row);
             let (speed, rate) = (200.0 + 60.0 * (0.5 * time_s).sin(), 30.0 * (0.5 * time_s).cos());
-            compared.take([speed, rate, slip(time_s, speed, rate)], 0.01, 0.15 * 0.15);
+            compared.take([speed, rate, slip(time_s, speed, rate)], 0.01, [0.15 * 0.15, 0.0]);
         }
         compared.error([3e4, 0.0], 0.4)
     }

@@ -26,12 +26,22 @@ const SHOWN: f64 = 3.0;
 /// Standard deviation from which on the delay of the wheel speed is taken off, s \[chosen\]: in the log of one shift a change just before the shift costs more
 /// than the delay.
 const WHEEL_STD_DEV_MAX_S: f64 = 0.02 / SHOWN;
+/// Standard deviation below which a delay of turbine or output speed may be longer than their channels have by the error budget, s, and by how much it
+/// has to differ from what was found before, s \[chosen\].
+const LONG_STD_DEV_S: f64 = 2e-3;
+const CHANGED_S: f64 = 2e-3;
+/// By how much a delay has to be above what channels have by the error budget to be taken off as one, and below it to be an age again, as a fraction \[chosen\].
+const APART: f64 = 0.25;
 /// Standard deviations below which what came long ago counts less, s \[chosen\].
 const KNOWN_S: f64 = 2e-4;
 const WHEEL_KNOWN_S: f64 = 1e-3;
 /// Multiple of its standard deviation from which on a rate counts \[chosen\]: the noise of the output speed is in rate and slip, and a weaker one would look
 /// like a skew.
 const RATE_SHOWN: f64 = 4.0;
+/// Longest delay by which speeds may look like a slip and are those of the gear, s \[chosen\]: the longest that is taken off and a fifth of it.
+const WIDEST_S: f64 = 1.2 * LONGEST_DELAY_S;
+/// Slip at the turbine below which speeds are near those of a gear, as a fraction of its speed \[chosen\].
+const NEAR: f64 = 0.03;
 /// Density of the rate of twist of the shafts, rad^2/s \[chosen\]: 0.1 rad/s for 0.3 s each way. It is noise here, as it changes its sign with each change of
 /// torque.
 const TWIST_RAD2_S: f64 = 6e-3;
@@ -45,8 +55,10 @@ pub(super) struct Skew<T> {
     smooth: Option<Smooth<T>>,
     turbine: Delay<T>,
     wheel: Delay<T>,
-    /// By how much turbine, output and wheel speed are taken to be late against the earlier one of the first two, s.
+    /// By how much turbine, output and wheel speed are taken to be late against the earlier one of the first two, s: as their age, and what is more than
+    /// the error budget has as delays of the sensors, which lets the readings act at their own time ([`super::late`]).
     late_s: [T; SPEEDS],
+    delays_s: [T; SPEEDS],
 }
 
 /// Speed of the output, slip of the turbine against it, and of the output over the final ratio against the wheels, low-passed, rad/s.
@@ -109,7 +121,13 @@ impl<T: Real> Delay<T> {
 
 impl<T: Real> Skew<T> {
     pub(super) fn nothing() -> Self {
-        Self { smooth: None, turbine: Delay::nothing(), wheel: Delay::nothing(), late_s: [T::zero(); SPEEDS] }
+        Self {
+            smooth: None,
+            turbine: Delay::nothing(),
+            wheel: Delay::nothing(),
+            late_s: [T::zero(); SPEEDS],
+            delays_s: [T::zero(); SPEEDS],
+        }
     }
 
     /// Forgets the readings before a gap in them, and not what they have shown.
@@ -134,7 +152,12 @@ impl<T: Real> Skew<T> {
 
     /// By how much turbine, output and wheel speed are taken to be late against the earlier one of the first two, s.
     pub(super) fn late_s(&self) -> [T; SPEEDS] {
-        self.late_s
+        core::array::from_fn(|k| self.late_s[k] + self.delays_s[k])
+    }
+
+    /// Delays of turbine, output and wheel speed that are longer than those of the error budget, s, if there are some.
+    pub(super) fn delays_s(&self) -> Option<[T; SPEEDS]> {
+        (self.delays_s != [T::zero(); SPEEDS]).then_some(self.delays_s)
     }
 
     /// Forgets what turbine and output speed have shown, of which at most this skew is taken off, s.
@@ -143,21 +166,33 @@ impl<T: Real> Skew<T> {
         self.take_off(max_s);
     }
 
-    /// Takes what is found off from now on, at most this skew of turbine and output, s.
+    /// Takes what is found off from now on. By the error budget turbine and output have at most this skew, s.
     fn take_off(&mut self, max_s: T) {
         let zero = T::zero();
+        let is_known = self.turbine.found.is_some_and(|[_, std_dev_s]| std_dev_s <= T::of(LONG_STD_DEV_S));
+        let longest_s = if is_known { T::of(LONGEST_DELAY_S).at_least(max_s) } else { max_s };
         let turbine = -self.turbine.shown(MIN_S, f64::INFINITY).unwrap_or(zero);
-        let turbine = turbine.at_least(-max_s).at_most(max_s);
-        let output = (-turbine).at_least(zero);
-        let wheel = self.wheel.shown(WHEEL_MIN_S, WHEEL_STD_DEV_MAX_S).map_or(zero, |wheel| wheel + output);
-        self.late_s = [turbine.at_least(zero), output, wheel.at_least(zero).at_most(T::of(LONGEST_DELAY_S))];
+        let turbine = turbine.at_least(-longest_s).at_most(longest_s);
+        let late_s = [turbine.at_least(zero), (-turbine).at_least(zero)];
+        for ((late_s, as_age_s), delay_s) in late_s.into_iter().zip(&mut self.late_s).zip(&mut self.delays_s) {
+            // Around the longest age it does not change from one to the other and back.
+            let longest_age_s = T::of(if *delay_s > zero { 1.0 - APART } else { 1.0 + APART }) * max_s;
+            let is_long = late_s > longest_age_s;
+            *as_age_s = if is_long { zero } else { late_s.at_most(max_s) };
+            if !is_long || (late_s - *delay_s).abs() >= T::of(CHANGED_S) {
+                *delay_s = if is_long { late_s } else { zero };
+            }
+        }
+        let wheel = self.wheel.shown(WHEEL_MIN_S, WHEEL_STD_DEV_MAX_S).map_or(zero, |wheel| wheel + late_s[1]);
+        self.late_s[WHEEL] = wheel.at_least(zero).at_most(T::of(LONGEST_DELAY_S));
     }
 }
 
 impl<T: Real> GearboxFilter<'_, T> {
     /// The longest delays of turbine, output and wheel speed that are found, s.
     pub fn longest_found_s(&self) -> [T; SPEEDS] {
-        [self.uncertainty.channel_skew_s, self.uncertainty.channel_skew_s, T::of(LONGEST_DELAY_S)]
+        let of_gearbox = T::of(LONGEST_DELAY_S).at_least(self.uncertainty.channel_skew_s);
+        [of_gearbox, of_gearbox, T::of(LONGEST_DELAY_S)]
     }
 
     /// Takes what a step of this time, s, has shown of the skew in a gear. The filter may not run yet: late readings look like a slip.
@@ -174,7 +209,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         (ratio, dt_s): (T, T),
     ) -> Option<Smooth<T>> {
         let (max_s, final_ratio) = (self.uncertainty.channel_skew_s, self.driveline.final_ratio);
-        let late_s = skew.late_s;
+        let (late_s, all_s) = (skew.late_s, skew.late_s());
         // A reading, and its age with nothing taken off.
         let fresh = |k: usize| {
             let newest = newest[k].filter(|newest| !newest.refused)?;
@@ -195,9 +230,10 @@ impl<T: Real> GearboxFilter<'_, T> {
         let output_rate = (now - output) / T::of(SMOOTH_S);
         let rate = ratio * output_rate;
         // As it would be with nothing taken off.
-        let value = slip.value - (late_s[TURBINE] - late_s[OUTPUT]) * rate;
+        let value = slip.value - (all_s[TURBINE] - all_s[OUTPUT]) * rate;
         // A clutch that slips, or another gear. A comparison with NaN is false.
-        let is_gear = value.abs() <= slip.threshold() + T::of(2.0) * max_s * rate.abs();
+        let widest_s = (T::of(2.0) * max_s).at_least(T::of(WIDEST_S));
+        let is_gear = value.abs() <= slip.threshold() + widest_s * rate.abs();
         let twist = fresh(WHEEL).and_then(|(wheel, wheel_s)| {
             let older_s = wheel_s.at_least(output_s);
             let value = at(OUTPUT, &output_speed, older_s)? / final_ratio - at(WHEEL, &wheel, older_s)?;
@@ -206,21 +242,24 @@ impl<T: Real> GearboxFilter<'_, T> {
         });
         let smooth = Smooth { output, slip: before.slip + fraction * (value - before.slip), twist };
         let noise = ratio.abs() * self.readings[OUTPUT].std_dev_rad_s / T::of(SMOOTH_S);
-        is_gear.then(|| {
-            if rate.abs() > T::of(RATE_SHOWN) * noise {
-                let noise = (square(slip.std_dev) * dt_s, T::one());
-                skew.turbine.take([T::zero(), rate, smooth.slip], dt_s, noise, T::of(KNOWN_S));
-            }
-            if let Some(twist) = smooth.twist.filter(|_| before.twist.is_some()) {
-                let sensors = square(self.readings[OUTPUT].std_dev_rad_s / final_ratio)
-                    + square(self.readings[WHEEL].std_dev_rad_s);
-                let noise = (sensors * dt_s + T::of(TWIST_RAD2_S), self.uncertainty.wheel_scale);
-                let row = [output / final_ratio, output_rate / final_ratio, twist];
-                skew.wheel.take(row, dt_s, noise, T::of(WHEEL_KNOWN_S));
-            }
-            skew.take_off(max_s);
-            smooth
-        })
+        if !is_gear {
+            // Speeds near those of the gear may be as late as this once their rate is known.
+            let is_near = value.abs() <= slip.threshold() + T::of(NEAR) * (ratio * now).abs();
+            return is_near.then_some(smooth);
+        }
+        if rate.abs() > T::of(RATE_SHOWN) * noise {
+            let noise = (square(slip.std_dev) * dt_s, T::one());
+            skew.turbine.take([T::zero(), rate, smooth.slip], dt_s, noise, T::of(KNOWN_S));
+        }
+        if let Some(twist) = smooth.twist.filter(|_| before.twist.is_some()) {
+            let sensors =
+                square(self.readings[OUTPUT].std_dev_rad_s / final_ratio) + square(self.readings[WHEEL].std_dev_rad_s);
+            let noise = (sensors * dt_s + T::of(TWIST_RAD2_S), self.uncertainty.wheel_scale);
+            let row = [output / final_ratio, output_rate / final_ratio, twist];
+            skew.wheel.take(row, dt_s, noise, T::of(WHEEL_KNOWN_S));
+        }
+        skew.take_off(max_s);
+        Some(smooth)
     }
 }
 
@@ -241,7 +280,7 @@ mod tests {
             skew.wheel.take([speed, rate, twist], 0.01, (TWIST_RAD2_S, 0.01), WHEEL_KNOWN_S);
             skew.take_off(0.02);
         }
-        skew.late_s
+        skew.late_s()
     }
 
     fn assert_found(delays_s: [f64; 2], expected_s: [f64; SPEEDS]) {
@@ -256,7 +295,8 @@ mod tests {
             ([0.004, 0.0], [0.004, 0.0, 0.0]),
             ([-0.009, 0.0], [0.0, 0.009, 0.009]),
             ([0.002, 0.004], [0.0, 0.0, 0.0]),
-            ([0.03, 0.03], [0.02, 0.0, 0.03]),
+            ([0.03, 0.03], [0.03, 0.0, 0.03]),
+            ([-0.08, 0.0], [0.0, 0.05, 0.05]),
             ([-0.01, 0.03], [0.0, 0.01, 0.04]),
             ([0.0, 0.2], [0.0, 0.0, 0.05]),
             ([0.0, -0.02], [0.0, 0.0, 0.0]),
@@ -277,7 +317,7 @@ mod tests {
             skew.turbine.take([0.0, rate, 0.3], 0.01, (1e-3, 1.0), KNOWN_S);
             skew.wheel.take([30.0, rate, 0.3], 0.01, (TWIST_RAD2_S, 0.01), WHEEL_KNOWN_S);
             skew.take_off(0.01);
-            assert_eq!(skew.late_s, [0.0; SPEEDS]);
+            assert_eq!(skew.late_s(), [0.0; SPEEDS]);
         }
     }
 }
