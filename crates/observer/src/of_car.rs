@@ -340,7 +340,7 @@ pub fn element_uncertainty(errors: &ElementErrors, scale: f64) -> ElementUncerta
     }
 }
 
-/// Largest skew of turbine and output speed that is taken off, s \[chosen: as an age, to first order, more does not help\].
+/// Largest skew of turbine and output speed, s \[chosen\]: of two cycles of a bus. It is taken off as an age, to first order; what is longer as a delay.
 const SKEW_MAX_S: f64 = 0.02;
 
 /// What the filter does not know beside the elements.

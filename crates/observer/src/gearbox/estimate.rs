@@ -197,9 +197,9 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Lowest and highest pressure of an element by its command alone, Pa, for errors within the budget, by its place in
     /// [`super::GearboxTables::elements`]; in a gear as in a shift. `None` if there is no such element, or no budget of it.
     pub fn pressure_range_pa(&self, state: &GearboxState<T>, at: usize) -> Option<[T; 2]> {
-        match self.longest_delay_s() {
-            Some(_) => state.late.pressure_range_pa.get(at).copied().flatten(),
-            None => self.range_of_element(state, at),
+        match state.late.waits() {
+            true => state.late.pressure_range_pa.get(at).copied().flatten(),
+            false => self.range_of_element(state, at),
         }
     }
 

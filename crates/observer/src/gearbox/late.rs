@@ -35,6 +35,11 @@ impl<T: Real> Late<T> {
         Self { steps: [None; KEPT], pressure_range_pa: [None; MAX_ELEMENTS] }
     }
 
+    /// Whether steps wait for their readings.
+    pub(super) fn waits(&self) -> bool {
+        self.steps[0].is_some()
+    }
+
     /// Takes the commands of a row, of whose speeds none is of now.
     fn push(&mut self, input: &ShiftInput<T>, dt_s: T) {
         let new = ShiftInput {
@@ -128,6 +133,13 @@ impl<T: Real> GearboxFilter<'_, T> {
         Self { readings, engine, acceleration, ..*self }
     }
 
+    /// Takes the steps that ended this time ago or earlier, s.
+    pub(super) fn pass_waiting(&self, state: &mut GearboxState<T>, ago_s: T) {
+        while let Some(step) = state.late.pop(ago_s) {
+            self.step_on_time(state, &step);
+        }
+    }
+
     /// A step with readings that are late by up to this time, s.
     pub(super) fn step_late(
         &self,
@@ -166,9 +178,7 @@ impl<T: Real> GearboxFilter<'_, T> {
                 }
             }
         }
-        while let Some(step) = state.late.pop(longest_s) {
-            on_time.step_on_time(state, &step);
-        }
+        on_time.pass_waiting(state, longest_s);
         let mut ahead = *state;
         let mut estimate = state.estimate;
         for step in state.late.steps.iter().rev().flatten() {

@@ -384,7 +384,13 @@ impl<T: Real> GearboxFilter<'_, T> {
     fn step_stated(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
         match self.longest_delay_s() {
             Some(longest_s) => self.step_late(state, input, longest_s),
-            None => self.step_on_time(state, input),
+            None => {
+                // A delay that was found is none any more: the steps that wait have all readings that they will get.
+                if state.late.waits() {
+                    self.pass_waiting(state, -T::one());
+                }
+                self.step_on_time(state, input)
+            }
         }
     }
 

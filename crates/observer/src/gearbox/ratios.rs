@@ -7,28 +7,34 @@
 //! w_t - i w_o = e i w_o - d i w_o'
 //! ```
 //!
-//! Least squares over the time in the gears give `e` of each, with one `d` of all as another unknown. Turbine readings are divided by `1 + e`, in a shift by what lies between
-//! those of both gears, as far as the ratio has come. A gear that was not driven yet is taken to have the mean of the others, as by a
-//! sensor's scale. An element that slips does not turn in proportion to the speed, or by more than a ratio errs.
+//! Least squares over the time in the gears give `e` of each, with one `d` of all as another unknown. Turbine readings are divided by `1 + e`, in a
+//! shift by what lies between those of both gears, as far as the ratio has come. A gear that was not driven yet is taken to have the mean of the
+//! others, as by a sensor's scale. A slip is told from it by
+//! its changes: one that is steady at a steady speed looks alike until one of both changes.
 
 use car::ShiftCommand;
 use drivetrain::Real;
 
 use super::{FIRST_S, GearboxFilter, GearboxState, OUTPUT, ShiftInput, TURBINE, square};
 
-/// Gears whose ratios are followed \[chosen\]; those beyond are as the tables have them.
+/// Gears whose ratios are followed \[chosen\]; those beyond are taken to have the mean of these.
 const GEARS: usize = 12;
 /// Largest error of a ratio that is taken off, as a fraction \[chosen\]: two digits of a ratio of 0.5 have half of it.
 const LARGEST: f64 = 0.02;
 /// Standard deviation of the error before the gear is driven, as a fraction \[chosen\].
 const UNKNOWN: f64 = 0.005;
-/// Standard deviations of it above which it is shown. Standard deviation below which it is known, and smallest error that is taken off \[chosen\]: at 300 rad/s 0.15 rad/s, half of what counts as a slip
-/// of noiseless speeds.
+/// Standard deviations of it above which it is shown, and standard deviation below which it is known \[chosen\].
 const SHOWN: f64 = 4.0;
 const KNOWN: f64 = 2e-4;
+/// Smallest error that is taken off \[chosen\]: at 300 rad/s 0.15 rad/s, half of what counts as a slip of noiseless speeds. One that is taken off is until it is
+/// half of that.
 const SMALLEST: f64 = 5e-4;
 /// Change of an error that is known from which on it is taken anew \[chosen\].
 const CHANGED: f64 = 2.5e-4;
+/// The same from which on a skew that was found before is one of other speeds \[chosen\].
+const OTHER: f64 = 1e-3;
+/// Time for which the speeds have to be off a ratio with its error until that is forgotten, s \[chosen\].
+const OFF_S: f64 = 1.0;
 /// Time for which the speeds are those of a gear before they are compared, how long they are, and how long they count, s \[chosen\].
 const SETTLED_S: f64 = 0.4;
 const COMPARED_S: f64 = 0.5;
@@ -51,6 +57,10 @@ pub(super) struct RatioErrors<T> {
     /// The gear that was driven last, and what the others show of the skew.
     last: usize,
     skew_of_others: [T; 2],
+    /// The skew `d` by all gears, s, and its standard deviation.
+    skew_s: [T; 2],
+    /// Since when the speeds are off the ratio with its error, s.
+    off_s: T,
     /// The error of each gear, as a fraction, once it is known.
     found: [Option<T>; GEARS],
     /// That of the other gears.
@@ -115,16 +125,24 @@ impl<T: Real> Compared<T> {
     fn of_skew(&self) -> [T; 2] {
         let [_, mixed, rates, by_x, by_rate, _] = self.sums;
         let per = mixed / self.of_error();
-        [(rates - per * mixed).at_least(T::zero()), by_rate - per * by_x]
+        let information = rates - per * mixed;
+        // Of slow changes the noise alone may be left.
+        if information > T::zero() { [information, by_rate - per * by_x] } else { [T::zero(); 2] }
     }
 
-    /// The error `e` once it is known, with what other gears show of the skew; `largest_rad_s` bounds the root mean square of what both do not explain.
-    fn error(&mut self, others: [T; 2], largest_rad_s: T) -> Option<T> {
+    /// The skew `d` with what other gears show of it, s, and its standard deviation.
+    fn skew_s(&self, others: [T; 2]) -> [T; 2] {
+        let here = self.of_skew();
+        let information = others[0] + here[0];
+        [(others[1] + here[1]) / information, information.sqrt().recip()]
+    }
+
+    /// The error `e` once it is known, with this skew and its standard deviation, s; `largest_rad_s` bounds the root mean square of what both do not explain.
+    fn error(&mut self, [skew_s, skew_std_dev_s]: [T; 2], largest_rad_s: T) -> Option<T> {
         let [_, mixed, _, by_x, by_rate, slips] = self.sums;
-        let (here, of_error) = (self.of_skew(), self.of_error());
-        let (skew, skew_s) = (others[0] + here[0], (others[1] + here[1]) / (others[0] + here[0]));
+        let of_error = self.of_error();
         let error = (by_x - mixed * skew_s) / of_error;
-        let std_dev = (of_error.recip() + square(mixed / of_error) / skew).sqrt();
+        let std_dev = (of_error.recip() + square(mixed / of_error * skew_std_dev_s)).sqrt();
         let unexplained = (slips - error * by_x - skew_s * by_rate) / self.weight;
         // A comparison with NaN is false.
         self.explains = unexplained <= square(largest_rad_s);
@@ -132,7 +150,7 @@ impl<T: Real> Compared<T> {
             && self.time_s >= T::of(COMPARED_S)
             && std_dev <= T::of(KNOWN).at_least(error.abs() / T::of(SHOWN))
             && error.abs() <= T::of(LARGEST);
-        is_known.then_some(if error.abs() >= T::of(SMALLEST) { error } else { T::zero() })
+        is_known.then_some(error)
     }
 }
 
@@ -143,6 +161,8 @@ impl<T: Real> RatioErrors<T> {
             gears: [Compared::nothing(); GEARS],
             last: GEARS,
             skew_of_others: [T::zero(); 2],
+            skew_s: [T::zero(), T::infinity()],
+            off_s: T::zero(),
             found: [None; GEARS],
             others: T::zero(),
             differs: false,
@@ -180,21 +200,45 @@ impl<T: Real> RatioErrors<T> {
         from + self.way * (to - from)
     }
 
-    /// Keeps what is known of a gear. Whether that is new.
-    fn keep(&mut self, place: usize, error: T) -> bool {
-        let Some(found) = self.found.get_mut(place) else { return false };
+    /// The skew of turbine and output speed, s, once it is known.
+    pub(super) fn skew_s(&self) -> Option<T> {
+        let [skew_s, std_dev_s] = self.skew_s;
+        (skew_s.abs() > T::of(3.0) * std_dev_s).then_some(skew_s)
+    }
+
+    /// Keeps what is known of a gear. By how much that changes what is taken off in it.
+    fn keep(&mut self, place: usize, error: T) -> T {
+        let Some(found) = self.found.get(place).copied() else { return T::zero() };
         let before = found.unwrap_or(self.others);
+        let smallest = T::of(if before == T::zero() { SMALLEST } else { 0.5 * SMALLEST });
+        let error = if error.abs() >= smallest { error } else { T::zero() };
         if found.is_some() && (error - before).abs() < T::of(CHANGED) {
-            return false;
+            return T::zero();
         }
-        *found = Some(error);
+        self.set(place, Some(error));
+        error - before
+    }
+
+    fn set(&mut self, place: usize, error: Option<T>) {
+        if let Some(found) = self.found.get_mut(place) {
+            *found = error;
+        }
         let (mut sum, mut count) = (T::zero(), T::zero());
         for error in self.found.iter().flatten() {
             (sum, count) = (sum + *error, count + T::one());
         }
-        self.others = sum / count;
+        self.others = if count > T::zero() { sum / count } else { T::zero() };
         self.differs = self.found.iter().flatten().any(|error| *error != T::zero());
-        (error - before).abs() >= T::of(CHANGED)
+    }
+
+    /// Forgets an error that the speeds have been off for long: it was a slip.
+    fn follow_off(&mut self, place: usize, rest: T, threshold: T, dt_s: T) {
+        self.off_s = if rest.abs() > threshold { self.off_s + dt_s } else { T::zero() };
+        if self.off_s >= T::of(OFF_S) {
+            self.off_s = T::zero();
+            self.gears[place.min(GEARS - 1)] = Compared::nothing();
+            self.set(place, None);
+        }
     }
 }
 
@@ -208,32 +252,46 @@ impl<T: Real> GearboxState<T> {
 impl<T: Real> GearboxFilter<'_, T> {
     /// The input with a turbine speed as the ratios of the tables would have it, if those are known to be others.
     pub(super) fn at_ratios(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> Option<ShiftInput<T>> {
-        let ratios = &mut state.ratios;
-        if !ratios.differs {
+        if !state.ratios.differs {
             return None;
         }
-        self.follow_ratio(ratios, input);
+        self.follow_ratio(state, input);
         let mut input = *input;
         if let Some(turbine) = &mut input.turbine_rad_s {
-            turbine.value = turbine.value / (T::one() + ratios.now());
+            turbine.value = turbine.value / (T::one() + state.ratios.now());
         }
         Some(input)
     }
 
+    /// A turbine speed as it was read, for what is in front of the gearbox: but for the mean error of all gears, which is taken to be one of a sensor.
+    pub(super) fn as_read(&self, state: &GearboxState<T>, turbine_rad_s: T) -> T {
+        let ratios = &state.ratios;
+        if ratios.differs {
+            turbine_rad_s * (T::one() + ratios.now()) / (T::one() + ratios.others)
+        } else {
+            turbine_rad_s
+        }
+    }
+
     /// Follows between which gears the speeds are, and how far they have come.
-    fn follow_ratio(&self, ratios: &mut RatioErrors<T>, input: &ShiftInput<T>) {
+    fn follow_ratio(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) {
+        let output = input.output_rad_s.map(|reading| reading.value);
+        let newest = state.newest[OUTPUT].filter(|newest| newest.age_s <= T::of(FIRST_S)).map(|newest| newest.value);
+        let ratios = &mut state.ratios;
         let ShiftCommand { from, to } = input.gear;
         let [from, to] = [from, to].map(|gear| gear.place().and_then(|place| u8::try_from(place).ok()));
-        if !input.gear.is_steady() || !ratios.between.contains(&to) {
-            ratios.between = [from, to];
+        // Out of neutral and into it there is one ratio.
+        let between = [from.or(to), to.or(from)];
+        if (!input.gear.is_steady() || !ratios.between.contains(&to)) && ratios.between != between {
+            (ratios.between, ratios.way) = (between, T::zero());
         }
         let ratio = |place: Option<u8>| self.tables.gears.get(usize::from(place?)).map(|gear| gear.ratio);
         let ([Some(from), Some(to)], Some(turbine), Some(output)) =
-            (ratios.between.map(ratio), input.turbine_rad_s, input.output_rad_s)
+            (ratios.between.map(ratio), input.turbine_rad_s, output.or(newest))
         else {
             return;
         };
-        let way = (turbine.value - from * output.value) / ((to - from) * output.value);
+        let way = (turbine.value - from * output) / ((to - from) * output);
         // In one gear, and at rest, it is no number.
         ratios.way = if way.is_finite() { way.at_least(T::zero()).at_most(T::one()) } else { T::zero() };
     }
@@ -246,16 +304,19 @@ impl<T: Real> GearboxFilter<'_, T> {
             state.ratios.pause();
             return;
         };
-        let found = self.compared(state, (place, row.ratio), dt_s);
         let before = state.ratios.now();
-        if found.is_some_and(|error| state.ratios.keep(place, error)) {
-            self.follow_ratio(&mut state.ratios, input);
-            let factor = (T::one() + before) / (T::one() + state.ratios.now());
-            if let Some(turbine) = &mut state.newest[TURBINE] {
-                turbine.scale(factor);
-            }
-            // It was found with another ratio.
-            state.skew.forget_turbine(self.uncertainty.channel_skew_s);
+        let found = self.compared(state, (place, row.ratio), dt_s);
+        let change = found.map_or(T::zero(), |error| state.ratios.keep(place, error));
+        if !state.ratios.differs && before == T::zero() {
+            return;
+        }
+        self.follow_ratio(state, input);
+        let now = state.ratios.now();
+        if let Some(turbine) = state.newest[TURBINE].as_mut().filter(|_| now != before) {
+            turbine.scale((T::one() + before) / (T::one() + now));
+        }
+        if change.abs() >= T::of(OTHER) {
+            state.skew.forget_turbine();
         }
     }
 
@@ -295,10 +356,19 @@ impl<T: Real> GearboxFilter<'_, T> {
                 return None;
             }
             let others = state.ratios.skew_of_others(place, max_s);
-            let of_rate = T::of(0.5) * fraction * square(ratio * self.readings[OUTPUT].std_dev_rad_s / T::of(SMOOTH_S));
+            let of_rate =
+                T::of(0.25) * fraction * square(ratio * self.readings[OUTPUT].std_dev_rad_s / T::of(SMOOTH_S));
             let gear = state.ratios.gears.get_mut(place)?;
             gear.take([x, rate, smooth.slip[1]], dt_s, [square(slip.std_dev), of_rate]);
-            return gear.error(others, T::of(UNEXPLAINED) * slip.threshold());
+            let skew_s = gear.skew_s(others);
+            let error = gear.error(skew_s, T::of(UNEXPLAINED) * slip.threshold());
+            state.ratios.skew_s = skew_s;
+            let taken = state.ratios.of(u8::try_from(place).ok());
+            let rest = smooth.slip[1] - taken * x - skew_s[0] * rate;
+            if taken != T::zero() {
+                state.ratios.follow_off(place, rest, slip.threshold(), dt_s);
+            }
+            return error;
         }
         None
     }
@@ -316,7 +386,8 @@ mod tests {
             let (speed, rate) = (200.0 + 60.0 * (0.5 * time_s).sin(), 30.0 * (0.5 * time_s).cos());
             compared.take([speed, rate, slip(time_s, speed, rate)], 0.01, [0.15 * 0.15, 0.0]);
         }
-        compared.error([3e4, 0.0], 0.4)
+        let skew_s = compared.skew_s([3e4, 0.0]);
+        compared.error(skew_s, 0.4)
     }
 
     #[test]
@@ -327,8 +398,7 @@ mod tests {
                 assert!((of - error).abs() < 1e-4, "{error} {skew_s}: {of}");
             }
         }
-        assert_eq!(found(|_, _, rate| -0.01 * rate), Some(0.0));
-        assert_eq!(found(|_, speed, _| 3e-4 * speed), Some(0.0));
+        assert!(found(|_, _, rate| -0.01 * rate).is_some_and(|error| error.abs() < 1e-4));
     }
 
     #[test]
@@ -342,10 +412,35 @@ mod tests {
     #[test]
     fn a_gear_that_was_not_driven_has_the_mean_of_the_others() {
         let mut ratios = RatioErrors::nothing();
-        assert!(ratios.keep(0, 0.004) && ratios.keep(1, 0.002) && !ratios.keep(1, 0.0021));
+        assert_eq!(
+            [(0, 0.004), (1, 0.002), (1, 0.0021)].map(|(place, error)| ratios.keep(place, error)),
+            [0.004, -0.002, 0.0]
+        );
         assert_eq!([0, 1, 2, 99].map(|place| ratios.of(Some(place))), [0.004, 0.002, 0.003, 0.003]);
-        assert!(ratios.keep(2, 0.0) && !ratios.keep(99, 0.01) && ratios.differs);
+        assert_eq!([(2, 0.0), (99, 0.01)].map(|(place, error)| ratios.keep(place, error)), [-0.003, 0.0]);
         (ratios.between, ratios.way) = ([Some(0), Some(1)], 0.25);
         assert_eq!(ratios.now(), 0.0035);
+    }
+
+    #[test]
+    fn an_error_about_the_smallest_does_not_come_and_go() {
+        let mut ratios = RatioErrors::nothing();
+        let kept = [4.9e-4, 5.1e-4, 4.9e-4, 5.1e-4, 3e-4, 2e-4, 4e-4].map(|error| {
+            ratios.keep(0, error);
+            ratios.of(Some(0))
+        });
+        assert_eq!(kept, [0.0, 5.1e-4, 5.1e-4, 5.1e-4, 5.1e-4, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn an_error_that_was_a_slip_is_forgotten() {
+        let mut ratios = RatioErrors::nothing();
+        ratios.keep(3, 0.01);
+        for (rest, is_kept) in [(0.1, true), (2.0, true), (0.1, true), (2.0, false)] {
+            (0..99).for_each(|_| ratios.follow_off(3, rest, 0.8, 0.01));
+            ratios.follow_off(3, rest, 0.8, if is_kept { 0.0 } else { 0.02 });
+            assert_eq!(ratios.differs, is_kept, "{rest}");
+        }
+        assert_eq!(ratios.of(Some(3)), 0.0);
     }
 }

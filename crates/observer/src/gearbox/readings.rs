@@ -232,6 +232,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             let (acceleration, std_dev) = engine.acceleration();
             [now, engine.variance(), acceleration, std_dev * std_dev]
         });
+        let turbine = self.as_read(state, turbine);
         let std_dev = self.readings[TURBINE].std_dev_rad_s;
         let reported_n_m = state.reported.map(|(torque, _)| torque);
         let turbine = [turbine, std_dev * std_dev];

@@ -26,11 +26,11 @@ const SHOWN: f64 = 3.0;
 /// Standard deviation from which on the delay of the wheel speed is taken off, s \[chosen\]: in the log of one shift a change just before the shift costs more
 /// than the delay.
 const WHEEL_STD_DEV_MAX_S: f64 = 0.02 / SHOWN;
-/// Standard deviation below which a delay of turbine or output speed may be longer than their channels have by the error budget, s, and by how much it
-/// has to differ from what was found before, s \[chosen\].
+/// Standard deviation below which a delay of turbine or output speed may be longer than the error budget has it, s \[chosen\].
 const LONG_STD_DEV_S: f64 = 2e-3;
+/// Change of a long delay from which on it is taken anew, s \[chosen\].
 const CHANGED_S: f64 = 2e-3;
-/// By how much a delay has to be above what channels have by the error budget to be taken off as one, and below it to be an age again, as a fraction \[chosen\].
+/// A delay is long from so much above the largest skew of the error budget on, and until it is so much below, as a fraction \[chosen\].
 const APART: f64 = 0.25;
 /// Standard deviations below which what came long ago counts less, s \[chosen\].
 const KNOWN_S: f64 = 2e-4;
@@ -55,9 +55,9 @@ pub(super) struct Skew<T> {
     smooth: Option<Smooth<T>>,
     turbine: Delay<T>,
     wheel: Delay<T>,
-    /// By how much turbine, output and wheel speed are taken to be late against the earlier one of the first two, s: as their age, and what is more than
-    /// the error budget has as delays of the sensors, which lets the readings act at their own time ([`super::late`]).
+    /// By how much turbine, output and wheel speed are late against the earlier one of the first two, s: delays that are taken as ages of the readings.
     late_s: [T; SPEEDS],
+    /// Longer ones, s, which are taken as delays of the sensors ([`super::late`]).
     delays_s: [T; SPEEDS],
 }
 
@@ -160,20 +160,26 @@ impl<T: Real> Skew<T> {
         (self.delays_s != [T::zero(); SPEEDS]).then_some(self.delays_s)
     }
 
-    /// Forgets what turbine and output speed have shown, of which at most this skew is taken off, s.
-    pub(super) fn forget_turbine(&mut self, max_s: T) {
+    /// Forgets what turbine and output speed have shown. What is taken off stays until they show it anew.
+    pub(super) fn forget_turbine(&mut self) {
         self.turbine = Delay::nothing();
-        self.take_off(max_s);
     }
 
-    /// Takes what is found off from now on. By the error budget turbine and output have at most this skew, s.
-    fn take_off(&mut self, max_s: T) {
+    /// Takes what is found off from now on. By the error budget turbine and output have at most this skew, s; it may be longer where `beside`, the same found
+    /// with errors of the ratios as other unknowns, is too.
+    fn take_off(&mut self, max_s: T, beside: Option<T>) {
         let zero = T::zero();
-        let is_known = self.turbine.found.is_some_and(|[_, std_dev_s]| std_dev_s <= T::of(LONG_STD_DEV_S));
-        let longest_s = if is_known { T::of(LONGEST_DELAY_S).at_least(max_s) } else { max_s };
+        let is_long = self.turbine.found.zip(beside).is_some_and(|([delay_s, std_dev_s], beside_s)| {
+            std_dev_s <= T::of(LONG_STD_DEV_S) && delay_s * beside_s > zero && beside_s.abs() > max_s && max_s > zero
+        });
+        let is_kept = self.delays_s != [zero; SPEEDS];
+        let longest_s = if is_long || is_kept { T::of(LONGEST_DELAY_S).at_least(max_s) } else { max_s };
         let turbine = -self.turbine.shown(MIN_S, f64::INFINITY).unwrap_or(zero);
         let turbine = turbine.at_least(-longest_s).at_most(longest_s);
-        let late_s = [turbine.at_least(zero), (-turbine).at_least(zero)];
+        let mut late_s = [turbine.at_least(zero), (-turbine).at_least(zero)];
+        if self.turbine.found.is_none() {
+            late_s = [TURBINE, OUTPUT].map(|k| self.late_s()[k]);
+        }
         for ((late_s, as_age_s), delay_s) in late_s.into_iter().zip(&mut self.late_s).zip(&mut self.delays_s) {
             // Around the longest age it does not change from one to the other and back.
             let longest_age_s = T::of(if *delay_s > zero { 1.0 - APART } else { 1.0 + APART }) * max_s;
@@ -199,12 +205,13 @@ impl<T: Real> GearboxFilter<'_, T> {
     pub(super) fn take_skew(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>, dt_s: T) {
         let gear = self.tables.gear(input.gear.to).filter(|_| input.gear.is_steady() && dt_s <= T::of(FIRST_S));
         let (skew, newest) = (&mut state.skew, &state.newest);
-        skew.smooth = gear.and_then(|gear| self.smoothed(skew, newest, (gear.ratio, dt_s)));
+        let beside = state.ratios.skew_s();
+        skew.smooth = gear.and_then(|gear| self.smoothed((skew, beside), newest, (gear.ratio, dt_s)));
     }
 
     fn smoothed(
         &self,
-        skew: &mut Skew<T>,
+        (skew, beside): (&mut Skew<T>, Option<T>),
         newest: &[Option<Newest<T>>; SPEEDS],
         (ratio, dt_s): (T, T),
     ) -> Option<Smooth<T>> {
@@ -236,7 +243,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         let is_gear = value.abs() <= slip.threshold() + widest_s * rate.abs();
         let twist = fresh(WHEEL).and_then(|(wheel, wheel_s)| {
             let older_s = wheel_s.at_least(output_s);
-            let value = at(OUTPUT, &output_speed, older_s)? / final_ratio - at(WHEEL, &wheel, older_s)?;
+            let twist = at(OUTPUT, &output_speed, older_s)? / final_ratio - at(WHEEL, &wheel, older_s)?;
+            let value = twist - skew.delays_s[OUTPUT] * output_rate / final_ratio;
             let before = before.twist.unwrap_or(value);
             Some(before + fraction * (value - before))
         });
@@ -258,7 +266,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             let row = [output / final_ratio, output_rate / final_ratio, twist];
             skew.wheel.take(row, dt_s, noise, T::of(WHEEL_KNOWN_S));
         }
-        skew.take_off(max_s);
+        skew.take_off(max_s, beside);
         Some(smooth)
     }
 }
@@ -278,7 +286,7 @@ mod tests {
             skew.turbine.take([0.0, 10.0 * rate, slip], 0.01, (0.1 * 0.1 * 0.01, 1.0), KNOWN_S);
             let twist = 0.01 * speed + wheel_s * rate;
             skew.wheel.take([speed, rate, twist], 0.01, (TWIST_RAD2_S, 0.01), WHEEL_KNOWN_S);
-            skew.take_off(0.02);
+            skew.take_off(0.02, skew.turbine.found.map(|[delay_s, _]| delay_s));
         }
         skew.late_s()
     }
@@ -316,7 +324,7 @@ mod tests {
         for rate in [0.0, 1e-3, -1e-3] {
             skew.turbine.take([0.0, rate, 0.3], 0.01, (1e-3, 1.0), KNOWN_S);
             skew.wheel.take([30.0, rate, 0.3], 0.01, (TWIST_RAD2_S, 0.01), WHEEL_KNOWN_S);
-            skew.take_off(0.01);
+            skew.take_off(0.01, None);
             assert_eq!(skew.late_s(), [0.0; SPEEDS]);
         }
     }

@@ -163,6 +163,7 @@ fn written(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use std::io;
+    use std::ops::Range;
     use std::path::Path;
 
     use super::super::{CsvRows, CsvWriter};
@@ -196,6 +197,48 @@ mod tests {
             all.push(format!("{} {:?}", rows.time_s(), cells.collect::<Vec<_>>()));
         }
         Ok(all)
+    }
+
+    /// The same with numbers that are fetched at once.
+    #[derive(Debug)]
+    struct InBlocks(Known);
+
+    impl TableRows for InBlocks {
+        fn names(&self) -> Vec<&str> {
+            self.0.names()
+        }
+
+        fn rows(&self) -> usize {
+            self.0.rows()
+        }
+
+        fn cell(&self, row: usize, column: usize) -> Cell<'_> {
+            self.0.cell(row, column)
+        }
+
+        fn numbers(&self, rows: Range<usize>, column: usize, numbers: &mut Vec<f64>) -> bool {
+            let cells = rows.map(|row| self.0.cell(row, column));
+            numbers.extend(cells.filter_map(|cell| if let Cell::Number(number) = cell { Some(number) } else { None }));
+            column < 2
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_fetched_at_once_are_those_of_each_row() {
+        for count in [1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 7] {
+            let known = || Known((0..count).map(|row| (row as f64, (0.1 * row as f64).sin(), "1")).collect());
+            let [mut one_by_one, mut at_once] = [Arc::new(known()) as Arc<dyn TableRows>, Arc::new(InBlocks(known()))]
+                .map(|table| CsvRows::of_table(Path::new("log"), table).unwrap());
+            for row in 0..count {
+                assert!(one_by_one.advance().unwrap() && at_once.advance().unwrap());
+                // The speed is read from the middle of a block on.
+                for column in [0, 1, 2].into_iter().filter(|column| *column != 1 || row > BLOCK + 40) {
+                    let numbers = [&one_by_one, &at_once].map(|rows| rows.number_or_none(column).map(f64::to_bits));
+                    assert_eq!(numbers[0], numbers[1], "{row} {column}");
+                }
+            }
+            assert!(!one_by_one.advance().unwrap() && !at_once.advance().unwrap());
+        }
     }
 
     #[test]
