@@ -15,7 +15,7 @@
 use car::ShiftCommand;
 use drivetrain::Real;
 
-use super::{FIRST_S, GearboxFilter, GearboxState, OUTPUT, ShiftInput, TURBINE, square};
+use super::{GearboxFilter, GearboxState, OUTPUT, ShiftInput, TURBINE, square};
 
 /// Gears whose ratios are followed \[chosen\]; those beyond are taken to have the mean of these.
 const GEARS: usize = 12;
@@ -44,8 +44,9 @@ const UNEXPLAINED: f64 = 0.5;
 /// Time constant with which slip and output speed are low-passed twice before they are compared, s \[chosen\]: the noise of the output speed is in slip and
 /// rate, and would look like a skew.
 const SMOOTH_S: f64 = 0.1;
-/// Time between two readings, s \[chosen\].
+/// Time between two readings, and the longest one, s \[chosen\]: 20 readings a second are compared.
 const READ_S: f64 = 0.01;
+const LONGEST_S: f64 = 0.06;
 
 /// What the readings in gears have shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -276,7 +277,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Follows between which gears the speeds are, and how far they have come.
     fn follow_ratio(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) {
         let output = input.output_rad_s.map(|reading| reading.value);
-        let newest = state.newest[OUTPUT].filter(|newest| newest.age_s <= T::of(FIRST_S)).map(|newest| newest.value);
+        let newest = state.newest[OUTPUT].filter(|newest| newest.age_s <= T::of(LONGEST_S)).map(|newest| newest.value);
         let ratios = &mut state.ratios;
         let ShiftCommand { from, to } = input.gear;
         let [from, to] = [from, to].map(|gear| gear.place().and_then(|place| u8::try_from(place).ok()));
@@ -298,7 +299,7 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// Takes what a step of this time, s, has shown of the ratio of a gear. The filter may not run yet: another ratio looks like a slip.
     pub(super) fn take_ratio(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>, dt_s: T) {
-        let is_in_gear = input.gear.is_steady() && dt_s <= T::of(FIRST_S);
+        let is_in_gear = input.gear.is_steady() && dt_s <= T::of(LONGEST_S);
         let gear = input.gear.to.place().filter(|place| is_in_gear && *place < GEARS);
         let Some((place, row)) = gear.and_then(|place| Some((place, self.tables.gears.get(place)?))) else {
             state.ratios.pause();
@@ -324,7 +325,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let before = state.ratios.smooth.take();
         let fresh = |k: usize| {
             let newest = state.newest[k].as_ref()?;
-            (!newest.refused && newest.age_s <= T::of(FIRST_S)).then_some(newest)
+            (!newest.refused && newest.age_s <= T::of(LONGEST_S)).then_some(newest)
         };
         let (turbine, output) = (fresh(TURBINE)?, fresh(OUTPUT)?);
         if output.value.abs() <= self.uncertainty.output_least_rad_s {
