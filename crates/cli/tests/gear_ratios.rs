@@ -47,22 +47,25 @@ fn ratios_that_are_off_are_found_in_the_gears() {
             let errors: Vec<f64> =
                 truth.iter().zip(&estimate).map(|(a, b)| a - b).filter(|error| !error.is_nan()).collect();
             assert!(errors.len() > 1000);
-            (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
+            let largest = errors.iter().fold(0.0_f64, |largest, error| largest.max(error.abs()));
+            [(errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt(), largest]
         });
         (squares, found)
     };
     let (right, found) = errors_n_m(&[0.0; 6]);
     assert!(!found.contains("off the ratio"), "{found}");
-    println!("{right:.1?} N m with the ratios of the file");
-    // A scale, and ratios of few digits: a gear that was not driven yet has the mean of the others. Without the search the torque of the offgoing clutch errs by 176 and 239 N m with the first two.
+    println!("RMS and largest error of both clutches {right:.1?} N m with the ratios of the file");
+    // A scale, and ratios of few digits: a gear that was not driven yet has the mean of the others. Without the search the torque of the offgoing
+    // clutch errs by 176 and 239 N m with the first two. The limits of the root mean squares are a quarter above what was found.
     for (errors, limit) in [
-        ([0.005; 6], [1.5, 1.5]),
-        ([-0.01; 6], [2.5, 2.0]),
-        ([0.0028, -0.0041, 0.0019, -0.0046, 0.0033, 0.001], [2.0, 7.0]),
+        ([0.005; 6], [1.25, 1.25]),
+        ([-0.01; 6], [1.45, 1.25]),
+        ([0.0028, -0.0041, 0.0019, -0.0046, 0.0033, 0.001], [1.8, 3.3]),
+        ([-0.0037, -0.0053, -0.0027, 0.0019, 0.0007, -0.0042], [1.8, 1.5]),
     ] {
         let (off, found) = errors_n_m(&errors);
         println!("{off:.1?} N m with ratios that are off by {errors:?}");
-        assert!(found.contains(&format!("4 ({:+.1} %)", 100.0 * errors[3])), "{found}");
-        assert!((0..2).all(|clutch| off[clutch] < limit[clutch] * right[clutch]), "{errors:?}: {off:?}");
+        assert!(found.contains(&format!("2 ({:+.1} %)", 100.0 * errors[1])), "{found}");
+        assert!((0..2).all(|clutch| off[clutch][0] < limit[clutch] * right[clutch][0]), "{errors:?}: {off:?}");
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! Least squares over the time in the gears give `e` of each, with one `d` of all as another unknown. Turbine readings are divided by `1 + e`, in a
 //! shift by what lies between those of both gears, as far as the ratio has come. A gear that was not driven yet is taken to have the mean of the
-//! others, as by a sensor's scale. A slip is told from it by
+//! others, as by a sensor's scale. A slip is distinguished by
 //! its changes: one that is steady at a steady speed looks alike until one of both changes.
 
 use car::ShiftCommand;
@@ -47,6 +47,8 @@ const SMOOTH_S: f64 = 0.1;
 /// Time between two readings, and the longest one, s \[chosen\]: 20 readings a second are compared.
 const READ_S: f64 = 0.01;
 const LONGEST_S: f64 = 0.06;
+/// Of a sensor without noise, rad^2/s^2 \[chosen\].
+const SMALLEST_VARIANCE: f64 = 1e-6;
 
 /// What the readings in gears have shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,7 +104,7 @@ impl<T: Real> Compared<T> {
     /// Takes `x`, the rate and the slip over a step, with the variances of slip and rate.
     fn take(&mut self, [x, rate, slip]: [T; 3], dt_s: T, [variance, of_rate]: [T; 2]) {
         // A reading that is repeated in faster rows counts once.
-        let weight = (dt_s / T::of(READ_S)).at_most(T::one()) / variance;
+        let weight = (dt_s / T::of(READ_S)).at_most(T::one()) / variance.at_least(T::of(SMALLEST_VARIANCE));
         let products = [x * x, x * rate, rate * rate - of_rate, x * slip, rate * slip, slip * slip];
         for (sum, product) in self.sums.iter_mut().zip(products) {
             *sum = *sum + weight * product;
@@ -421,6 +423,14 @@ mod tests {
         assert_eq!([(2, 0.0), (99, 0.01)].map(|(place, error)| ratios.keep(place, error)), [-0.003, 0.0]);
         (ratios.between, ratios.way) = ([Some(0), Some(1)], 0.25);
         assert_eq!(ratios.now(), 0.0035);
+    }
+
+    #[test]
+    fn sensors_without_noise_show_it_too() {
+        let mut compared = Compared::nothing();
+        (0..200).for_each(|_| compared.take([200.0_f32, 0.0, 0.8], 0.01, [0.0; 2]));
+        let skew_s = compared.skew_s([3e4, 0.0]);
+        assert!(compared.error(skew_s, 0.4).is_some_and(|error| (error - 0.004).abs() < 1e-4));
     }
 
     #[test]

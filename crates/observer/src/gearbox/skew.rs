@@ -165,12 +165,12 @@ impl<T: Real> Skew<T> {
         self.turbine = Delay::nothing();
     }
 
-    /// Takes what is found off from now on. By the error budget turbine and output have at most this skew, s; it may be longer where `beside`, the same found
+    /// Takes what is found off from now on. By the error budget turbine and output have at most this skew, s; it may be longer where `joint`, the same found
     /// with errors of the ratios as other unknowns, is too.
-    fn take_off(&mut self, max_s: T, beside: Option<T>) {
+    fn take_off(&mut self, max_s: T, joint: Option<T>) {
         let zero = T::zero();
-        let is_long = self.turbine.found.zip(beside).is_some_and(|([delay_s, std_dev_s], beside_s)| {
-            std_dev_s <= T::of(LONG_STD_DEV_S) && delay_s * beside_s > zero && beside_s.abs() > max_s && max_s > zero
+        let is_long = self.turbine.found.zip(joint).is_some_and(|([delay_s, std_dev_s], joint_s)| {
+            std_dev_s <= T::of(LONG_STD_DEV_S) && delay_s * joint_s > zero && joint_s.abs() > max_s && max_s > zero
         });
         let is_kept = self.delays_s != [zero; SPEEDS];
         let longest_s = if is_long || is_kept { T::of(LONGEST_DELAY_S).at_least(max_s) } else { max_s };
@@ -205,13 +205,13 @@ impl<T: Real> GearboxFilter<'_, T> {
     pub(super) fn take_skew(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>, dt_s: T) {
         let gear = self.tables.gear(input.gear.to).filter(|_| input.gear.is_steady() && dt_s <= T::of(FIRST_S));
         let (skew, newest) = (&mut state.skew, &state.newest);
-        let beside = state.ratios.skew_s();
-        skew.smooth = gear.and_then(|gear| self.smoothed((skew, beside), newest, (gear.ratio, dt_s)));
+        let joint = state.ratios.skew_s();
+        skew.smooth = gear.and_then(|gear| self.smoothed((skew, joint), newest, (gear.ratio, dt_s)));
     }
 
     fn smoothed(
         &self,
-        (skew, beside): (&mut Skew<T>, Option<T>),
+        (skew, joint): (&mut Skew<T>, Option<T>),
         newest: &[Option<Newest<T>>; SPEEDS],
         (ratio, dt_s): (T, T),
     ) -> Option<Smooth<T>> {
@@ -266,7 +266,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             let row = [output / final_ratio, output_rate / final_ratio, twist];
             skew.wheel.take(row, dt_s, noise, T::of(WHEEL_KNOWN_S));
         }
-        skew.take_off(max_s, beside);
+        skew.take_off(max_s, joint);
         Some(smooth)
     }
 }
