@@ -1,13 +1,10 @@
 //! Speeds of the rows of a table that are no readings of their shaft: frozen and impossible ones, and those that the table holds.
 
-use logs::{AllWithdrawn, Quality, Role, SpeedReading, SpeedWatch, Withdrawn};
+use logs::{Quality, Role, SpeedReading, SpeedWatch, Withdrawn};
 use observer::Reading;
 
 /// The speeds of a row, in the order of [`WATCHED`].
 pub(crate) type SpeedReadings<'a> = [&'a mut Option<Reading<f64>>; WATCHED.len()];
-
-/// Readings of earlier rows, and of the row itself, that a row shows to be wrong.
-pub(crate) type WithdrawnByRow = [AllWithdrawn; WATCHED.len()];
 
 /// The speeds of the rows, of which frozen and impossible ones are refused by the rules of [`logs::speed_watch`], and held ones are left out.
 pub(crate) struct FrozenRows {
@@ -15,6 +12,7 @@ pub(crate) struct FrozenRows {
     /// The time at which the newest reading of each was measured, s, and whether it is refused.
     newest_s: [(f64, Option<Quality>); WATCHED.len()],
     counts: [Counts; WATCHED.len()],
+    withdrawn: Vec<Withdrawn>,
 }
 
 /// Readings of a speed, and those of them that are not used.
@@ -61,13 +59,13 @@ impl FrozenRows {
             speeds: SpeedWatch::of_gearbox(ratios),
             newest_s: [(f64::NEG_INFINITY, None); WATCHED.len()],
             counts: [Counts::default(); WATCHED.len()],
+            withdrawn: Vec::new(),
         }
     }
 
     /// Refuses the readings of a row that are frozen or impossible, by a value that is not a number, and leaves out those of a row before
-    /// that a table holds. Returns which readings up to this row are wrong, for [`Self::withdraw`].
-    pub(crate) fn take_out(&mut self, speeds: SpeedReadings<'_>, time_s: f64) -> WithdrawnByRow {
-        let mut all_withdrawn = [[None; 2]; WATCHED.len()];
+    /// that a table holds.
+    pub(crate) fn take_out(&mut self, speeds: SpeedReadings<'_>, time_s: f64) {
         for (i, speed) in speeds.into_iter().enumerate() {
             let Some(Reading { value, age_s }) = *speed else { continue };
             let measured_s = time_s - age_s;
@@ -87,9 +85,13 @@ impl FrozenRows {
             } else if quality == Quality::Held {
                 *speed = None;
             }
-            all_withdrawn[i] = withdrawn;
+            self.withdrawn.extend(withdrawn.into_iter().flatten());
         }
-        all_withdrawn
+    }
+
+    /// Readings of earlier rows, and of the last one itself, which that shows to be wrong, for [`Self::withdraw`].
+    pub(crate) fn withdrawn(&mut self) -> Vec<Withdrawn> {
+        std::mem::take(&mut self.withdrawn)
     }
 
     /// Refuses a reading of a row at this time, s, if it is one of those that are withdrawn.

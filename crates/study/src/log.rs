@@ -10,7 +10,7 @@ use observer::{Input, Phase};
 use trace::{CsvRows, TraceError, signal};
 
 use crate::Signals;
-use crate::frozen_rows::{FrozenRows, SpeedReadings, WithdrawnByRow};
+use crate::frozen_rows::{FrozenRows, SpeedReadings};
 use crate::row_clock::{RowClock, RowTime};
 use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
@@ -234,9 +234,9 @@ impl Log {
                 return next.map(|next| next.map(|next| (*input, *row) = next).is_some());
             }
             match self.read_row() {
-                Ok(Some((next, withdrawn))) => {
+                Ok(Some(next)) => {
                     self.ahead.push(next.1.time_s, next);
-                    for withdrawn in withdrawn.into_iter().flatten().flatten() {
+                    for withdrawn in self.frozen.withdrawn() {
                         for (input, row) in self.ahead.waiting() {
                             self.frozen.withdraw(withdrawn, speeds(input), row.time_s);
                         }
@@ -248,8 +248,8 @@ impl Log {
         }
     }
 
-    /// The next row of the file, and the readings that it shows to be wrong; `None` at its end.
-    fn read_row(&mut self) -> Result<Option<(InputRow, WithdrawnByRow)>, TraceError> {
+    /// The next row of the file; `None` at its end.
+    fn read_row(&mut self) -> Result<Option<InputRow>, TraceError> {
         let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
         let rows = &self.rows;
         let Ok(mut input) = self.signals.input(dt_s, |column| Ok::<f64, Infallible>(self.samples.number(rows, column)));
@@ -260,8 +260,8 @@ impl Log {
                 columns.map(|column| column.and_then(|column| rows.number(column).ok()).unwrap_or(f64::NAN));
             Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 }
         });
-        let withdrawn = self.frozen.take_out(speeds(&mut input), time_s);
-        Ok(Some(((input, LogRow { time_s, resets: self.clock.resets(), truth, beside }), withdrawn)))
+        self.frozen.take_out(speeds(&mut input), time_s);
+        Ok(Some((input, LogRow { time_s, resets: self.clock.resets(), truth, beside })))
     }
 }
 

@@ -56,6 +56,9 @@ impl Scale {
     /// The value in SI.
     #[inline]
     pub fn of_value(self, value: f64) -> f64 {
+        if self.times == self.over {
+            return value;
+        }
         let si = value * self.times / self.over;
         if self.times < 10.0 || self.times.fract() != 0.0 {
             return si;

@@ -51,9 +51,9 @@ impl MemoryWriter {
     /// Writes a row with the numbers of all columns that have numbers, in their order, and the words of the row before.
     pub(crate) fn numbers(&mut self, time_s: f64, numbers: impl IntoIterator<Item = f64>) {
         let begin = self.block.len();
-        self.block.push(time_s);
-        self.block.extend(numbers.into_iter().take(self.width - 1));
         self.block.resize(begin + self.width, f64::NAN);
+        let cells = std::iter::once(time_s).chain(numbers);
+        self.block[begin..].iter_mut().zip(cells).for_each(|(cell, number)| *cell = number);
         self.all_repeats += 1;
         self.move_whole_block();
     }

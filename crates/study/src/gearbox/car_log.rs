@@ -17,7 +17,7 @@ pub use evaluate::LogStep;
 
 use super::gear_signal::Gears;
 use super::pressure_command::command_for;
-use crate::frozen_rows::{FrozenRows, SpeedReadings, WithdrawnByRow};
+use crate::frozen_rows::{FrozenRows, SpeedReadings};
 use crate::row_clock::{RowClock, RowTime};
 use crate::row_samples::{RowSamples, refuse_misnamed_engine};
 
@@ -217,9 +217,9 @@ impl<'c> CarLog<'c> {
                 return next;
             }
             match self.read_step() {
-                Ok(Some((step, withdrawn))) => {
+                Ok(Some(step)) => {
                     self.ahead.push(step.time_s, step);
-                    for withdrawn in withdrawn.into_iter().flatten().flatten() {
+                    for withdrawn in self.frozen.withdrawn() {
                         for step in self.ahead.waiting() {
                             self.frozen.withdraw(withdrawn, speeds(&mut step.input), step.time_s);
                         }
@@ -231,8 +231,8 @@ impl<'c> CarLog<'c> {
         }
     }
 
-    /// The next row of the file, and the readings that it shows to be wrong; `None` at its end.
-    fn read_step(&mut self) -> Result<Option<(LogStep, WithdrawnByRow)>, TraceError> {
+    /// The next row of the file; `None` at its end.
+    fn read_step(&mut self) -> Result<Option<LogStep>, TraceError> {
         let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
         self.take_gears();
         let (rows, columns, samples) = (&self.rows, &self.columns, &self.samples);
@@ -271,9 +271,9 @@ impl<'c> CarLog<'c> {
         };
         let pedals = columns.pedals.map(number);
         let oil_degc = Some(number(columns.oil)).filter(|degc| !degc.is_nan());
-        let withdrawn = self.frozen.take_out(speeds(&mut input), time_s);
+        self.frozen.take_out(speeds(&mut input), time_s);
         let step = LogStep { time_s, input, pedals, vehicle_m_s, oil_degc, reported_n_m, speed_m_s, pressures, truth };
-        Ok(Some((step, withdrawn)))
+        Ok(Some(step))
     }
 
     /// Takes the cells of `gear` and `target_gear`; an empty one says nothing new.

@@ -21,6 +21,7 @@ const BLOCK: usize = 256;
 /// A table in memory, and how many of its rows were passed.
 pub(super) struct TableSource {
     table: Arc<dyn TableRows>,
+    rows: usize,
     columns: Vec<Fetched>,
     /// The first row of which numbers are fetched.
     begin: usize,
@@ -37,20 +38,19 @@ struct Fetched {
 impl TableSource {
     pub(super) fn new(table: Arc<dyn TableRows>) -> Self {
         let columns = table.names().iter().map(|_| Fetched::default()).collect();
-        Self { columns, table, begin: 0, passed: 0 }
+        Self { columns, rows: table.rows(), table, begin: 0, passed: 0 }
     }
 
     /// Goes on to the next row; false where there is none.
     fn advance(&mut self) -> bool {
-        let rows = self.table.rows();
-        if self.passed >= rows {
+        if self.passed >= self.rows {
             return false;
         }
         if self.passed - self.begin == BLOCK {
             self.begin = self.passed;
             for (place, column) in self.columns.iter_mut().enumerate().filter(|(_, column)| column.is_read.get()) {
                 column.numbers.clear();
-                self.table.numbers(self.begin..rows.min(self.begin + BLOCK), place, &mut column.numbers);
+                self.table.numbers(self.begin..self.rows.min(self.begin + BLOCK), place, &mut column.numbers);
             }
         }
         self.passed += 1;

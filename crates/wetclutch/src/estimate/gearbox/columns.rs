@@ -1,11 +1,11 @@
 //! The columns of an estimate of a car with any gearbox.
 
-use car::columns::{element_column, element_commands};
+use car::columns::element_column;
 use car::{Car, Gear, ShiftCommand};
 use evaluate::LogStep;
 use evaluate::logged::Filtered;
-use observer::gearbox::{MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftPhase};
-use observer::{ChannelHealth, Channels, Health, Reading, ShiftTables};
+use observer::gearbox::{ClutchEstimate, MAX_ELEMENTS, ShiftElement, ShiftEstimate, ShiftPhase};
+use observer::{ChannelHealth, Channels, Health, ShiftTables};
 use study::gearbox::gear_numbers::GearNumbers;
 use trace::signal::{self, ACCELERATION_READING, OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
@@ -54,8 +54,8 @@ impl<'a> Row<'a> {
     }
 
     /// Its name; empty in neutral.
-    fn gear(&self, which: usize) -> Cell<'a> {
-        Cell::Word(if self.of(which).is_neutral() { "" } else { self.car.gear_name(self.of(which)) })
+    fn gear(&self, which: usize) -> &'a str {
+        if self.of(which).is_neutral() { "" } else { self.car.gear_name(self.of(which)) }
     }
 
     /// The gear (0) or the target gear (1).
@@ -65,7 +65,7 @@ impl<'a> Row<'a> {
 
     /// What became of the reading of a channel, by its place in [`READINGS`]; of the command of a clutch of the shift nothing where there
     /// is none.
-    fn reading(&self, at: usize) -> Cell<'a> {
+    fn reading(&self, at: usize) -> &'static str {
         let ShiftEstimate { channels, commands, clutches, .. } = &self.filtered.estimate;
         let of_command = |which: usize| clutches.and_then(|of| commands.get(of[which].element.place()?).copied());
         let health = match READINGS.get(at) {
@@ -73,15 +73,15 @@ impl<'a> Row<'a> {
             Some(&OFFGOING_COMMAND_READING) => of_command(0),
             _ => channels.each().get(at).copied(),
         };
-        Cell::Word(health.map_or("", ChannelHealth::name))
+        health.map_or("", ChannelHealth::name)
     }
 
-    fn element(&self, which: usize) -> Cell<'a> {
-        let Some(clutches) = self.filtered.estimate.clutches else { return Cell::Word("") };
-        Cell::Word(match clutches[which].element {
+    fn element(&self, which: usize) -> &'a str {
+        let Some(clutches) = &self.filtered.estimate.clutches else { return "" };
+        match clutches[which].element {
             ShiftElement::OneWay => self.one_way(which),
             of => self.places.iter().find(|(at, _)| of.place() == Some(*at)).map_or("", |(_, name)| *name),
-        })
+        }
     }
 
     /// The one-way clutch of the shift.
@@ -90,37 +90,6 @@ impl<'a> Row<'a> {
         let single = self.car.single_shift(self.filtered.estimate.gear.unwrap_or(self.step.input.gear));
         let element = single.and_then(|elements| gearbox.elements.get(elements[which]));
         element.map_or("", |element| element.name.as_str())
-    }
-
-    /// Pressure, torque, their ranges, both by the valve model, whether the speeds show nothing, and the standard deviations, in the order
-    /// of [`CLUTCH`].
-    fn clutch(&self, which: usize, what: usize) -> f64 {
-        let Some(clutch) = self.filtered.estimate.clutches.as_ref().map(|clutches| &clutches[which]) else {
-            return f64::NAN;
-        };
-        if !clutch.element.has_pressure() && ![TORQUE, TORQUE_DEVIATION].contains(&what) {
-            // It has a torque alone.
-            return f64::NAN;
-        }
-        let end = |range: Option<[f64; 2]>, end: usize| range.map_or(f64::NAN, |range| range[end]);
-        match what {
-            0 => clutch.pressure_pa,
-            1 => end(clutch.pressure_range_pa, 0),
-            2 => end(clutch.pressure_range_pa, 1),
-            TORQUE => clutch.torque_n_m,
-            4 => end(clutch.torque_range_n_m, 0),
-            5 => end(clutch.torque_range_n_m, 1),
-            6 => clutch.valve_pa,
-            7 => clutch.open_loop_n_m,
-            9 => clutch.pressure_std_dev_pa,
-            TORQUE_DEVIATION => clutch.std_dev_n_m,
-            _ => f64::from(u8::from(clutch.hidden)),
-        }
-    }
-
-    /// The same without the sign of a zero.
-    fn clutch_cell(&self, which: usize, what: usize) -> Cell<'a> {
-        Cell::Number(self.clutch(which, what) + 0.0)
     }
 }
 
@@ -140,67 +109,176 @@ pub(crate) const CLUTCH: [&str; 11] = [
 ];
 /// The column of an element, after its name, that says what became of the reading of its command.
 const COMMAND_READING: &str = "command_reading";
-/// The places of the torque and of its standard deviation among them.
-const TORQUE: usize = 3;
-const TORQUE_DEVIATION: usize = 10;
 /// The columns of an element, after its name: those of [`CLUTCH`] that its command alone gives.
 const ELEMENT: [&str; 3] = [CLUTCH[6], CLUTCH[1], CLUTCH[2]];
 const ROLES: [&str; 2] = ["offgoing", "oncoming"];
 
+/// Columns of numbers that come from one place.
+#[derive(Clone, Copy)]
+pub(crate) enum Source<'a> {
+    /// A clutch of the shift.
+    Clutch(usize),
+    /// Torques beside those of the clutches of a shift.
+    Torques(Knows),
+    /// An element by its place in the filter's tables, with its name.
+    Element(usize, &'a str),
+    /// Gear and target gear.
+    Gears,
+    /// Readings of speeds, engine torque and acceleration.
+    Measured,
+    /// The reading of the command of an element, by its place in the filter's tables, with the name of its column.
+    MeasuredCommand(usize, &'a str),
+}
+
+impl Source<'_> {
+    /// The names of its columns.
+    fn names(self) -> Vec<String> {
+        let all = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        match self {
+            Self::Clutch(which) => CLUTCH.iter().map(|what| format!("{}_{what}", ROLES[which])).collect(),
+            Self::Torques(knows) => {
+                let clutch = if knows.converter { "lock_up" } else { "launch_clutch" };
+                let of_clutch = ["estimate", "deviation"].map(|what| format!("{clutch}_torque_{what}_n_m"));
+                let mut names = vec!["turbine_torque_estimate_n_m".to_owned()];
+                if !knows.elements {
+                    names.extend(["estimate", "deviation"].map(|what| format!("clutches_at_turbine_{what}_n_m")));
+                }
+                names.push(signal::SHAFT_ESTIMATE.to_owned());
+                names.extend(of_clutch);
+                names
+            }
+            Self::Element(_, name) => ELEMENT.iter().map(|what| format!("{}_{what}", element_column(name))).collect(),
+            Self::Gears => all(&[signal::GEAR_NUMBER, signal::TARGET_GEAR_NUMBER]),
+            Self::Measured => all(&MEASURED),
+            Self::MeasuredCommand(_, column) => all(&[column]),
+        }
+    }
+
+    /// Writes the numbers of its columns in a row, not a number where there is none, over those of the row before.
+    fn write(self, row: &Row<'_>, numbers: &mut [f64]) {
+        let or_none = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        let estimate = &row.filtered.estimate;
+        match self {
+            Self::Clutch(which) => match &estimate.clutches {
+                Some(clutches) => numbers.copy_from_slice(&of_clutch(&clutches[which])),
+                None => numbers.fill(f64::NAN),
+            },
+            Self::Torques(knows) => {
+                let clutch = estimate.input_clutch.as_ref();
+                let clutch = [clutch.map(|clutch| clutch.torque_n_m), clutch.map(|clutch| clutch.std_dev_n_m)];
+                let sum = estimate.at_turbine.as_ref();
+                let sum = [sum.map(|sum| sum.torque_n_m + 0.0), sum.map(|sum| sum.std_dev_n_m)];
+                let sum = if knows.elements { &sum[..0] } else { &sum[..] };
+                let torques = [estimate.turbine_n_m].into_iter().chain(sum.iter().copied()).chain([estimate.shaft_n_m]);
+                let torques = torques.chain(clutch).map(or_none);
+                numbers.iter_mut().zip(torques).for_each(|(number, torque)| *number = torque);
+            }
+            Self::Element(place, _) => {
+                let place = place.min(MAX_ELEMENTS - 1);
+                let [least, greatest] = row.filtered.pressure_ranges_pa[place].unwrap_or([f64::NAN; 2]);
+                numbers.copy_from_slice(&[estimate.valve_pa[place], least + 0.0, greatest + 0.0]);
+            }
+            Self::Gears => numbers.copy_from_slice(&[0, 1].map(|which| row.numbers.number(row.of(which)))),
+            Self::Measured => {
+                let input = &row.step.input;
+                let readings = [
+                    input.engine_rad_s,
+                    input.turbine_rad_s,
+                    input.output_rad_s,
+                    input.wheel_rad_s,
+                    row.step.reported_n_m,
+                    input.acceleration_m_s2,
+                ];
+                numbers.copy_from_slice(&readings.map(|reading| or_none(reading.map(|reading| reading.value))));
+            }
+            Self::MeasuredCommand(place, _) => {
+                let reading = row.step.input.commands[place.min(MAX_ELEMENTS - 1)];
+                numbers.fill(or_none(reading.map(|reading| reading.value)));
+            }
+        }
+    }
+}
+
+/// The numbers of a clutch of a shift, in the order of [`CLUTCH`], without the sign of a zero. A one-way clutch has a torque alone.
+fn of_clutch(clutch: &ClutchEstimate<f64>) -> [f64; CLUTCH.len()] {
+    let none = f64::NAN;
+    let (torque_n_m, std_dev_n_m) = (clutch.torque_n_m, clutch.std_dev_n_m);
+    if !clutch.element.has_pressure() {
+        return [none, none, none, torque_n_m + 0.0, none, none, none, none, none, none, std_dev_n_m + 0.0];
+    }
+    let [pressure, torque] = [clutch.pressure_range_pa, clutch.torque_range_n_m].map(|range| range.unwrap_or([none; 2]));
+    let hidden = f64::from(u8::from(clutch.hidden));
+    [
+        clutch.pressure_pa,
+        pressure[0],
+        pressure[1],
+        torque_n_m,
+        torque[0],
+        torque[1],
+        clutch.valve_pa,
+        clutch.open_loop_n_m,
+        hidden,
+        clutch.pressure_std_dev_pa,
+        std_dev_n_m,
+    ]
+    .map(|number| number + 0.0)
+}
+
+/// The numbers of a row.
+pub(crate) struct Numbers<'a> {
+    /// With how many columns each has.
+    sources: Vec<(Source<'a>, usize)>,
+    all: Vec<f64>,
+    /// Whether the row before was of a shift, and its gears.
+    before: Option<(bool, ShiftCommand)>,
+    /// Those of the columns of numbers in a table, in their order.
+    chosen: Vec<usize>,
+}
+
+impl Numbers<'_> {
+    /// Takes those of the next row.
+    pub(crate) fn take(&mut self, row: &Row<'_>) {
+        let now = (row.filtered.estimate.clutches.is_some(), row.step.input.gear);
+        let before = self.before.replace(now);
+        let is_without_shift = before.is_some_and(|(had_clutches, _)| !had_clutches) && !now.0;
+        let is_in_same_gears = before.is_some_and(|(_, gears)| gears == now.1);
+        let mut rest = self.all.as_mut_slice();
+        for (source, columns) in &self.sources {
+            let Some((numbers, behind)) = rest.split_at_mut_checked(*columns) else { return };
+            let is_same = match source {
+                Source::Clutch(_) => is_without_shift,
+                Source::Gears => is_in_same_gears,
+                _ => false,
+            };
+            if !is_same {
+                source.write(row, numbers);
+            }
+            rest = behind;
+        }
+    }
+
+    /// The number of a column.
+    fn get(&self, at: usize) -> f64 {
+        self.all.get(at).copied().unwrap_or(f64::NAN)
+    }
+
+    /// The numbers of the columns of the table.
+    pub(crate) fn chosen(&self) -> impl Iterator<Item = f64> {
+        self.chosen.iter().map(|at| self.get(*at))
+    }
+}
+
 /// Where the cells of a column come from.
 #[derive(Clone, Copy)]
 pub(crate) enum Value {
-    Of(for<'a> fn(&Row<'a>) -> Cell<'a>),
-    Clutch(usize, usize),
-    /// The number of the gear (0) or the target gear (1).
-    GearNumber(usize),
-    /// Pressure of an element by its valve model, by its place in the filter's tables.
-    Valve(usize),
-    /// An end of the range of that pressure.
-    Range(usize, usize),
+    /// A word.
+    Of(for<'a> fn(&Row<'a>) -> &'a str),
+    /// A number, by its place among those of the row.
+    Number(usize),
     /// What became of the reading of a channel, by its place in [`READINGS`]; after them that of [`ACCELERATION_READING`].
     Reading(usize),
     /// The same of the command of an element, by its place in the filter's tables.
     Command(usize),
-    /// The reading itself.
-    Measured(fn(&Row<'_>) -> Option<Reading<f64>>),
-    /// That of the command of an element, by its place in the filter's tables.
-    MeasuredCommand(usize),
-}
-
-impl Value {
-    pub(crate) fn cell<'a>(self, row: &Row<'a>) -> Cell<'a> {
-        match self {
-            Self::Of(value) => value(row),
-            Self::Clutch(which, what) => row.clutch_cell(which, what),
-            Self::Valve(place) => Cell::Number(row.filtered.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
-            Self::Range(place, end) => {
-                of(row.filtered.pressure_ranges_pa[place.min(MAX_ELEMENTS - 1)].map(|range| range[end] + 0.0))
-            }
-            Self::GearNumber(which) => Cell::Number(row.numbers.number(row.of(which))),
-            Self::Reading(at) => row.reading(at),
-            Self::Command(place) => Cell::Word(row.filtered.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
-            Self::Measured(reading) => of(reading(row).map(|reading| reading.value)),
-            Self::MeasuredCommand(place) => {
-                of(row.step.input.commands[place.min(MAX_ELEMENTS - 1)].map(|reading| reading.value))
-            }
-        }
-    }
-
-    /// The number of its cell in a row, of a column that has numbers.
-    #[inline]
-    pub(crate) fn number(self, row: &Row<'_>) -> f64 {
-        let cell = match self {
-            // Most columns are those of the clutches of a shift, and most rows are of no shift.
-            Self::Clutch(..) if row.filtered.estimate.clutches.is_none() => return f64::NAN,
-            _ => self.cell(row),
-        };
-        match cell {
-            Cell::Number(number) => number,
-            Cell::Whole(number) => number as f64,
-            Cell::Word(_) | Cell::SameWord | Cell::SameWords => f64::NAN,
-        }
-    }
 }
 
 /// How many columns stand before the columns of readings that end a table.
@@ -217,12 +295,19 @@ pub(crate) struct Column {
 }
 
 impl Column {
-    /// Its cell in a row.
-    pub(crate) fn cell<'a>(&self, row: &Row<'a>, same: Same) -> Cell<'a> {
-        match (self.kind, self.value) {
-            (ColumnKind::Word, Value::Reading(_) | Value::Command(_)) if same.readings => Cell::SameWord,
-            (ColumnKind::Word, Value::Of(_)) if same.others => Cell::SameWord,
-            (_, value) => value.cell(row),
+    fn word(name: impl Into<String>, value: Value) -> Self {
+        Self { name: name.into(), kind: ColumnKind::Word, value }
+    }
+
+    /// Its cell in a row with these numbers.
+    pub(crate) fn cell<'a>(&self, row: &Row<'a>, numbers: &Numbers<'_>, same: Same) -> Cell<'a> {
+        match self.value {
+            Value::Number(at) => Cell::Number(numbers.get(at)),
+            Value::Reading(_) | Value::Command(_) if same.readings => Cell::SameWord,
+            Value::Of(_) if same.others => Cell::SameWord,
+            Value::Of(word) => Cell::Word(word(row)),
+            Value::Reading(at) => Cell::Word(row.reading(at)),
+            Value::Command(place) => Cell::Word(row.filtered.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
         }
     }
 }
@@ -241,102 +326,101 @@ impl Knows {
     }
 }
 
-fn word(name: &str, value: for<'a> fn(&Row<'a>) -> Cell<'a>) -> Column {
-    Column { name: name.to_owned(), kind: ColumnKind::Word, value: Value::Of(value) }
+/// The columns of a table, and where its numbers come from.
+#[derive(Default)]
+pub(crate) struct Columns<'a> {
+    pub(crate) all: Vec<Column>,
+    sources: Vec<(Source<'a>, usize)>,
+    numbers: usize,
 }
 
-fn number(name: impl Into<String>, value: Value) -> Column {
-    Column { name: name.into(), kind: ColumnKind::Number, value }
-}
+impl<'a> Columns<'a> {
+    /// The columns of a car whose elements have these places in the filter's tables.
+    pub(crate) fn of(places: &[(usize, &'a str)], knows: Knows) -> Self {
+        let mut columns = Self::default();
+        let word = |name, word: for<'b> fn(&Row<'b>) -> &'b str| Column::word(name, Value::Of(word));
+        columns.all.extend([
+            word(signal::GEAR, |row| row.gear(0)),
+            word(signal::TARGET_GEAR, |row| row.gear(1)),
+            word(signal::PHASE, |row| row.filtered.estimate.phase.map_or("", |phase| phase.name())),
+        ]);
+        if knows.elements {
+            columns.all.extend([word(ROLES[0], |row| row.element(0)), word(ROLES[1], |row| row.element(1))]);
+            columns.push_numbers([0, 1].map(Source::Clutch));
+        }
+        columns.push_numbers([Source::Torques(knows)]);
+        columns.push_numbers(places.iter().map(|&(place, name)| Source::Element(place, name)));
+        columns.all.push(word(signal::HEALTH, |row| row.filtered.estimate.health.name()));
+        columns.push_numbers([Source::Gears]);
+        columns.all.extend(readings(places, knows));
+        columns
+    }
 
-/// The columns of a car whose elements have these places in the filter's tables.
-pub(crate) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
-    let mut columns = vec![
-        word(signal::GEAR, |row| row.gear(0)),
-        word(signal::TARGET_GEAR, |row| row.gear(1)),
-        word(signal::PHASE, |row| Cell::Word(row.filtered.estimate.phase.map_or("", |phase| phase.name()))),
-    ];
-    if knows.elements {
-        columns.extend([word(ROLES[0], |row| row.element(0)), word(ROLES[1], |row| row.element(1))]);
-        for (which, role) in ROLES.iter().enumerate() {
-            let named = CLUTCH.iter().enumerate();
-            columns.extend(named.map(|(what, name)| number(format!("{role}_{name}"), Value::Clutch(which, what))));
+    /// With the columns of the readings of a car, whose elements' commands have these names.
+    pub(crate) fn push_measured(&mut self, commands: &'a [(usize, String)], tables: &ShiftTables<f64>) {
+        let command =
+            |(at, name): &'a (usize, String)| Some(Source::MeasuredCommand(tables.place(*at)?, name.as_str()));
+        self.push_numbers(std::iter::once(Source::Measured).chain(commands.iter().filter_map(command)));
+    }
+
+    fn push_numbers(&mut self, sources: impl IntoIterator<Item = Source<'a>>) {
+        for source in sources {
+            let names = source.names();
+            self.sources.push((source, names.len()));
+            for name in names {
+                self.all.push(Column { name, kind: ColumnKind::Number, value: Value::Number(self.numbers) });
+                self.numbers += 1;
+            }
         }
     }
-    columns.extend(torques(knows));
-    for (place, name) in places {
-        let values = [Value::Valve(*place), Value::Range(*place, 0), Value::Range(*place, 1)];
-        columns.extend(
-            ELEMENT.iter().zip(values).map(|(what, value)| number(format!("{}_{what}", element_column(name)), value)),
-        );
-    }
-    columns.push(word(signal::HEALTH, |row| Cell::Word(row.filtered.estimate.health.name())));
-    let gears = [(signal::GEAR_NUMBER, 0), (signal::TARGET_GEAR_NUMBER, 1)];
-    columns.extend(gears.map(|(name, which)| number(name, Value::GearNumber(which))));
-    columns.extend(readings(places, knows));
-    columns
-}
 
-/// Torques beside those of the clutches of a shift.
-fn torques(knows: Knows) -> Vec<Column> {
-    let mut columns =
-        vec![number("turbine_torque_estimate_n_m", Value::Of(|row| of(row.filtered.estimate.turbine_n_m)))];
-    if !knows.elements {
-        columns.push(number(
-            "clutches_at_turbine_estimate_n_m",
-            Value::Of(|row| of(row.filtered.estimate.at_turbine.map(|sum| sum.torque_n_m + 0.0))),
-        ));
-        columns.push(number(
-            "clutches_at_turbine_deviation_n_m",
-            Value::Of(|row| of(row.filtered.estimate.at_turbine.map(|sum| sum.std_dev_n_m))),
-        ));
+    /// Those of these names, in their order.
+    ///
+    /// # Errors
+    /// There is no such column, or one is named twice.
+    pub(crate) fn choose(&mut self, names: &[String]) -> Result<(), Error> {
+        let mut chosen = Vec::new();
+        for name in names.iter().map(|name| name.trim()).filter(|name| *name != signal::TIME) {
+            let Some(at) = self.all.iter().position(|column| column.name == name) else {
+                let known: Vec<&str> = self.all.iter().map(|column| column.name.as_str()).collect();
+                return Err(no_column(name, &known, chosen.iter().any(|column: &Column| column.name == name)));
+            };
+            chosen.push(self.all.remove(at));
+        }
+        self.all = chosen;
+        Ok(())
     }
-    columns.push(number(signal::SHAFT_ESTIMATE, Value::Of(|row| of(row.filtered.estimate.shaft_n_m))));
-    let clutch = if knows.converter { "lock_up" } else { "launch_clutch" };
-    columns.push(number(
-        format!("{clutch}_torque_estimate_n_m"),
-        Value::Of(|row| of(row.filtered.estimate.input_clutch.map(|clutch| clutch.torque_n_m))),
-    ));
-    columns.push(number(
-        format!("{clutch}_torque_deviation_n_m"),
-        Value::Of(|row| of(row.filtered.estimate.input_clutch.map(|clutch| clutch.std_dev_n_m))),
-    ));
-    columns
+
+    /// The columns, and the numbers of a row.
+    pub(crate) fn split(self) -> (Vec<Column>, Numbers<'a>) {
+        let place = |column: &Column| if let Value::Number(at) = column.value { Some(at) } else { None };
+        let chosen = self.all.iter().filter_map(place).collect();
+        (self.all, Numbers { sources: self.sources, all: vec![f64::NAN; self.numbers], before: None, chosen })
+    }
 }
 
 /// What became of the reading of each channel, and of the command of each element.
 fn readings(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
-    let words = |name: String, value: Value| Column { name, kind: ColumnKind::Word, value };
     let is_command = |name: &str| [OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING].contains(&name);
     let channels = READINGS.iter().enumerate().filter(|(_, name)| knows.elements || !is_command(name));
-    let channels = channels.map(|(at, name)| words((*name).to_owned(), Value::Reading(at)));
+    let channels = channels.map(|(at, name)| Column::word(*name, Value::Reading(at)));
     let command = |(place, name): &(usize, &str)| {
-        words(format!("{}_{COMMAND_READING}", element_column(name)), Value::Command(*place))
+        Column::word(format!("{}_{COMMAND_READING}", element_column(name)), Value::Command(*place))
     };
     let acceleration =
-        knows.acceleration.then(|| words(ACCELERATION_READING.to_owned(), Value::Reading(READINGS.len())));
+        knows.acceleration.then(|| Column::word(ACCELERATION_READING, Value::Reading(READINGS.len())));
     channels.chain(acceleration).chain(places.iter().map(command)).collect()
 }
 
-/// A measured channel: its column, and its reading in a row.
-type Channel = (&'static str, fn(&Row<'_>) -> Option<Reading<f64>>);
-
 /// The measured channels that an estimate may have too.
-const MEASURED: [Channel; 6] = [
-    (signal::ENGINE_SPEED, |row| row.step.input.engine_rad_s),
-    (signal::TURBINE_SPEED, |row| row.step.input.turbine_rad_s),
-    (signal::OUTPUT_SPEED, |row| row.step.input.output_rad_s),
-    (signal::WHEEL_SPEED, |row| row.step.input.wheel_rad_s),
-    (signal::REPORTED_ENGINE_TORQUE, |row| row.step.reported_n_m),
-    (signal::LONGITUDINAL_ACCELERATION, |row| row.step.input.acceleration_m_s2),
+const MEASURED: [&str; 6] = [
+    signal::ENGINE_SPEED,
+    signal::TURBINE_SPEED,
+    signal::OUTPUT_SPEED,
+    signal::WHEEL_SPEED,
+    signal::REPORTED_ENGINE_TORQUE,
+    signal::LONGITUDINAL_ACCELERATION,
 ];
-
-/// The columns of the readings of a car, which an estimate has where they are asked for.
-pub(crate) fn measured(car: &Car, tables: &ShiftTables<f64>) -> Vec<Column> {
-    let channels = MEASURED.iter().map(|(name, reading)| number(*name, Value::Measured(*reading)));
-    let command = |(at, name)| Some(number(name, Value::MeasuredCommand(tables.place(at)?)));
-    channels.chain(element_commands(car).into_iter().filter_map(command)).collect()
-}
 
 /// Whether a table of estimates, of any kind of car, may have a column of this name that logs have too.
 pub fn is_measured_column(name: &str) -> bool {
@@ -351,36 +435,8 @@ pub fn is_car_column(name: &str) -> bool {
         rest.is_some_and(|rest| rest.starts_with("element_"))
     };
     let is_one = |[converter, elements]: [bool; 2]| {
-        columns(&[], Knows { converter, elements, acceleration: true }).iter().any(|column| column.name == name)
+        Columns::of(&[], Knows { converter, elements, acceleration: true }).all.iter().any(|column| column.name == name)
     };
     [[true, true], [false, true], [true, false]].into_iter().any(is_one)
         || ELEMENT.into_iter().chain([COMMAND_READING]).any(of_element)
-}
-
-fn of(value: Option<f64>) -> Cell<'static> {
-    Cell::Number(value.unwrap_or(f64::NAN))
-}
-
-/// The columns of these names in their order, also those of readings. Without names all, those of readings only with `with_measured`.
-pub(crate) fn chosen(
-    mut all: Vec<Column>,
-    measured: Vec<Column>,
-    (names, with_measured): (&[String], bool),
-) -> Result<Vec<Column>, Error> {
-    if names.is_empty() && !with_measured {
-        return Ok(all);
-    }
-    all.extend(measured);
-    if names.is_empty() {
-        return Ok(all);
-    }
-    let mut chosen = Vec::new();
-    for name in names.iter().map(|name| name.trim()).filter(|name| *name != signal::TIME) {
-        let Some(at) = all.iter().position(|column| column.name == name) else {
-            let known: Vec<&str> = all.iter().map(|column| column.name.as_str()).collect();
-            return Err(no_column(name, &known, chosen.iter().any(|column: &Column| column.name == name)));
-        };
-        chosen.push(all.remove(at));
-    }
-    Ok(chosen)
 }

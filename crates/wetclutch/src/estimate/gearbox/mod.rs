@@ -8,6 +8,7 @@ pub mod source;
 
 use std::path::Path;
 
+use car::columns::element_commands;
 use car::{Car, ErrorBudget};
 use config::CarFile;
 use evaluate::LogStep;
@@ -19,10 +20,10 @@ use observer::ShiftTables;
 use report::drive_page::{DrivePage, MAX_DRAWN, findings, shift_words};
 use study::gearbox::gear_numbers::GearNumbers;
 use trace::signal::ACCELERATION_READING;
-use trace::{Cell, ColumnKind, ShownPath as _};
+use trace::{Cell, ShownPath as _};
 
 use self::checks::{HeardCommands, RowTimes, refused};
-use self::columns::{Knows, Row, Same, Value, before_readings, chosen, columns, measured};
+use self::columns::{Columns, Knows, Row, Same, before_readings};
 pub use self::columns::{is_car_column, is_measured_column};
 pub use self::learnt::LearntOfDrive;
 use self::passing::Passing;
@@ -139,13 +140,18 @@ pub fn estimate(
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
     let numbers = GearNumbers::of(car);
-    let names = (&options.columns[..], destination.is_live());
     let is_named = options.columns.iter().any(|name| name.trim() == ACCELERATION_READING);
     let knows = Knows::of(car, is_named || source.has_acceleration());
-    let columns = chosen(columns(&places, knows), measured(car, tables), names)?;
+    let commands = element_commands(car);
+    let mut columns = Columns::of(&places, knows);
+    if destination.is_live() || !options.columns.is_empty() {
+        columns.push_measured(&commands, tables);
+    }
+    if !options.columns.is_empty() {
+        columns.choose(&options.columns)?;
+    }
+    let (columns, mut row_numbers) = columns.split();
     let (before_readings, mut said, mut named_before) = (before_readings(&columns), None, None);
-    let numbers_alone: Vec<Value> =
-        columns.iter().filter(|column| column.kind != ColumnKind::Word).map(|column| column.value).collect();
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(destination, named)?;
     table.reserve(log.known_rows(&options.shifts));
@@ -157,18 +163,18 @@ pub fn estimate(
     let max_drawn = if options.with_page { MAX_DRAWN } else { 0 };
     let mut write = |step: &LogStep, filtered: &Filtered| {
         let (time_s, row) = (step.time_s, Row { car, numbers: &numbers, places: &places, step, filtered });
-        let same = Same {
-            readings: said.replace(row.said()) == Some(row.said()),
-            others: named_before.replace(row.named()) == Some(row.named()),
-        };
+        let now = (row.said(), row.named());
+        let same =
+            Same { readings: said.replace(now.0) == Some(now.0), others: named_before.replace(now.1) == Some(now.1) };
+        row_numbers.take(&row);
         // In memory words that stay the same are counted and not written.
         if let (Output::Memory(writer), true) = (&mut table, same.readings && same.others) {
-            writer.numbers(time_s, numbers_alone.iter().map(|value| value.number(&row)));
+            writer.numbers(time_s, row_numbers.chosen());
             return Ok(());
         }
         let new = if same.readings { &columns[..before_readings] } else { &columns[..] };
         let rest = (new.len() < columns.len()).then_some(Cell::SameWords);
-        table.cells(time_s, new.iter().map(|column| column.cell(&row, same)).chain(rest))?;
+        table.cells(time_s, new.iter().map(|column| column.cell(&row, &row_numbers, same)).chain(rest))?;
         if options.is_followed() { table.flush() } else { Ok(()) }
     };
     let read = || {
