@@ -10,6 +10,7 @@ use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
 
 use super::check::{Check, CheckedRow};
+use super::pressing::Pressing;
 
 /// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.
 const STEADY_S: f64 = 1.0;
@@ -23,12 +24,7 @@ const ENOUGH: u64 = 100;
 /// What the commands of a log say of each gear.
 pub(crate) struct CommandCheck<'c> {
     car: &'c Car,
-    /// Element of the gearbox and place in the filter's tables.
-    places: Vec<(usize, usize)>,
-    /// Pressures by the valve model, Pa, below which an element presses by no means, and above which it does, by their place.
-    limits_pa: Vec<[f64; 2]>,
-    /// Whether a command of each has come.
-    heard: [bool; MAX_ELEMENTS],
+    pressing: Pressing,
     gear: Option<Gear>,
     since_s: f64,
     of_gears: Vec<OfGear>,
@@ -45,22 +41,8 @@ struct OfGear {
 
 impl<'c> CommandCheck<'c> {
     pub(crate) fn new(car: &'c Car, tables: &ShiftTables<f64>, budget: &ErrorBudget) -> Self {
-        let places = (0..car.gearbox.elements.len()).filter_map(|element| Some((element, tables.place(element)?)));
-        let places: Vec<(usize, usize)> = places.collect();
-        let mut limits_pa = vec![[f64::NEG_INFINITY, f64::INFINITY]; places.len()];
-        for &(element, place) in &places {
-            let (Some(errors), Some(limits_pa)) = (budget.element(element), limits_pa.get_mut(place)) else { continue };
-            let of_tables = &tables.tables().elements[place];
-            let kiss_pa = of_tables.clutch.kiss_pressure();
-            let by_command_pa = errors.by_command_pa(&of_tables.valve.valve, kiss_pa);
-            let ([weakest, strongest], hysteresis_pa) = (errors.valve_gain_factor, errors.valve_hysteresis_pa);
-            *limits_pa = [
-                (kiss_pa - hysteresis_pa) / strongest - by_command_pa,
-                (kiss_pa + hysteresis_pa) / weakest + by_command_pa,
-            ];
-        }
         let of_gears = vec![OfGear::default(); car.gearbox.gears.len()];
-        Self { car, places, limits_pa, heard: [false; MAX_ELEMENTS], gear: None, since_s: f64::NAN, of_gears }
+        Self { car, pressing: Pressing::new(car, tables, budget), gear: None, since_s: f64::NAN, of_gears }
     }
 
     /// The gear in which the most rows contradict the command of this element, in a sentence.
@@ -76,7 +58,7 @@ impl<'c> CommandCheck<'c> {
         let gear = gears.max_by_key(|gear| self.of_gears[*gear].opens[place])?;
         let OfGear { rows, opens, presses } = &self.of_gears[gear];
         let name = |element: usize| self.car.gearbox.elements[element].name.as_str();
-        let others = self.places.iter().filter(|(other, at)| !holds(gear, *other) && 2 * presses[*at] > *rows);
+        let others = self.pressing.places().iter().filter(|(other, at)| !holds(gear, *other) && 2 * presses[*at] > *rows);
         let others: Vec<&str> = others.map(|(other, _)| name(*other)).collect();
         let what = match others.as_slice() {
             [] => "; its channel may be another signal, or its valve may work the other way round".to_owned(),
@@ -100,11 +82,9 @@ impl<'c> CommandCheck<'c> {
 
 impl Check for CommandCheck<'_> {
     fn row(&mut self, row: &CheckedRow<'_>) {
-        let (time_s, valve_pa) = (row.step.time_s, &row.estimate.valve_pa);
+        let time_s = row.step.time_s;
         let gear = Some(row.step.input.gear).filter(|gear| gear.is_steady()).map(|gear| gear.from);
-        for (heard, command) in self.heard.iter_mut().zip(&row.step.input.commands) {
-            *heard |= command.is_some();
-        }
+        self.pressing.push(row);
         let [_, turbine, output] = row.came_rad_s;
         let ratio = gear.and_then(|gear| self.car.ratio(gear)).unwrap_or(f64::NAN);
         let in_gear = ratio * output;
@@ -116,14 +96,14 @@ impl Check for CommandCheck<'_> {
         let place = gear.and_then(Gear::place).filter(|_| is_steady);
         let Some(of_gear) = place.and_then(|place| self.of_gears.get_mut(place)) else { return };
         of_gear.rows += 1;
-        let limits_pa = self.limits_pa.iter().zip(valve_pa).enumerate().filter(|(place, _)| self.heard[*place]);
-        for (place, ([opens_pa, presses_pa], valve_pa)) in limits_pa {
-            of_gear.opens[place] += u64::from(valve_pa < opens_pa);
-            of_gear.presses[place] += u64::from(valve_pa > presses_pa);
+        for &(_, place) in self.pressing.places() {
+            let presses = self.pressing.at(place, row);
+            of_gear.opens[place] += u64::from(presses == Some(false));
+            of_gear.presses[place] += u64::from(presses == Some(true));
         }
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.places.iter().filter_map(|&(element, place)| self.warning(element, place)).collect()
+        self.pressing.places().iter().filter_map(|&(element, place)| self.warning(element, place)).collect()
     }
 }

@@ -9,7 +9,7 @@ use crate::LogStep;
 
 /// Speed of the output by any of the speeds from which on the ratio of a gear is compared with the speeds, rad/s, and fraction by which they
 /// may differ.
-const RATIO_FROM_RAD_S: f64 = 20.0;
+pub(super) const RATIO_FROM_RAD_S: f64 = 20.0;
 const RATIO_FRACTION: f64 = 0.1;
 /// Output speed above which the car moves where the turbine is at speed, rad/s \[chosen\]: a slow walk.
 const MOVES_RAD_S: f64 = 5.0;

@@ -15,6 +15,7 @@ mod lock_up_check;
 mod open_loop;
 mod other_shifts;
 mod polled_speeds;
+mod pressing;
 pub mod ratio_histogram;
 mod ratio_scale;
 mod refused_commands;
@@ -102,7 +103,7 @@ impl<'c> Checks<'c> {
             failed: FailedSpeeds::default(),
             unannounced: UnannouncedShifts::new(car),
             acceleration: UnusedAcceleration::default(),
-            slipping: SlippingElements::new(car),
+            slipping: SlippingElements::new(car, tables, budget),
             torques: ClutchTorques::new(car),
             scales: Scales::new(car),
         }

@@ -3,16 +3,21 @@
 //! A clutch that slips takes power: the turbine turns faster than in the gear while it drives, and slower while the car drives it; one that is open
 //! leaves the turbine without torque. Which element it is, the speeds of turbine and output alone do not show; the gears do. It is engaged in every
 //! gear that slips, and it has held no more than in a slip. Where the speeds of a gear are those of another one, elements hold that are not
-//! commanded.
+//! commanded. A shift whose commands have been those of its new gear for long counts as that gear: a clutch that does not open or close is no reason
+//! for the shift controller to end it.
 
-use car::Car;
-use observer::{Health, Reading};
+use car::{Car, ErrorBudget};
+use observer::{Health, Reading, ShiftTables};
 
 use super::check::{Check, CheckedRow};
+use super::in_gear::RATIO_FROM_RAD_S;
+use super::pressing::Pressing;
 use super::ratio_histogram::RatioHistogram;
 
 /// A gear counts after so long, s, and a slip after so long, s \[chosen\]: gear signals come late, and a reading may be wrong.
 const STEADY_S: f64 = 1.0;
+/// The same of the commands of a gear in a shift to it \[chosen\]: an inertia phase takes up to 1 s.
+const COMMANDED_S: f64 = 2.0;
 const LASTS_S: f64 = 0.3;
 /// Fraction of the turbine speed in the gear and slip beside it, rad/s, up to which the gear holds, and above which it slips \[chosen\].
 const HOLDS: (f64, f64) = (0.02, 2.0);
@@ -49,7 +54,9 @@ struct Slipping {
 /// What the log shows so far.
 pub(crate) struct SlippingElements<'c> {
     car: &'c Car,
-    gear: Option<usize>,
+    pressing: Pressing,
+    /// The gear, and whether the commands alone are those of it, in a shift.
+    gear: Option<(usize, bool)>,
     /// Since when the gear is this one, and since when it holds, s.
     since_s: f64,
     holds_since_s: Option<f64>,
@@ -65,10 +72,11 @@ pub(crate) struct SlippingElements<'c> {
 }
 
 impl<'c> SlippingElements<'c> {
-    pub(super) fn new(car: &'c Car) -> Self {
+    pub(super) fn new(car: &'c Car, tables: &ShiftTables<f64>, budget: &ErrorBudget) -> Self {
         let elements = car.gearbox.elements.len();
         Self {
             car,
+            pressing: Pressing::new(car, tables, budget),
             gear: None,
             since_s: f64::NAN,
             holds_since_s: None,
@@ -90,6 +98,27 @@ impl<'c> SlippingElements<'c> {
             _ => self.reported_n_m?,
         };
         torque_n_m.is_finite().then_some(torque_n_m)
+    }
+
+    /// The gear to which a shift goes, if the commands of a row are those of it: what it engages presses, and what it opens does not.
+    fn commanded(&self, row: &CheckedRow<'_>) -> Option<usize> {
+        let gears = row.step.input.gear;
+        let (from, to) = (gears.from.place()?, gears.to.place()?);
+        let has_plates = |element: &usize| self.car.clutches.get(*element).is_some_and(Option::is_some);
+        let mut all = (0..self.car.gearbox.elements.len()).filter(has_plates);
+        let is_of_gear = all.all(|element| match [from, to].map(|gear| self.engages(gear, element)) {
+            [_, true] => self.pressing.of(element, row) == Some(true),
+            [true, false] => self.pressing.of(element, row) == Some(false),
+            [false, false] => true,
+        });
+        is_of_gear.then_some(to)
+    }
+
+    /// Whether turbine and output speed of a row in a shift are fast enough to be compared with those of this gear.
+    fn is_compared(&self, row: &CheckedRow<'_>, gear: usize) -> bool {
+        let [_, turbine, output] = row.came_rad_s;
+        let by_turbine = turbine / self.car.gearbox.gears[gear].ratio;
+        output.max(by_turbine) > RATIO_FROM_RAD_S && !(turbine + output).is_nan()
     }
 
     /// Takes a row in a steady gear.
@@ -231,6 +260,13 @@ impl<'c> SlippingElements<'c> {
         elements.filter(|element| self.engages(gear, *element) && !self.engages(other, *element)).collect()
     }
 
+    /// Whether an element that holds without its command in all of these pairs is open in a gear: then that cannot but slip.
+    fn is_held_open(&self, gear: usize, pairs: &[[usize; 2]]) -> bool {
+        let holds = |element: &usize| pairs.iter().all(|[gear, other]| self.only_in(*other, *gear).contains(element));
+        let elements = 0..self.car.gearbox.elements.len();
+        !pairs.is_empty() && elements.into_iter().any(|element| holds(&element) && !self.engages(gear, element))
+    }
+
     /// The gears that are others, in a sentence.
     fn of_others(&self, pairs: &[[usize; 2]]) -> Option<String> {
         let changed: Vec<[Vec<usize>; 2]> =
@@ -281,7 +317,11 @@ impl Check for SlippingElements<'_> {
         let input = &row.step.input;
         let reported = row.step.reported_n_m.or(input.engine_n_m).map(|Reading { value, .. }| value);
         self.reported_n_m = reported.filter(|value| value.is_finite()).or(self.reported_n_m);
-        let gear = Some(input.gear).filter(|gear| gear.is_steady()).and_then(|gear| gear.from.place());
+        self.pressing.push(row);
+        let gear = match input.gear.is_steady() {
+            true => input.gear.from.place().map(|gear| (gear, false)),
+            false => self.commanded(row).map(|gear| (gear, true)),
+        };
         if gear != self.gear || row.is_hole {
             (self.gear, self.since_s) = (gear, row.step.time_s);
             self.pause();
@@ -289,16 +329,20 @@ impl Check for SlippingElements<'_> {
         let channels = &row.estimate.channels;
         let is_free = matches!(row.estimate.health, Health::ClutchOpen | Health::OneWayOverruns | Health::TooSlow);
         let is_read = !row.has_ended && !channels.turbine.is_refused() && !channels.output.is_refused();
-        let is_steady = row.step.time_s - self.since_s >= STEADY_S;
-        let in_gear = row.in_gear.as_ref().filter(|of| of.is_compared && is_read && is_steady && !is_free);
-        match in_gear {
-            Some(in_gear) => self.in_gear(row, in_gear.gear),
+        let (steady_s, is_compared) = match gear {
+            Some((gear, true)) => (COMMANDED_S, self.is_compared(row, gear)),
+            _ => (STEADY_S, row.in_gear.as_ref().is_some_and(|of| of.is_compared)),
+        };
+        let is_steady = row.step.time_s - self.since_s >= steady_s;
+        match gear.filter(|_| is_compared && is_read && is_steady && !is_free) {
+            Some((gear, _)) => self.in_gear(row, gear),
             None => self.pause(),
         }
     }
 
     fn warnings(&self) -> Vec<String> {
-        let (slipping, others) = self.found();
+        let (mut slipping, others) = self.found();
+        slipping.retain(|gear| !self.is_held_open(*gear, &others));
         self.of_slip(&slipping).into_iter().chain(self.of_others(&others)).collect()
     }
 }
