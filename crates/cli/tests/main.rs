@@ -56,5 +56,6 @@ mod support;
 mod tables;
 mod units;
 mod watch;
+mod whole_drives;
 mod write_map;
 mod wrong_maps;

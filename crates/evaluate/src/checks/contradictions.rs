@@ -58,7 +58,8 @@ impl<'c> CommandCheck<'c> {
         let gear = gears.max_by_key(|gear| self.of_gears[*gear].opens[place])?;
         let OfGear { rows, opens, presses } = &self.of_gears[gear];
         let name = |element: usize| self.car.gearbox.elements[element].name.as_str();
-        let others = self.pressing.places().iter().filter(|(other, at)| !holds(gear, *other) && 2 * presses[*at] > *rows);
+        let others =
+            self.pressing.places().iter().filter(|(other, at)| !holds(gear, *other) && 2 * presses[*at] > *rows);
         let others: Vec<&str> = others.map(|(other, _)| name(*other)).collect();
         let what = match others.as_slice() {
             [] => "; its channel may be another signal, or its valve may work the other way round".to_owned(),

@@ -271,7 +271,9 @@ impl<'c> SlippingElements<'c> {
     fn of_others(&self, pairs: &[[usize; 2]]) -> Option<String> {
         let changed: Vec<[Vec<usize>; 2]> =
             pairs.iter().map(|[gear, other]| [self.only_in(*gear, *other), self.only_in(*other, *gear)]).collect();
-        let [off, on] = changed.first()?;
+        let is_swapped = |[off, on]: &&[Vec<usize>; 2]| changed.iter().any(|pair| pair[0] == *on && pair[1] == *off);
+        let swapped = changed.iter().find(is_swapped);
+        let [off, on] = swapped.or(changed.first())?;
         let which = pairs.iter().map(|[gear, other]| {
             format!("those of gear {1} in gear {0}", self.gear_names(&[*gear]), self.gear_names(&[*other]))
         });
@@ -283,10 +285,9 @@ impl<'c> SlippingElements<'c> {
         let holds_not = |of: &[usize]| if many(of) { "do not hold" } else { "does not hold" };
         let its_command = |of: &[usize]| if many(of) { "their commands" } else { "its command" };
         let its_valve = |of: &[usize]| if many(of) { "their valves are stuck" } else { "its valve is stuck" };
-        let is_swapped = changed.iter().any(|pair| pair[0] == *on && pair[1] == *off);
         let same_on = changed.iter().all(|pair| pair[1] == *on);
         let same_off = changed.iter().all(|pair| pair[0] == *off);
-        let cause = if is_swapped {
+        let cause = if swapped.is_some() {
             format!(
                 "{} and {} hold in each other's place: their valves or connectors are swapped",
                 names(off),

@@ -132,7 +132,8 @@ impl<T: Real> Gaussian<T> {
         }
     }
 
-    /// Makes a state independent of the others, with this mean and variance.
+    /// Makes a state independent of the others, with this mean and variance. Out of line, as others that many places call: it saves code.
+    #[inline(never)]
     pub(super) fn renew(&mut self, state: usize, mean: T, variance: T) {
         let state = state.min(N - 1);
         for k in 0..N {
@@ -291,6 +292,7 @@ impl<T: Real> Gaussian<T> {
     }
 
     /// Whether all are numbers, and no variance is negative.
+    #[inline(never)]
     pub(super) fn is_sound(&self) -> bool {
         let states = self.covariance.iter().zip(&self.mean).enumerate().take(self.active);
         // What is no number, or infinite, makes a sum so.

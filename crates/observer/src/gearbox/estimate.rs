@@ -99,6 +99,31 @@ impl<T: Real> ShiftEstimate<T> {
     }
 }
 
+/// Limits the torques by the valve models of clutches whose readings show no slip: such a clutch carries what the other one leaves of the load of
+/// both at the turbine, N m, and two of them share it as they could hold it.
+fn limit_to_load<T: Real>(
+    clutches: &mut [ClutchEstimate<T>; 2],
+    shift: &ShiftRow<T>,
+    slips: &[Slip<T>; 2],
+    load_n_m: T,
+) {
+    let alpha = shift.clutches.each_ref().map(|clutch| clutch.alpha);
+    let at_turbine_n_m: [T; 2] = core::array::from_fn(|c| alpha[c] * clutches[c].torque_n_m);
+    let holds: [bool; 2] = core::array::from_fn(|c| !slips[c].is_over() && shift.clutches[c].has_pressure());
+    let [off_n_m, on_n_m] = at_turbine_n_m.map(T::abs);
+    let both_n_m = off_n_m + on_n_m;
+    for c in 0..2 {
+        let (other, can_n_m) = (1 - c, at_turbine_n_m[c].abs());
+        let carries_n_m = match holds {
+            [true, true] if both_n_m > T::zero() => load_n_m * can_n_m / both_n_m,
+            _ => load_n_m - at_turbine_n_m[other],
+        };
+        if holds[c] {
+            clutches[c].torque_n_m = carries_n_m.at_least(-can_n_m).at_most(can_n_m) / alpha[c];
+        }
+    }
+}
+
 impl<T: Real> GearboxFilter<'_, T> {
     pub(super) fn conclude(
         &self,
@@ -176,19 +201,25 @@ impl<T: Real> GearboxFilter<'_, T> {
                     health = without;
                 }
                 let (then, is_read) = (self.measured(&state.newest, None), self.are_read(&state.newest));
-                estimate.clutches = shift.map(|shift| {
+                let clutches = shift.map(|shift| {
                     let learnt = state.learnt.known_mean(&self.acting(shift));
-                    [0, 1].map(|c: usize| {
-                        let c = c.min(1);
-                        let clutch = &shift.clutches[c];
+                    let slips = shift.clutches.each_ref().map(|clutch| self.slip(clutch.ratio, then));
+                    let mut clutches = [0, 1].map(|c: usize| {
+                        let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
                         let lasting = [learnt[c], learnt[c + 2]];
-                        let slip = self.slip(clutch.ratio, then);
-                        let direction = Self::direction_by_valve(is_read, &slip, turbine_n_m);
-                        let estimate = self.by_valve(&state.elements, clutch, [slip.value, direction], lasting);
+                        let direction = Self::direction_by_valve(is_read, &slips[c], turbine_n_m);
+                        self.by_valve(&state.elements, clutch, [slips[c].value, direction], lasting)
+                    });
+                    if let Some(turbine_n_m) = turbine_n_m.filter(|_| is_read) {
+                        limit_to_load(&mut clutches, shift, &slips, turbine_n_m - Self::inertia_n_m(state, shift));
+                    }
+                    [0, 1].map(|c: usize| {
+                        let (estimate, clutch) = (clutches[c.min(1)], &shift.clutches[c.min(1)]);
                         let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
                         self.in_range(estimate, &state.elements, (clutch, is_tied), &state.newest)
                     })
                 });
+                state.estimate.clutches = clutches;
             }
         }
         state.estimate.health = health;

@@ -18,6 +18,7 @@ const INERTIA_ACTS: usize = 4;
 
 impl<T: Real> Running<T> {
     /// The states of a shift, as they are where there is none.
+    #[inline(never)]
     pub(super) fn renew_shift(&mut self) {
         for state in IN_GEAR..N {
             self.x.renew(state, T::zero(), T::one());

@@ -366,6 +366,7 @@ impl<'a, T: Real> GearboxTables<'a, T> {
     }
 
     /// The shift that is commanded, if it is one between two known elements; `None` in a gear.
+    #[inline(never)]
     pub fn commanded(&self, command: ShiftCommand) -> Option<&ShiftRow<T>> {
         if command.is_steady() {
             return None;

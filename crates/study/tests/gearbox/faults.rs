@@ -130,6 +130,26 @@ fn valves_that_are_swapped_or_stuck_closed_are_named() {
     assert!(stuck.iter().any(|warning| warning.contains("B holds without")), "{stuck:?}");
 }
 
+/// A clutch that stays closed fights the oncoming one, and the shift controller waits for a gear that does not come.
+#[test]
+fn a_valve_that_is_stuck_closed_shows_in_shifts_that_do_not_end() {
+    let (mut cases, mut shown, mut named) = (0, 0, 0);
+    for car in cars().into_iter().take(4) {
+        let elements = car.gearbox.elements.iter().zip(&car.clutches);
+        for (element, clutch) in elements.filter_map(|(element, clutch)| Some((element.name.clone(), clutch.as_ref()?)))
+        {
+            let command = Some(clutch.valve.command_for(car.line_pressure_pa));
+            let said = said(&car, &car, Some(FaultKind::StuckSolenoid { element: element.clone(), command }));
+            println!("{} {element}: {said:?}", car.gearbox.name);
+            let is_named = said.iter().any(|warning| warning.contains(&format!(" {element} holds without")));
+            (cases, shown, named) = (cases + 1, shown + usize::from(!said.is_empty()), named + usize::from(is_named));
+        }
+    }
+    println!("{shown} of {cases} shown, {named} named");
+    // Others lock the gearbox and stop the car, or are engaged in all gears of the drive.
+    assert!(2 * shown >= cases && 5 * named >= 2 * cases, "{shown} {named} {cases}");
+}
+
 /// The elements with the largest torques for their size slip; it may be one alone.
 #[test]
 fn a_low_line_pressure_is_seen_as_elements_that_slip() {

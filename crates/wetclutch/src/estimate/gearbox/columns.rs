@@ -206,7 +206,8 @@ fn of_clutch(clutch: &ClutchEstimate<f64>) -> [f64; CLUTCH.len()] {
     if !clutch.element.has_pressure() {
         return [none, none, none, torque_n_m + 0.0, none, none, none, none, none, none, std_dev_n_m + 0.0];
     }
-    let [pressure, torque] = [clutch.pressure_range_pa, clutch.torque_range_n_m].map(|range| range.unwrap_or([none; 2]));
+    let [pressure, torque] =
+        [clutch.pressure_range_pa, clutch.torque_range_n_m].map(|range| range.unwrap_or([none; 2]));
     let hidden = f64::from(u8::from(clutch.hidden));
     [
         clutch.pressure_pa,
@@ -407,8 +408,7 @@ fn readings(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
     let command = |(place, name): &(usize, &str)| {
         Column::word(format!("{}_{COMMAND_READING}", element_column(name)), Value::Command(*place))
     };
-    let acceleration =
-        knows.acceleration.then(|| Column::word(ACCELERATION_READING, Value::Reading(READINGS.len())));
+    let acceleration = knows.acceleration.then(|| Column::word(ACCELERATION_READING, Value::Reading(READINGS.len())));
     channels.chain(acceleration).chain(places.iter().map(command)).collect()
 }
 
