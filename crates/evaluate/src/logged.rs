@@ -72,7 +72,7 @@ impl<'c> LoggedDrive<'c> {
 
     /// The drive.
     pub fn finish(self) -> ScoredDrive {
-        let found = self.filter.not_as_stated(self.shifts.car());
+        let found = self.filter.not_as_stated(&self.shifts);
         self.shifts.finish(found)
     }
 }
@@ -116,8 +116,9 @@ impl<'c> LoggedFilter<'c> {
     }
 
     /// Readings that are not as is stated, in sentences: late ones, and speeds that do not have the ratios of the gears.
-    fn not_as_stated(&self, car: &Car) -> Vec<String> {
-        let gears = car.gearbox.gears.iter().enumerate();
+    fn not_as_stated(&self, shifts: &LoggedShifts<'_>) -> Vec<String> {
+        // In a gear that slips the speeds have no ratio.
+        let gears = shifts.car().gearbox.gears.iter().enumerate().filter(|(place, _)| !shifts.slips_in(*place));
         let ratios = gears.filter_map(|(place, gear)| Some((gear.name.as_str(), self.state.ratio_error(place)?)));
         let speeds = late_speeds::warnings(self.state.speeds_late_s(), self.filter.longest_found_s());
         let acceleration = late_speeds::acceleration_warning(self.state.acceleration_late_s());

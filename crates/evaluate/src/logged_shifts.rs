@@ -197,6 +197,11 @@ impl<'c> LoggedShifts<'c> {
         self.checks.slipping.is_found()
     }
 
+    /// Whether an element of a gear, by its place in the gearbox, slips there or does not open.
+    pub(crate) fn slips_in(&self, gear: usize) -> bool {
+        self.checks.slipping.is_found_in(gear)
+    }
+
     /// Output over wheel speed in a gear at speed, in the middle; not a number where too few rows have both.
     pub fn output_over_wheel(&self) -> f64 {
         self.checks.scales.output_over_wheel()

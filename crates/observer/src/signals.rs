@@ -156,7 +156,8 @@ pub enum Health {
     /// The pressure of the observer is below zero or above the highest pressure of the supply: the estimate is that
     /// limit.
     PressureLimited,
-    /// The gearbox output turns too slowly for its readings to be used: the estimate is from the valve model alone.
+    /// The gearbox output turns too slowly for its readings to be used: the estimate is from the valve model alone; that of the gearbox filter also
+    /// from the load of a clutch that does not slip.
     TooSlow,
     /// No gear drives the car, and none has to: neutral, or the clutch of a car without a converter is open, or slips at a launch. The
     /// estimate is from the valve model alone.

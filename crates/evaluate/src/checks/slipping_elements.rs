@@ -57,7 +57,7 @@ pub(crate) struct SlippingElements<'c> {
     pressing: Pressing,
     /// The gear, and whether the commands alone are those of it, in a shift.
     gear: Option<(usize, bool)>,
-    /// Since when the gear is this one, and since when it holds, s.
+    /// Since when it is this gear or the commands are those of it, and since when it holds, s.
     since_s: f64,
     holds_since_s: Option<f64>,
     slipping: Option<Slipping>,
@@ -100,28 +100,37 @@ impl<'c> SlippingElements<'c> {
         torque_n_m.is_finite().then_some(torque_n_m)
     }
 
-    /// The gear to which a shift goes, if the commands of a row are those of it: what it engages presses, and what it opens does not.
+    /// The gear to which a shift goes, if the commands of a row are those of it: what it engages presses, what it opens does not, and nothing else
+    /// does. At least one of these changes in the shift.
     fn commanded(&self, row: &CheckedRow<'_>) -> Option<usize> {
         let gears = row.step.input.gear;
         let (from, to) = (gears.from.place()?, gears.to.place()?);
         let has_plates = |element: &usize| self.car.clutches.get(*element).is_some_and(Option::is_some);
+        let mut changes = false;
         let mut all = (0..self.car.gearbox.elements.len()).filter(has_plates);
-        let is_of_gear = all.all(|element| match [from, to].map(|gear| self.engages(gear, element)) {
-            [_, true] => self.pressing.of(element, row) == Some(true),
-            [true, false] => self.pressing.of(element, row) == Some(false),
-            [false, false] => true,
+        let is_of_gear = all.all(|element| {
+            let (engaged, presses) =
+                ([from, to].map(|gear| self.engages(gear, element)), self.pressing.of(element, row));
+            changes |= engaged[0] != engaged[1];
+            match engaged {
+                [_, true] => presses == Some(true),
+                [true, false] => presses == Some(false),
+                [false, false] => presses != Some(true),
+            }
         });
-        is_of_gear.then_some(to)
+        (is_of_gear && changes).then_some(to)
     }
 
     /// Whether turbine and output speed of a row in a shift are fast enough to be compared with those of this gear.
     fn is_compared(&self, row: &CheckedRow<'_>, gear: usize) -> bool {
         let [_, turbine, output] = row.came_rad_s;
-        let by_turbine = turbine / self.car.gearbox.gears[gear].ratio;
+        // Without a converter the turbine turns with the engine at a standstill.
+        let has_converter = self.car.converter.is_some();
+        let by_turbine = if has_converter { turbine / self.car.gearbox.gears[gear].ratio } else { f64::NAN };
         output.max(by_turbine) > RATIO_FROM_RAD_S && !(turbine + output).is_nan()
     }
 
-    /// Takes a row in a steady gear.
+    /// Takes a row in a gear, or with the commands of one.
     fn in_gear(&mut self, row: &CheckedRow<'_>, gear: usize) {
         let (car, [_, turbine, output]) = (self.car, row.came_rad_s);
         let in_gear = car.gearbox.gears[gear].ratio * output;
@@ -208,6 +217,12 @@ impl<'c> SlippingElements<'c> {
         (slipping, others)
     }
 
+    /// Whether a gear slips, or its speeds are those of another one.
+    pub(crate) fn is_found_in(&self, gear: usize) -> bool {
+        let (slipping, others) = self.found();
+        slipping.contains(&gear) || others.iter().any(|[of, _]| *of == gear)
+    }
+
     /// Whether the log shows an element that does not hold where it should.
     pub(crate) fn is_found(&self) -> bool {
         let (slipping, others) = self.found();
@@ -260,11 +275,11 @@ impl<'c> SlippingElements<'c> {
         elements.filter(|element| self.engages(gear, *element) && !self.engages(other, *element)).collect()
     }
 
-    /// Whether an element that holds without its command in all of these pairs is open in a gear: then that cannot but slip.
-    fn is_held_open(&self, gear: usize, pairs: &[[usize; 2]]) -> bool {
-        let holds = |element: &usize| pairs.iter().all(|[gear, other]| self.only_in(*other, *gear).contains(element));
-        let elements = 0..self.car.gearbox.elements.len();
-        !pairs.is_empty() && elements.into_iter().any(|element| holds(&element) && !self.engages(gear, element))
+    /// Whether the elements that hold without their commands in several of these pairs are open in a gear: then that cannot but slip.
+    fn is_held(&self, gear: usize, pairs: &[[usize; 2]]) -> bool {
+        let mut all = pairs.iter().map(|[gear, other]| self.only_in(*other, *gear));
+        let Some(held) = all.next().filter(|held| !held.is_empty() && pairs.len() > 1) else { return false };
+        all.all(|other| other == held) && held.iter().all(|element| !self.engages(gear, *element))
     }
 
     /// The gears that are others, in a sentence.
@@ -343,7 +358,7 @@ impl Check for SlippingElements<'_> {
 
     fn warnings(&self) -> Vec<String> {
         let (mut slipping, others) = self.found();
-        slipping.retain(|gear| !self.is_held_open(*gear, &others));
+        slipping.retain(|gear| !self.is_held(*gear, &others));
         self.of_slip(&slipping).into_iter().chain(self.of_others(&others)).collect()
     }
 }

@@ -104,7 +104,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// Whether the newest reading of the output speed is too slow to be used.
-    fn is_slow(&self, state: &GearboxState<T>) -> bool {
+    pub(super) fn is_slow(&self, state: &GearboxState<T>) -> bool {
         let newest = state.newest[OUTPUT].filter(|newest| newest.age_s <= T::of(LOST_S));
         newest.is_some_and(|newest| newest.value.abs() <= self.uncertainty.output_least_rad_s)
     }

@@ -132,7 +132,7 @@ impl<T: Real> Gaussian<T> {
         }
     }
 
-    /// Makes a state independent of the others, with this mean and variance. Out of line, as others that many places call: it saves code.
+    /// Makes a state independent of the others, with this mean and variance. Not inlined: many places call it.
     #[inline(never)]
     pub(super) fn renew(&mut self, state: usize, mean: T, variance: T) {
         let state = state.min(N - 1);

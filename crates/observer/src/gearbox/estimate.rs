@@ -6,6 +6,7 @@ use drivetrain::Real;
 use super::elements::{ElementState, PressureError};
 use super::phases::Slip;
 use super::powertrain::{ClutchTorque, Torques};
+use super::turbine::MIN_N_M;
 use super::{
     ClutchesAtTurbine, FRACTION, FRICTION, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS, N, Newest,
     OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftElement, ShiftInput, ShiftPhase, ShiftRow,
@@ -80,6 +81,9 @@ pub struct ShiftEstimate<T> {
     pub commands: [ChannelHealth; MAX_ELEMENTS],
 }
 
+/// Standard deviation of the part of a load that one of two clutches has, which hold both.
+const SHARED: f64 = 0.29;
+
 impl<T: Real> ShiftEstimate<T> {
     pub(super) fn nothing() -> Self {
         Self {
@@ -99,27 +103,32 @@ impl<T: Real> ShiftEstimate<T> {
     }
 }
 
-/// Limits the torques by the valve models of clutches whose readings show no slip: such a clutch carries what the other one leaves of the load of
-/// both at the turbine, N m, and two of them share it as they could hold it.
+/// Limits the torques by the valve models of clutches that hold, as the readings show no slip: such a clutch carries what the other one leaves of the load of
+/// both at the turbine, N m, which is given with its standard deviation; two of them share it as they could hold it. The drag of other plates is left
+/// out.
 fn limit_to_load<T: Real>(
     clutches: &mut [ClutchEstimate<T>; 2],
     shift: &ShiftRow<T>,
-    slips: &[Slip<T>; 2],
-    load_n_m: T,
+    holds: [bool; 2],
+    [load_n_m, std_dev_n_m]: [T; 2],
 ) {
     let alpha = shift.clutches.each_ref().map(|clutch| clutch.alpha);
     let at_turbine_n_m: [T; 2] = core::array::from_fn(|c| alpha[c] * clutches[c].torque_n_m);
-    let holds: [bool; 2] = core::array::from_fn(|c| !slips[c].is_over() && shift.clutches[c].has_pressure());
+    let holds: [bool; 2] = core::array::from_fn(|c| holds[c] && shift.clutches[c].has_pressure());
     let [off_n_m, on_n_m] = at_turbine_n_m.map(T::abs);
     let both_n_m = off_n_m + on_n_m;
     for c in 0..2 {
         let (other, can_n_m) = (1 - c, at_turbine_n_m[c].abs());
-        let carries_n_m = match holds {
-            [true, true] if both_n_m > T::zero() => load_n_m * can_n_m / both_n_m,
-            _ => load_n_m - at_turbine_n_m[other],
+        let (carries_n_m, shared_n_m) = match holds {
+            [true, true] if both_n_m > T::zero() => (load_n_m * can_n_m / both_n_m, T::of(SHARED) * load_n_m.abs()),
+            _ => (load_n_m - at_turbine_n_m[other], T::zero()),
         };
-        if holds[c] {
-            clutches[c].torque_n_m = carries_n_m.at_least(-can_n_m).at_most(can_n_m) / alpha[c];
+        if holds[c] && carries_n_m.abs() < can_n_m {
+            let clutch = &mut clutches[c];
+            let is_against = shift.clutches[c].element.is_one_sided() && carries_n_m < T::zero();
+            clutch.torque_n_m = if is_against { T::zero() } else { carries_n_m / alpha[c] };
+            let std_dev_n_m = (square(std_dev_n_m) + square(shared_n_m)).sqrt() / alpha[c].abs();
+            (clutch.std_dev_n_m, clutch.hidden) = (clutch.std_dev_n_m.at_most(std_dev_n_m), false);
         }
     }
 }
@@ -200,26 +209,7 @@ impl<T: Real> GearboxFilter<'_, T> {
                 } else if health < Health::TooSlow {
                     health = without;
                 }
-                let (then, is_read) = (self.measured(&state.newest, None), self.are_read(&state.newest));
-                let clutches = shift.map(|shift| {
-                    let learnt = state.learnt.known_mean(&self.acting(shift));
-                    let slips = shift.clutches.each_ref().map(|clutch| self.slip(clutch.ratio, then));
-                    let mut clutches = [0, 1].map(|c: usize| {
-                        let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
-                        let lasting = [learnt[c], learnt[c + 2]];
-                        let direction = Self::direction_by_valve(is_read, &slips[c], turbine_n_m);
-                        self.by_valve(&state.elements, clutch, [slips[c].value, direction], lasting)
-                    });
-                    if let Some(turbine_n_m) = turbine_n_m.filter(|_| is_read) {
-                        limit_to_load(&mut clutches, shift, &slips, turbine_n_m - Self::inertia_n_m(state, shift));
-                    }
-                    [0, 1].map(|c: usize| {
-                        let (estimate, clutch) = (clutches[c.min(1)], &shift.clutches[c.min(1)]);
-                        let is_tied = !state.held_may_slip && shift.is_tied(c, since_s);
-                        self.in_range(estimate, &state.elements, (clutch, is_tied), &state.newest)
-                    })
-                });
-                state.estimate.clutches = clutches;
+                state.estimate.clutches = shift.map(|shift| self.by_valves(state, shift, turbine_n_m));
             }
         }
         state.estimate.health = health;
@@ -240,6 +230,18 @@ impl<T: Real> GearboxFilter<'_, T> {
             .and_then(|(memory, element)| memory.pressure_range_pa(element))
     }
 
+    /// Torque of both clutches of a shift together at the turbine, N m, and its standard deviation, by the rates of both speeds; none where one was
+    /// not read twice in a row.
+    fn load_of_both(&self, state: &GearboxState<T>, shift: &ShiftRow<T>, turbine_n_m: T) -> Option<[T; 2]> {
+        let ([by_turbine, by_output], (turbine, of_turbine), (output, of_output)) =
+            (shift.mass_kg_m2[0], self.rate(state, TURBINE)?, self.rate(state, OUTPUT)?);
+        let share = self.turbine.converter_share.max(self.turbine.engine_share);
+        let variance = square(share * turbine_n_m.abs().at_least(T::of(MIN_N_M)))
+            + square(by_turbine) * of_turbine
+            + square(by_output) * of_output;
+        Some([turbine_n_m - by_turbine * turbine - by_output * output, variance.sqrt()])
+    }
+
     /// Slip of the offgoing clutch away from the new gear, where the readings show one.
     fn flare(&self, shift: &ShiftRow<T>, speeds: [T; 2]) -> T {
         let [off, on] = shift.clutches.map(|clutch| clutch.ratio);
@@ -257,6 +259,38 @@ impl<T: Real> GearboxFilter<'_, T> {
             (None, false) => T::one(),
             _ => slip.direction(),
         }
+    }
+
+    /// Both clutches of a shift while the filter does not run.
+    #[inline(never)]
+    fn by_valves(
+        &self,
+        state: &GearboxState<T>,
+        shift: &ShiftRow<T>,
+        turbine_n_m: Option<T>,
+    ) -> [ClutchEstimate<T>; 2] {
+        let (_, since_s) = state.gears;
+        let (then, is_read) = (self.measured(&state.newest, None), self.are_read(&state.newest));
+        let learnt = state.learnt.known_mean(&self.acting(shift));
+        let slips = shift.clutches.each_ref().map(|clutch| self.slip(clutch.ratio, then));
+        let is_tied = |c: usize| !state.held_may_slip && shift.is_tied(c, since_s);
+        let load = turbine_n_m.filter(|_| is_read && self.is_slow(state) && !state.held_may_slip);
+        let load = load.and_then(|turbine_n_m| self.load_of_both(state, shift, turbine_n_m));
+        let driving_n_m = load.map(|[load_n_m, _]| load_n_m).or(turbine_n_m);
+        let mut clutches = [0, 1].map(|c: usize| {
+            let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
+            let lasting = [learnt[c], learnt[c + 2]];
+            let direction = Self::direction_by_valve(is_read, &slips[c], driving_n_m);
+            self.by_valve(&state.elements, clutch, [slips[c].value, direction], lasting)
+        });
+        if let Some(load) = load {
+            let holds = [0, 1].map(|c: usize| is_tied(c) && !slips[c.min(1)].is_over());
+            limit_to_load(&mut clutches, shift, holds, load);
+        }
+        [0, 1].map(|c: usize| {
+            let (estimate, clutch) = (clutches[c.min(1)], &shift.clutches[c.min(1)]);
+            self.in_range(estimate, &state.elements, (clutch, is_tied(c)), &state.newest)
+        })
     }
 
     /// A clutch by its valve model and what is learnt of it, where the speeds cannot be used; `slip` is the slip at the turbine and the

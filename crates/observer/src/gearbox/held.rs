@@ -83,7 +83,7 @@ impl<T: Real> GearboxFilter<'_, T> {
     }
 
     /// Torque of the turbine's inertia by the newest readings, N m.
-    pub(super) fn inertia_n_m(state: &GearboxState<T>, shift: &ShiftRow<T>) -> T {
+    fn inertia_n_m(state: &GearboxState<T>, shift: &ShiftRow<T>) -> T {
         let [turbine, output] = [&state.newest[TURBINE], &state.newest[OUTPUT]]
             .map(|newest| newest.and_then(|newest| newest.rate()).map_or(T::zero(), |(rate, _)| rate));
         let [by_turbine, by_output] = shift.mass_kg_m2[0];

@@ -86,6 +86,8 @@ fn a_clutch_whose_command_fails_is_told_by_the_speeds() {
                 Fault::Frozen if which == offgoing && clutch == 0 => 0.7 * by_valve[0],
                 // And one that closes to be open, until it grips or pulls.
                 Fault::Zero | Fault::Frozen => 1.2 * right[clutch] + 26.0,
+                // The launch of the dual clutch.
+                _ if at == 5 => 1.2 * right[clutch] + 24.5,
                 _ => 1.2 * right[clutch] + 14.0,
             };
             let is_within = [0, 1].iter().all(|&clutch| found[clutch] < limit(clutch));

@@ -142,6 +142,8 @@ fn a_valve_that_is_stuck_closed_shows_in_shifts_that_do_not_end() {
             let said = said(&car, &car, Some(FaultKind::StuckSolenoid { element: element.clone(), command }));
             println!("{} {element}: {said:?}", car.gearbox.name);
             let is_named = said.iter().any(|warning| warning.contains(&format!(" {element} holds without")));
+            let is_of_another = |warning: &&String| warning.contains(" holds without") && !is_named;
+            assert_eq!(said.iter().find(is_of_another), None, "{element}");
             (cases, shown, named) = (cases + 1, shown + usize::from(!said.is_empty()), named + usize::from(is_named));
         }
     }

@@ -227,8 +227,8 @@ fn of_clutch(clutch: &ClutchEstimate<f64>) -> [f64; CLUTCH.len()] {
 
 /// The numbers of a row.
 pub(crate) struct Numbers<'a> {
-    /// With how many columns each has.
-    sources: Vec<(Source<'a>, usize)>,
+    /// With how many columns each has, and whether the table has one of them.
+    sources: Vec<(Source<'a>, usize, bool)>,
     all: Vec<f64>,
     /// Whether the row before was of a shift, and its gears.
     before: Option<(bool, ShiftCommand)>,
@@ -244,14 +244,14 @@ impl Numbers<'_> {
         let is_without_shift = before.is_some_and(|(had_clutches, _)| !had_clutches) && !now.0;
         let is_in_same_gears = before.is_some_and(|(_, gears)| gears == now.1);
         let mut rest = self.all.as_mut_slice();
-        for (source, columns) in &self.sources {
+        for (source, columns, is_used) in &self.sources {
             let Some((numbers, behind)) = rest.split_at_mut_checked(*columns) else { return };
             let is_same = match source {
                 Source::Clutch(_) => is_without_shift,
                 Source::Gears => is_in_same_gears,
                 _ => false,
             };
-            if !is_same {
+            if *is_used && !is_same {
                 source.write(row, numbers);
             }
             rest = behind;
@@ -395,8 +395,15 @@ impl<'a> Columns<'a> {
     /// The columns, and the numbers of a row.
     pub(crate) fn split(self) -> (Vec<Column>, Numbers<'a>) {
         let place = |column: &Column| if let Value::Number(at) = column.value { Some(at) } else { None };
-        let chosen = self.all.iter().filter_map(place).collect();
-        (self.all, Numbers { sources: self.sources, all: vec![f64::NAN; self.numbers], before: None, chosen })
+        let chosen: Vec<usize> = self.all.iter().filter_map(place).collect();
+        let mut begin = 0;
+        let sources = self.sources.into_iter().map(|(source, columns)| {
+            let places = begin..begin + columns;
+            begin = places.end;
+            (source, columns, chosen.iter().any(|at| places.contains(at)))
+        });
+        let sources = sources.collect();
+        (self.all, Numbers { sources, all: vec![f64::NAN; self.numbers], before: None, chosen })
     }
 }
 
