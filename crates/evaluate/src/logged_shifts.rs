@@ -197,7 +197,7 @@ impl<'c> LoggedShifts<'c> {
         self.checks.slipping.is_found()
     }
 
-    /// Whether an element of a gear, by its place in the gearbox, slips there or does not open.
+    /// Whether a gear, by its place in the gearbox, slips, or its speeds are those of another one.
     pub(crate) fn slips_in(&self, gear: usize) -> bool {
         self.checks.slipping.is_found_in(gear)
     }

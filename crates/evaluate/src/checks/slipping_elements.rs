@@ -16,9 +16,9 @@ use super::ratio_histogram::RatioHistogram;
 
 /// A gear counts after so long, s, and a slip after so long, s \[chosen\]: gear signals come late, and a reading may be wrong.
 const STEADY_S: f64 = 1.0;
-/// The same of the commands of a gear in a shift to it \[chosen\]: an inertia phase takes up to 1 s.
-const COMMANDED_S: f64 = 2.0;
 const LASTS_S: f64 = 0.3;
+/// The commands of a gear in a shift to it count after so long, s \[chosen\]: an inertia phase takes up to 1 s.
+const COMMANDED_S: f64 = 2.0;
 /// Fraction of the turbine speed in the gear and slip beside it, rad/s, up to which the gear holds, and above which it slips \[chosen\].
 const HOLDS: (f64, f64) = (0.02, 2.0);
 const SLIPS: (f64, f64) = (0.04, 5.0);
@@ -275,7 +275,7 @@ impl<'c> SlippingElements<'c> {
         elements.filter(|element| self.engages(gear, *element) && !self.engages(other, *element)).collect()
     }
 
-    /// Whether the elements that hold without their commands in several of these pairs are open in a gear: then that cannot but slip.
+    /// Whether elements that hold without their commands in all of several pairs are to be open in a gear: then that cannot but slip.
     fn is_held(&self, gear: usize, pairs: &[[usize; 2]]) -> bool {
         let mut all = pairs.iter().map(|[gear, other]| self.only_in(*other, *gear));
         let Some(held) = all.next().filter(|held| !held.is_empty() && pairs.len() > 1) else { return false };
