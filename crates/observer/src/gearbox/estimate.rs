@@ -8,9 +8,9 @@ use super::phases::Slip;
 use super::powertrain::{ClutchTorque, Torques};
 use super::turbine::MIN_N_M;
 use super::{
-    ClutchesAtTurbine, FRACTION, FRICTION, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS, N, Newest,
-    OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftElement, ShiftInput, ShiftPhase, ShiftRow,
-    TURBINE, WHEEL, square,
+    ClutchesAtTurbine, FIRST_S, FRACTION, FRICTION, GearboxFilter, GearboxState, InputClutch, KISS, MAX_ELEMENTS, N,
+    Newest, OUTPUT, PRESSURE, SLOW_FRACTION, SPEEDS, SPRING, ShiftClutch, ShiftElement, ShiftInput, ShiftPhase,
+    ShiftRow, TURBINE, WHEEL, square,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -83,6 +83,8 @@ pub struct ShiftEstimate<T> {
 
 /// Standard deviation of the part of a load that one of two clutches has, which hold both.
 const SHARED: f64 = 0.29;
+/// Standard deviation of the rate of a speed near a standstill that is not read, rad/s^2 \[chosen\].
+const UNREAD_RAD_S2: f64 = 100.0;
 
 impl<T: Real> ShiftEstimate<T> {
     pub(super) fn nothing() -> Self {
@@ -230,16 +232,18 @@ impl<T: Real> GearboxFilter<'_, T> {
             .and_then(|(memory, element)| memory.pressure_range_pa(element))
     }
 
-    /// Torque of both clutches of a shift together at the turbine, N m, and its standard deviation, by the rates of both speeds; none where one was
-    /// not read twice in a row.
-    fn load_of_both(&self, state: &GearboxState<T>, shift: &ShiftRow<T>, turbine_n_m: T) -> Option<[T; 2]> {
-        let ([by_turbine, by_output], (turbine, of_turbine), (output, of_output)) =
-            (shift.mass_kg_m2[0], self.rate(state, TURBINE)?, self.rate(state, OUTPUT)?);
+    /// Torque of both clutches of a shift together at the turbine, N m, and its standard deviation, by the rates of both speeds, near a standstill.
+    fn load_of_both(&self, state: &GearboxState<T>, shift: &ShiftRow<T>, turbine_n_m: T) -> [T; 2] {
+        let [by_turbine, by_output] = shift.mass_kg_m2[0];
+        let is_fresh = |k: usize| state.newest[k].is_some_and(|newest| newest.age_s <= T::of(FIRST_S));
+        let rate = |k: usize| self.rate(state, k).filter(|_| is_fresh(k));
+        let [(turbine, of_turbine), (output, of_output)] =
+            [TURBINE, OUTPUT].map(|k| rate(k).unwrap_or((T::zero(), square(T::of(UNREAD_RAD_S2)))));
         let share = self.turbine.converter_share.max(self.turbine.engine_share);
         let variance = square(share * turbine_n_m.abs().at_least(T::of(MIN_N_M)))
             + square(by_turbine) * of_turbine
             + square(by_output) * of_output;
-        Some([turbine_n_m - by_turbine * turbine - by_output * output, variance.sqrt()])
+        [turbine_n_m - by_turbine * turbine - by_output * output, variance.sqrt()]
     }
 
     /// Slip of the offgoing clutch away from the new gear, where the readings show one.
@@ -274,9 +278,11 @@ impl<T: Real> GearboxFilter<'_, T> {
         let learnt = state.learnt.known_mean(&self.acting(shift));
         let slips = shift.clutches.each_ref().map(|clutch| self.slip(clutch.ratio, then));
         let is_tied = |c: usize| !state.held_may_slip && shift.is_tied(c, since_s);
-        let load = turbine_n_m.filter(|_| is_read && self.is_slow(state) && !state.held_may_slip);
-        let load = load.and_then(|turbine_n_m| self.load_of_both(state, shift, turbine_n_m));
+        let load = turbine_n_m.filter(|_| self.is_slow(state) && !state.held_may_slip);
+        let load = load.map(|turbine_n_m| self.load_of_both(state, shift, turbine_n_m));
         let driving_n_m = load.map(|[load_n_m, _]| load_n_m).or(turbine_n_m);
+        // Of a shaft that stands, a toothed wheel gives no reading.
+        let is_read = is_read || load.is_some();
         let mut clutches = [0, 1].map(|c: usize| {
             let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
             let lasting = [learnt[c], learnt[c + 2]];
