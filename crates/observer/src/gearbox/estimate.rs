@@ -280,6 +280,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         let is_tied = |c: usize| !state.held_may_slip && shift.is_tied(c, since_s);
         let load = turbine_n_m.filter(|_| self.is_slow(state) && !state.held_may_slip);
         let load = load.map(|turbine_n_m| self.load_of_both(state, shift, turbine_n_m));
+        // Of readings without bound there is none.
+        let load = load.filter(|[load_n_m, std_dev_n_m]| load_n_m.is_finite() && std_dev_n_m.is_finite());
         let driving_n_m = load.map(|[load_n_m, _]| load_n_m).or(turbine_n_m);
         // Of a shaft that stands, a toothed wheel gives no reading.
         let is_read = is_read || load.is_some();
