@@ -81,7 +81,7 @@ pub struct ShiftEstimate<T> {
     pub commands: [ChannelHealth; MAX_ELEMENTS],
 }
 
-/// Standard deviation of the part of a load that one of two clutches has, which hold both.
+/// Standard deviation of the part of a load that one of two clutches carries while both hold: any from none to all of it, uniform.
 const SHARED: f64 = 0.29;
 /// Standard deviation of the rate of a speed near a standstill that is not read, rad/s^2 \[chosen\].
 const UNREAD_RAD_S2: f64 = 100.0;
@@ -116,7 +116,6 @@ fn limit_to_load<T: Real>(
 ) {
     let alpha = shift.clutches.each_ref().map(|clutch| clutch.alpha);
     let at_turbine_n_m: [T; 2] = core::array::from_fn(|c| alpha[c] * clutches[c].torque_n_m);
-    let holds: [bool; 2] = core::array::from_fn(|c| holds[c] && shift.clutches[c].has_pressure());
     let [off_n_m, on_n_m] = at_turbine_n_m.map(T::abs);
     let both_n_m = off_n_m + on_n_m;
     for c in 0..2 {
@@ -292,7 +291,8 @@ impl<T: Real> GearboxFilter<'_, T> {
             self.by_valve(&state.elements, clutch, [slips[c].value, direction], lasting)
         });
         if let Some(load) = load {
-            let holds = [0, 1].map(|c: usize| is_tied(c) && !slips[c.min(1)].is_over());
+            let has_pressure = |c: usize| shift.clutches[c].has_pressure();
+            let holds = core::array::from_fn(|c| is_tied(c) && has_pressure(c) && !slips[c].is_over());
             limit_to_load(&mut clutches, shift, holds, load);
         }
         [0, 1].map(|c: usize| {

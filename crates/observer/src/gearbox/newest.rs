@@ -105,7 +105,8 @@ impl<T: Real> Newest<T> {
             if span_s > T::of(LONGEST_S) {
                 break;
             }
-            if age_s <= early.1 {
+            // Readings of one time are no line.
+            if age_s <= early.1 && span_s > T::zero() {
                 return late.0 + (early.0 - late.0) * (age_s - late.1) / span_s;
             }
             late = early;
@@ -177,6 +178,18 @@ mod tests {
         assert!((newest.at(0.009) - 101.0).abs() < 1e-9);
         assert!((newest.at(0.0) - 102.8).abs() < 1e-9);
         assert_eq!(newest.at(0.02), 100.0);
+    }
+
+    #[test]
+    fn readings_whose_ages_have_become_equal_are_no_line() {
+        let mut newest = None;
+        for value in [100.0_f32, 102.0] {
+            newest.iter_mut().for_each(|newest: &mut Newest<f32>| newest.pass(0.01));
+            assert!(Newest::take(&mut newest, value, [0.004, 0.0], 0.1));
+        }
+        let mut newest = newest.unwrap();
+        newest.pass(1e6);
+        assert_eq!(newest.at(1e5), 100.0);
     }
 
     #[test]

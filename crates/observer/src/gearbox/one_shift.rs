@@ -279,9 +279,7 @@ impl<T: Real> OneShiftFilter<T> {
         };
         let held_n_m =
             if state.phase == Phase::AfterShift { self.held_n_m(filter, state, (taken, found)) } else { None };
-        // Readings without bound have no torque.
-        let torque_n_m = [held_n_m, Some(torque_n_m)].into_iter().flatten().find(|torque_n_m| torque_n_m.is_finite());
-        [pressure_pa, torque_n_m.unwrap_or(T::zero())]
+        [pressure_pa, held_n_m.unwrap_or(torque_n_m)]
     }
 
     /// Torque of the oncoming clutch after the shift, N m: what the turbine torque by the converter's maps leaves beside the inertia. What the
