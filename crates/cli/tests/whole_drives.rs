@@ -17,7 +17,7 @@ fn errors_n_m(truth: &str, estimates: &str) -> [[f64; 2]; 2] {
     })
 }
 
-/// Near a standstill a clutch holds far less than its pressure lets it: without the load as a limit the worst of these is off by 54 N m.
+/// Near a standstill a clutch holds far less than its pressure lets it: without the load as a limit the worst of these is off by 50 N m.
 #[test]
 fn torques_are_good_in_every_row_of_a_drive_in_town() {
     let folder = Folder::new("whole-drives");

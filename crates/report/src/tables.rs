@@ -47,7 +47,7 @@ pub fn health_meaning(health: Health) -> &'static str {
         }
         Health::CommandRejected => "an unusable valve command: the last usable command is used",
         Health::PressureLimited => "a pressure outside 0 to `pressure_max_pa`: the estimate is that limit",
-        Health::TooSlow => "an output speed too low for its sensor: the estimate is from the valve model alone",
+        Health::TooSlow => "an output speed too low for its sensor: the estimate is from the valve model",
         Health::OneWayOverruns => {
             "the one-way clutch of the gear overruns: the car coasts, and the engine does not drive it"
         }
