@@ -10,6 +10,7 @@ use arrow_array::types::{
 use arrow_array::{
     Array, ArrayRef, ArrowPrimitiveType, BooleanArray, LargeStringArray, PrimitiveArray, StringArray, StringViewArray,
 };
+use arrow_buffer::NullBuffer;
 use arrow_schema::{DataType, Field, TimeUnit};
 use pyo3::PyErr;
 use pyo3::exceptions::PyTypeError;
@@ -69,6 +70,10 @@ impl ArrowRows {
 
     /// The batch of a row, and its first row.
     fn batch_of(&self, row: usize) -> (usize, usize) {
+        // Of most tables there is one alone.
+        if self.ends.first().is_some_and(|end| row < *end) {
+            return (0, 0);
+        }
         let batch = self.ends.partition_point(|end| *end <= row);
         (batch, batch.checked_sub(1).map_or(0, |before| self.ends[before]))
     }
@@ -132,8 +137,8 @@ enum Cells {
     Utf8(StringArray),
     LargeUtf8(LargeStringArray),
     Utf8View(StringViewArray),
-    /// Words of a dictionary: the place of each in it.
-    Dictionary(ArrayRef, Codes, Box<Cells>),
+    /// Words of a dictionary: the place of each in it, and which there are.
+    Dictionary(Codes, Option<NullBuffer>, Box<Cells>),
 }
 
 impl Cells {
@@ -161,11 +166,8 @@ impl Cells {
             DataType::LargeUtf8 => Self::LargeUtf8(array.as_string_opt()?.clone()),
             DataType::Utf8View => Self::Utf8View(array.as_string_view_opt()?.clone()),
             DataType::Dictionary(_, values) if has_words(values) => {
-                let dictionary = array.as_any_dictionary_opt()?;
-                let values = dictionary.values();
-                // Without a value there is no place of one.
-                let places = if values.is_empty() { Vec::new() } else { dictionary.normalized_keys() };
-                Self::Dictionary(array.clone(), places.into_iter().collect(), Box::new(Self::of(values)?))
+                let values = array.as_any_dictionary_opt()?.values();
+                Self::Dictionary(places(array), array.nulls().cloned(), Box::new(Self::of(values)?))
             }
             _ => return None,
         })
@@ -203,10 +205,23 @@ impl Cells {
             Self::Utf8(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
             Self::LargeUtf8(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
             Self::Utf8View(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
-            Self::Dictionary(array, ..) if array.is_null(row) => Cell::Word(""),
-            Self::Dictionary(_, places, values) => places.get(row).map_or(Cell::Word(""), |place| values.get(place)),
+            Self::Dictionary(_, Some(nulls), _) if nulls.is_null(row) => Cell::Word(""),
+            Self::Dictionary(places, _, values) => places.get(row).map_or(Cell::Word(""), |place| values.get(place)),
         }
     }
+}
+
+/// Keys of a dictionary that are made places at once, as they are wide.
+const KEYS: usize = 4096;
+
+/// The places of the words of a dictionary; none where it has no word.
+fn places(array: &ArrayRef) -> Codes {
+    let all = (0..array.len()).step_by(KEYS).flat_map(|begin| {
+        let some = array.slice(begin, KEYS.min(array.len() - begin));
+        let some = some.as_any_dictionary_opt().filter(|some| !some.values().is_empty());
+        some.map_or_else(Vec::new, |some| some.normalized_keys())
+    });
+    all.collect()
 }
 
 fn number<T: ArrowPrimitiveType>(array: &PrimitiveArray<T>, row: usize, to: impl Fn(T::Native) -> f64) -> Cell<'_> {

@@ -26,7 +26,7 @@ pub const MAX_STATES: u32 = 400_000;
 /// A drive with its shifts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScoredDrive {
-    /// Every [`crate::SAMPLE_S`]; of a drive of more than [`MAX_STATES`] those that are kept: fewer where nothing happens.
+    /// Every [`crate::SAMPLE_S`], unless they are left out; of a drive of more than [`MAX_STATES`] those that are kept: fewer where nothing happens.
     pub states: Vec<DriveState>,
     /// Its shifts.
     pub shifts: Vec<ScoredShift>,
@@ -57,6 +57,8 @@ pub(crate) struct PassingShifts {
     pub(crate) drive: ScoredDrive,
     pub(crate) open: Option<ScoredShift>,
     plates: PlateTemperatures,
+    /// Whether no states are kept.
+    is_stateless: bool,
     /// States that were left when some were left out the last time.
     left: usize,
     /// Shifts that are drawn, by their places, as far as it is decided; and how many shifts it is decided of.
@@ -68,8 +70,16 @@ pub(crate) struct PassingShifts {
 }
 
 impl PassingShifts {
+    /// Keeps no states from here on.
+    pub(crate) fn keep_no_states(&mut self) {
+        self.is_stateless = true;
+    }
+
     /// Takes the next state of the drive.
     pub(crate) fn state(&mut self, state: DriveState) {
+        if self.is_stateless {
+            return;
+        }
         let states = &mut self.drive.states;
         states.push(state);
         if states.len() >= (MAX_STATES as usize).max(2 * self.left) {

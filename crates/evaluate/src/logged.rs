@@ -55,6 +55,13 @@ impl<'c> LoggedDrive<'c> {
         self
     }
 
+    /// The same without the states of the drive, which need memory and which a page alone draws.
+    #[must_use]
+    pub fn without_states(mut self) -> Self {
+        self.shifts.keep_no_states();
+        self
+    }
+
     /// The tables of a car behind these sensors.
     ///
     /// # Errors

@@ -76,6 +76,11 @@ impl<'c> LoggedShifts<'c> {
         }
     }
 
+    /// Keeps no states of the drive, for an estimate of which no page is made.
+    pub(crate) fn keep_no_states(&mut self) {
+        self.passing.keep_no_states();
+    }
+
     /// Takes a row with what the filter made of it, whose health it makes worse where the commands are those of another time.
     pub fn push(&mut self, step: &LogStep, filtered: &mut Filtered) {
         let (input, Filtered { estimate, beyond_bounds, .. }) = (&step.input, filtered);

@@ -127,7 +127,7 @@ impl MemoryWriter {
             Values::Words(_) => None,
         });
         for (at, numbers) in numbers.enumerate() {
-            numbers.extend(self.block.iter().skip(at).step_by(self.width));
+            numbers.extend(self.block.chunks_exact(self.width).map(|row| row[at]));
         }
         self.block.clear();
     }

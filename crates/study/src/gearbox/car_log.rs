@@ -287,8 +287,8 @@ impl<'c> CarLog<'c> {
             // A logger may write the gear as a number with decimals.
             let whole = || text.parse::<f64>().ok().map(|number| format!("{number}"));
             let named = |name: &str| gears.iter().position(|gear| gear.name == name).map(Gear::at);
-            let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(Gear::Neutral);
-            let found = named(&text).or(neutral).or_else(|| named(&whole()?));
+            let neutral = || NEUTRAL.contains(&&*text).then_some(Gear::Neutral);
+            let found = named(&text).or_else(neutral).or_else(|| named(&whole()?));
             self.gears.take(which, found, || text.escape_debug().to_string());
         }
     }

@@ -144,7 +144,7 @@ impl Source {
             Self::Table(source) => match source.cell(column) {
                 Cell::Number(number) => Cow::Owned(written(number)),
                 Cell::Whole(whole) => Cow::Owned(whole.to_string()),
-                Cell::Word(word) => Cow::Borrowed(word.trim_matches(|c: char| c.is_ascii_whitespace())),
+                Cell::Word(word) => Cow::Borrowed(word.trim_ascii()),
                 Cell::SameWord | Cell::SameWords => Cow::Borrowed(""),
             },
         }

@@ -133,8 +133,9 @@ pub fn estimate(
     let mut opened = None;
     let reading = CarReading { car, tables, log, stop: options.follow.as_ref(), threads: options.threads };
     let mut source = CarSource::open(reading, &mut opened, say)?;
-    let LoggedDrive { mut filter, mut shifts } =
+    let drive =
         LoggedDrive::new(car, tables, options.sensors.as_ref(), options.learnt.as_ref()).with_delays(source.delays_s());
+    let LoggedDrive { mut filter, mut shifts } = if options.with_page { drive } else { drive.without_states() };
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();
     let places: Vec<(usize, &str)> =
