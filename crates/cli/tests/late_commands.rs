@@ -85,6 +85,24 @@ fn slow_valves_within_wide_bounds_are_no_delay_of_the_commands() {
     assert!(!said.contains("the commands of the valves come"), "{said}");
 }
 
+/// Plates that take their load late in the slow shifts of comfort, up and down alike: to the shifts they look like commands 70 to 100 ms early.
+#[test]
+fn weak_plates_in_slow_shifts_are_no_early_commands() {
+    let folder = Folder::new("weak-plates");
+    let drive = std::fs::read_to_string(format!("{ROOT}drives/faults.toml")).unwrap();
+    let (drive, _) = drive.split_once("# From `from_s`").unwrap();
+    let drive = drive.replacen("controller = \"bench\"", "controller = \"comfort\"", 1);
+    let drive = drive + "[[fault]]\nkind = \"wrong-fluid\"\nfriction_factor = 0.75\nfrom_s = 0\n";
+    let drive = folder.write("weak.toml", drive.replacen("name = \"faults\"", "name = \"weak\"", 1));
+    for vehicle in ["six_speed", "eight_speed_a8lr1"] {
+        let car = format!("{ROOT}vehicles/{vehicle}.toml");
+        said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
+        let (log, out) = (folder.path("sim/weak_measured.csv"), folder.path("out.csv"));
+        let said = said(&wetclutch(&["estimate", &log, "--vehicle", &car, "-o", &out]));
+        assert!(!said.contains("the commands of the valves come"), "{vehicle}: {said}");
+    }
+}
+
 /// A vehicle file with the values of a list times a factor.
 fn scaled(file: &str, key: &str, factor: f64) -> String {
     let begin = file.find(key).unwrap();

@@ -4,8 +4,9 @@
 //! models give the torque that they can carry. Both are compared with the pressures moved by -300 to 300 ms: where both clutches slip, `U` is
 //! the sum of what they can carry; where one holds, it carries the rest, up to what it can. The move with the minimum difference over the
 //! shifts of the log is the delay of its commands. An error of friction, valve gain or turbine torque moves upshifts and downshifts in
-//! opposite directions, a delay in the same one. So that a wrong scale or offset of the commands is not taken for a delay, each move is
-//! tried with other gains and offsets of the pressures, and it has to be better than all of them are without a move.
+//! opposite directions, a delay in the same one; where the shifts are slow, it may move both in the same one too. So that clutches that are
+//! weaker or stronger, or a wrong scale or offset of the commands, are not taken for a delay, each move is tried with other torques and with
+//! other offsets of the pressures, and it has to be better than all of them are without a move.
 
 use std::collections::VecDeque;
 
@@ -54,16 +55,16 @@ const LOAD_S: f64 = 0.3;
 /// Fraction of the difference that the delay leaves at most \[chosen\].
 const LEFT: f64 = 0.9;
 
-/// Errors of the gain of the valves, over its bound, and offsets of the pressures, over the bound of the hysteresis or half of what the error of the
-/// commands does, whichever is larger, that are tried \[chosen\].
-const GAINS: [f64; 5] = [-2.5, -1.3, 0.0, 1.5, 3.0];
+/// Errors of the torque at the same pressure, over the bounds of friction and valve gain together, and offsets of the pressures, over the bound of
+/// the hysteresis or half of what the error of the commands does, whichever is larger, that are tried \[chosen\].
+const STRENGTHS: [f64; 6] = [-1.6, -1.0, -0.5, 0.0, 0.5, 1.0];
 const OFFSETS: [f64; 3] = [-4.0, 0.0, 4.0];
-/// Lowest gain that is tried.
-const GAIN_MIN: f64 = 0.2;
-const PRESSURES: usize = GAINS.len() * OFFSETS.len();
+/// Smallest factor of the torque that is tried.
+const FACTOR_MIN: f64 = 0.2;
+const CARS: usize = STRENGTHS.len() * OFFSETS.len();
 
-/// By gain and offset of the pressures, then by move.
-type Differences = [[f64; MOVES]; PRESSURES];
+/// By factor of the torque and offset of the pressures, then by move.
+type Differences = [[f64; MOVES]; CARS];
 
 /// What a row says.
 #[derive(Debug, Clone, Copy)]
@@ -99,8 +100,8 @@ struct Waiting {
 /// The delays of a log's shifts, so far.
 pub(crate) struct CommandDelay<'c> {
     tables: &'c ShiftTables<f64>,
-    /// Gains and offsets, Pa, of the pressures by the valve models that are tried.
-    pressures: [(f64, f64); PRESSURES],
+    /// Factors of the torques by the valve models, and offsets of their pressures, Pa, that are tried.
+    cars: [(f64, f64); CARS],
     /// Delay from which on it is reported, s.
     reported_s: f64,
     /// The last rows, at least about [`GRID_S`] apart.
@@ -125,23 +126,23 @@ impl<'c> CommandDelay<'c> {
             Some(errors.valve_hysteresis_pa.max(0.5 * by_command_pa))
         });
         let offset_pa = offsets.fold(0.0, f64::max);
-        let pressures = std::array::from_fn(|at| {
-            let (of_gain, of_offset) = (GAINS[at / OFFSETS.len()], OFFSETS[at % OFFSETS.len()]);
-            ((1.0 + of_gain * gain).max(GAIN_MIN), of_offset * offset_pa)
-        });
         let more_delay_s = (budget.widest(ElementErrors::valve_delay) - DEFAULT_DELAY_S).max(0.0);
         let more_lag_s = LAG_S * (budget.widest(|of| most_off(of.valve_lag_factor)) - DEFAULT_LAG).max(0.0);
         let strength = gain + budget.widest(|of| most_off(of.friction_factor));
+        let cars = std::array::from_fn(|at| {
+            let (of_strength, of_offset) = (STRENGTHS[at / OFFSETS.len()], OFFSETS[at % OFFSETS.len()]);
+            ((1.0 + of_strength * strength).max(FACTOR_MIN), of_offset * offset_pa)
+        });
         let more_strength_s = LOAD_S * (strength - DEFAULT_STRENGTH).max(0.0);
         Self {
             tables,
-            pressures,
+            cars,
             reported_s: REPORTED_S + more_delay_s + more_lag_s + more_strength_s,
             rows: VecDeque::new(),
             waiting: VecDeque::new(),
             age_s: 0.0,
             shifts: [0; 2],
-            differences: Box::new([[0.0; MOVES]; PRESSURES]),
+            differences: Box::new([[0.0; MOVES]; CARS]),
             found: None,
         }
     }
@@ -190,16 +191,13 @@ impl<'c> CommandDelay<'c> {
         let elements = self.tables.tables().elements;
         let [Some(off), Some(on)] = shift.clutches.map(|of| Some((of, of.element.place()?))) else { return None };
         let clutches = [off, on].map(|(of, place)| (of, place, &elements[place].clutch));
-        let force = |point: &Point, (gain, offset_pa): (f64, f64)| {
-            clutches.map(|(_, place, clutch)| clutch.clamp_force(gain * point.valve_pa[place] + offset_pa))
+        let force = |point: &Point, (factor, offset_pa): (f64, f64)| {
+            clutches.map(|(_, place, clutch)| factor * clutch.clamp_force(point.valve_pa[place] + offset_pa))
         };
-        let forces: Vec<Vec<[f64; 2]>> = self
-            .pressures
-            .iter()
-            .map(|&pressure| points.iter().map(|point| force(point, pressure)).collect())
-            .collect();
+        let forces: Vec<Vec<[f64; 2]>> =
+            self.cars.iter().map(|&car| points.iter().map(|point| force(point, car)).collect()).collect();
         let [m11, m12] = shift.mass_kg_m2[0];
-        let (mut sums, mut used) = ([[0.0; MOVES]; PRESSURES], 0);
+        let (mut sums, mut used) = ([[0.0; MOVES]; CARS], 0);
         for at in AROUND..points.len().saturating_sub(AROUND) {
             let (point, before, after) = (&points[at], &points[at - RATE], &points[at + RATE]);
             let rate = |of: fn(&Point) -> f64| (of(after) - of(before)) / (2.0 * span_s(RATE));
