@@ -23,6 +23,9 @@ use crate::speed_faults::{GONE_S, LONGEST_S};
 const SAMPLES: u32 = 3;
 /// How many times its usual error a difference that was to be expected closes by at once, with a size that is no rounding, rad/s \[chosen\].
 const SUDDEN: (f64, f64) = (8.0, 1.0);
+/// A difference that goes to zero within this time, s, and by so many times its usual error in a sample, is closed by a clutch \[chosen\]: its plates
+/// stick at once in the end, and a copy would be little off until then.
+const CLOSING: (f64, f64) = (0.1, 2.0);
 /// How many times its usual error the difference of two noisy speeds closes by at once \[chosen\].
 const CLOSES: f64 = 4.0;
 /// Samples in which the usual error is learnt, and weight of one in its mean.
@@ -462,8 +465,8 @@ impl Pair {
             && (0.0..=SLOWEST_S).contains(&passed_s)
     }
 
-    /// Which of both jumped to the other, where the difference closed at once: it was to be expected on its side of zero. What a clutch takes
-    /// to zero would have gone beyond.
+    /// Which of both jumped to the other, where the difference closed at once: it was to be expected on its side of zero, and not to be there soon. What a
+    /// clutch takes to zero would have gone beyond.
     fn jump(&self, before: [Stamped; 2], newest: [Stamped; 2]) -> Option<usize> {
         let (times, min_rad_s) = SUDDEN;
         let [mean, last] = self.error;
@@ -476,8 +479,12 @@ impl Pair {
             && (0.0..=SLOWEST_S).contains(&passed_s);
         let which = usize::from(by[1] > by[0]);
         let closed = difference.abs();
-        let is_one = 2.0 * by[which] > closed && 2.0 * by[1 - which] < closed;
-        (is_sudden && is_one && self.changes >= LEARNT).then_some(which)
+        // A clutch that sticks takes the speeds of both its shafts to each other.
+        let is_one = 1.5 * by[which] > closed && 3.0 * by[1 - which] < closed;
+        let (soon_s, clearly) = CLOSING;
+        let closing = -self.change * difference.signum();
+        let is_closing = closing > clearly * mean && expected.abs() * passed_s <= soon_s * closing;
+        (is_sudden && is_one && !is_closing && self.changes >= LEARNT).then_some(which)
     }
 }
 

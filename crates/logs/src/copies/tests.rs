@@ -65,6 +65,60 @@ fn of_two_speeds_that_rise_fast_the_copy_is_the_one_that_leaves_its_line() {
     assert!(rows.iter().all(|(_, role, _)| *role == Role::EngineSpeed) && rows.len() >= 98, "{rows:?}");
 }
 
+/// In the direct gear a clutch with weak plates slips longer than the controller waits; then its command rises, and it sticks within one row. Both
+/// shafts go to each other.
+#[test]
+fn a_clutch_that_sticks_at_once_makes_no_copy() {
+    // Turbine and output of simulated cars before and after it, rad/s.
+    let sticks: [&[[f64; 2]]; 2] = [
+        &[
+            [163.8368, 157.6499],
+            [163.0874, 157.6742],
+            [162.5043, 157.7948],
+            [162.0618, 157.9808],
+            [161.7259, 158.1603],
+            [161.4539, 158.2738],
+            [161.2307, 158.3258],
+            [161.0896, 158.3866],
+            [161.1050, 158.4626],
+            [161.2141, 158.6414],
+            [159.9700, 159.9700],
+            [159.7080, 159.7080],
+        ],
+        &[
+            [181.2462, 176.4095],
+            [180.9522, 176.4659],
+            [180.6818, 176.5235],
+            [180.4274, 176.5788],
+            [180.1890, 176.6334],
+            [179.9663, 176.6916],
+            [179.7560, 176.7540],
+            [179.5328, 176.8054],
+            [179.2483, 176.8171],
+            [179.0166, 176.8310],
+            [178.8499, 176.9358],
+            [177.5936, 177.5936],
+        ],
+    ];
+    for last in sticks {
+        let [turbine, output] = last[0];
+        let speeds = |row: u32| match row.checked_sub(400) {
+            None => [turbine + 0.3 * f64::from(400 - row), output - 0.05 * f64::from(400 - row)],
+            Some(later) => last.get(later as usize).copied().unwrap_or_else(|| {
+                let [shaft, _] = last[last.len() - 1];
+                [shaft + 0.2 * f64::from(later); 2]
+            }),
+        };
+        let mut copies = Copies::new();
+        for row in 0..600 {
+            let time_s = 0.01 * f64::from(row);
+            for (role, value) in [Role::TurbineSpeed, Role::OutputSpeed].into_iter().zip(speeds(row)) {
+                assert_eq!(copies.push(role, [value, time_s], false), [None; 2], "{row} {last:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn shafts_that_come_together_are_no_copies() {
     // A lock-up clutch closes in 0.2 s and opens at once; both are then one shaft.
