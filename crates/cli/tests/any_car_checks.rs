@@ -316,6 +316,41 @@ fn cells_that_are_no_numbers_are_counted_and_most_of_them_are_an_error() {
     }
 }
 
+/// `N` and 0 are no gear, and both are read by a table and by a channel map.
+#[test]
+fn letters_and_numbers_of_no_gear_mean_the_same_with_and_without_a_map() {
+    let folder = simulated("gear-letters");
+    let text = folder.read("sim/short_measured.csv");
+    let is_neutral = |row: usize| (300..400).contains(&row);
+    let written = |cell: &str| {
+        let mut rows = [0; 2];
+        let both = ["gear", "target_gear"].into_iter().zip(&mut rows).fold(text.clone(), |text, (name, row)| {
+            with_column(&text, name, |value| {
+                *row += 1;
+                if is_neutral(*row) { cell.to_owned() } else { value.to_owned() }
+            })
+        });
+        folder.write("log.csv", both)
+    };
+    let numbers_of = |more: &[&str]| {
+        let out = folder.path("out.csv");
+        let all = [&["-o", &out], more].concat();
+        let said = said(&estimate(&folder, "log.csv", &all));
+        assert!(!said.contains("no gear of this gearbox") && !said.contains("are not numbers"), "{said}");
+        let found = numbers(&folder.read("out.csv"), "gear_number");
+        (found.iter().filter(|number| **number == 0.0).count(), found)
+    };
+    written("N");
+    let by_letter = numbers_of(&[]);
+    assert_eq!(by_letter.0, 100);
+    let map = folder.path("map.toml");
+    std::fs::write(&map, wetclutch(&["inspect", &folder.path("log.csv"), "--suggest"]).stdout).unwrap();
+    for cell in ["N", "P", "0"] {
+        written(cell);
+        assert!(numbers_of(&[]) == by_letter && numbers_of(&["--map", &map]) == by_letter, "{cell}");
+    }
+}
+
 #[test]
 fn a_gear_that_the_gearbox_does_not_have_is_counted_and_the_gear_before_stands() {
     let folder = simulated("no-gear");

@@ -12,6 +12,7 @@ use trace::{RecordError, Records, Unit};
 
 use crate::columns::{Batch, Stream};
 use crate::csv_dialect::{Dialect, cells};
+use crate::gear_letters::number_of_letter;
 use crate::row_order::RowOrder;
 use crate::samples::{Quality, Sample};
 use crate::stamp::{Midnight, StampForm};
@@ -279,6 +280,10 @@ impl Rows<'_> {
                 Some(value) if value.is_nan() => continue,
                 Some(value) if value.is_finite() => (value, Quality::Good),
                 Some(value) => (value, Quality::Missing),
+                // Of a gear it is used.
+                None if let Some(number) = number_of_letter(self.records.cell(column).unwrap_or_default()) => {
+                    (number, Quality::Missing)
+                }
                 None => {
                     self.no_numbers += 1;
                     if self.first_text.is_none() {

@@ -23,6 +23,7 @@ pub mod csv_log;
 pub mod error;
 pub mod format;
 pub mod frozen;
+mod gear_letters;
 pub mod held;
 mod in_order;
 pub mod inspect;

@@ -263,6 +263,9 @@ impl<'a> Readings<'a> {
         let entry = &channels.resolved.entry;
         let mut quality = sample.quality;
         let mut value = sample.value;
+        // A letter needs no unit, and is within every range.
+        let is_gear = matches!(entry.role, Role::Gear | Role::TargetGear) && channels.parts.len() == 1;
+        let letter = Some(value).filter(|value| is_gear && quality == Quality::Missing && value.is_finite());
         if channels.parts.len() > 1 {
             if sample.time_s != channels.parts_s {
                 if channels.parts.iter().any(Option::is_some) {
@@ -295,6 +298,9 @@ impl<'a> Readings<'a> {
         }
         if quality == Quality::Good && !value.is_finite() {
             quality = Quality::Missing;
+        }
+        if let Some(number) = letter {
+            (quality, value) = (Quality::Good, number);
         }
         if quality == Quality::Good && kind == Role::EngineFrictionTorque {
             self.friction_n_m = Some(value);

@@ -10,6 +10,8 @@ use crate::Series;
 const SETTLES_S: f64 = 0.5;
 /// Longest time without a reading of a speed, s.
 const GAP_S: f64 = 0.1;
+/// Rows further apart are of two stretches, s \[chosen\]: where a recording was stopped, nothing is known of what lies between them.
+const HOLE_S: f64 = 0.5;
 /// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
 const OUTPUT_MIN_RAD_S: f64 = 15.0;
 /// The engine pulls where the turbine turns slower than this fraction of its speed, and until it turns faster than the second one \[chosen\] ...
@@ -41,6 +43,8 @@ pub(crate) struct DrivingRecorder {
     readings: StretchReadings,
     open: Option<(usize, f64)>,
     unsettled_s: f64,
+    /// The time of the row before, s.
+    row_s: f64,
     twist: TwistRecorder,
     output: SkewRecorder,
     engine: SkewRecorder,
@@ -54,6 +58,7 @@ impl DrivingRecorder {
             readings: StretchReadings::default(),
             open: None,
             unsettled_s: f64::NEG_INFINITY,
+            row_s: f64::NAN,
             twist: TwistRecorder::default(),
             output: SkewRecorder::default(),
             engine: SkewRecorder::default(),
@@ -63,6 +68,10 @@ impl DrivingRecorder {
 
     /// Takes a row: its time, the readings of engine, turbine, output and wheel speed, the reported engine torque, and its state.
     pub(crate) fn push(&mut self, time_s: f64, speeds: [Dated; 4], reported: Dated, state: RowState) {
+        if !self.row_s.is_nan() && !(0.0..=HOLE_S).contains(&(time_s - self.row_s)) {
+            self.break_off(time_s);
+        }
+        self.row_s = time_s;
         let StretchReadings { engine, turbine, output, reported: torque } = &mut self.readings;
         for (series, reading) in [engine, turbine, output].into_iter().zip(speeds).chain([(torque, reported)]) {
             if let Some((time_s, value)) = reading {
@@ -109,6 +118,16 @@ impl DrivingRecorder {
         self.engine.close();
         self.found.engines = self.engine.stretches;
         self.found
+    }
+
+    /// Ends all stretches before a row that does not follow the one before it, s.
+    fn break_off(&mut self, time_s: f64) {
+        self.close();
+        self.readings = StretchReadings::default();
+        self.unsettled_s = time_s;
+        self.twist.close(&self.car);
+        self.output.close();
+        self.engine.close();
     }
 
     /// Whether the engine pulls the car in a gear.

@@ -10,6 +10,7 @@ use trace::csv_file;
 
 use super::pages::CheckedPages;
 use super::{not_built_in, records};
+use crate::gear_letters::number_of_letter;
 
 /// Texts that tell whether a column holds numbers: the first that are not empty, of so many rows.
 const FIRST: usize = 256;
@@ -48,7 +49,11 @@ fn first_texts(reader: &SerializedFileReader<File>, column: usize) -> Option<(us
                 break;
             }
             rows += read;
-            for number in some.iter().map(|text| number_of(text.data())).filter(|number| !number.is_nan()) {
+            for number in some
+                .iter()
+                .map(|text| csv_file::number(text.data()).unwrap_or(f64::INFINITY))
+                .filter(|number| !number.is_nan())
+            {
                 texts += 1;
                 numbers += usize::from(number.is_finite());
             }
@@ -60,7 +65,8 @@ fn first_texts(reader: &SerializedFileReader<File>, column: usize) -> Option<(us
     Some((numbers, texts))
 }
 
-/// The number in a text: NaN where it is empty, which is no value, and infinite where it holds something else, which is missing.
+/// The number in a text: NaN where it is empty, which is no value, that of a gear of a letter, and infinite where it holds something else, which is
+/// missing.
 pub(super) fn number_of(text: &[u8]) -> f64 {
-    csv_file::number(text).unwrap_or(f64::INFINITY)
+    csv_file::number(text).or_else(|| number_of_letter(text)).unwrap_or(f64::INFINITY)
 }

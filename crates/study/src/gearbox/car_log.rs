@@ -15,6 +15,7 @@ use trace::{CsvRows, TraceError, signal};
 
 pub use evaluate::LogStep;
 
+use super::gear_numbers::GearNumbers;
 use super::gear_signal::Gears;
 use super::pressure_command::command_for;
 use crate::frozen_rows::{FrozenRows, SpeedReadings};
@@ -125,6 +126,7 @@ pub struct CarLog<'c> {
     clock: RowClock,
     frozen: FrozenRows,
     samples: RowSamples,
+    numbers: GearNumbers,
     gears: Gears,
     /// Rows that may still be shown to have a wrong speed.
     ahead: LookAhead<LogStep, TraceError>,
@@ -142,13 +144,22 @@ impl<'c> CarLog<'c> {
         let (clock, frozen, samples) =
             (RowClock::default(), FrozenRows::of_gearbox(&car.gearbox.ratios()), RowSamples::new(&rows));
         let gears = Gears::new([signal::GEAR, signal::TARGET_GEAR]);
-        Ok(Self { car, columns, rows, clock, frozen, samples, gears, ahead: LookAhead::new(LOOK_AHEAD_S) })
+        let numbers = GearNumbers::of(car);
+        Ok(Self { car, columns, rows, clock, frozen, samples, numbers, gears, ahead: LookAhead::new(LOOK_AHEAD_S) })
     }
 
     /// A log that is still being written: no row waits for those after it.
     #[must_use]
     pub fn following(self) -> Self {
         Self { ahead: LookAhead::new(0.0), ..self }
+    }
+
+    /// Refuses a log most of whose rows have no time of their own.
+    ///
+    /// # Errors
+    /// It is one.
+    pub fn check_times(&self) -> Result<(), TraceError> {
+        self.clock.notes(&self.rows).map(drop)
     }
 
     /// What was met in the time stamps, the samples, the gears and of frozen speeds, in sentences.
@@ -285,10 +296,13 @@ impl<'c> CarLog<'c> {
             }
             let gears = &self.car.gearbox.gears;
             // A logger may write the gear as a number with decimals.
-            let whole = || text.parse::<f64>().ok().map(|number| format!("{number}"));
+            let number = || text.parse::<f64>().ok();
+            let whole = || number().map(|number| format!("{number}"));
+            // As in a channel map, zero is no gear and less than it reverse.
+            let not_forward = || self.numbers.gear(number().filter(|number| *number <= 0.0)?);
             let named = |name: &str| gears.iter().position(|gear| gear.name == name).map(Gear::at);
             let neutral = || NEUTRAL.contains(&&*text).then_some(Gear::Neutral);
-            let found = named(&text).or_else(neutral).or_else(|| named(&whole()?));
+            let found = named(&text).or_else(neutral).or_else(|| named(&whole()?)).or_else(not_forward);
             self.gears.take(which, found, || text.escape_debug().to_string());
         }
     }

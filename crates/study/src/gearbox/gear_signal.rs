@@ -58,8 +58,8 @@ impl GearSignal {
             return Err(format!("{met}\nhint: {gears}"));
         }
         Ok(Some(format!(
-            "{met}: the gear before is kept\nhint: if these values mean no gear, leave them out with `valid_range` of `channel.{name}` in a \
-             channel map"
+            "{met}: the gear before is kept\nhint: 0, N and P mean no gear, -1 and R reverse: `scale` and `offset` in a channel map make other numbers these, and \
+             `valid_range` of `channel.{name}` leaves out those that mean no signal"
         )))
     }
 }

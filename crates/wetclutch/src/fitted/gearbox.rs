@@ -17,6 +17,7 @@ use super::{
     nothing_held_out, said_of_channel, say_reasons,
 };
 use crate::estimate::gearbox::check_ratios;
+use crate::estimate::gearbox::checks::RowTimes;
 use crate::estimate::gearbox::source::{CarReading, CarSource};
 use crate::{Error, LogInput, Notes, VehicleFile, shell_quoted};
 
@@ -127,8 +128,9 @@ fn record_one(
 ) -> Result<Recorded, Error> {
     let mut opened = None;
     let mut steps = CarSource::open(CarReading { car, tables, log, stop: None, threads: 1 }, &mut opened, say)?;
-    let mut count = 0_u64;
+    let (mut count, mut times) = (0_u64, RowTimes::default());
     while let Some(step) = steps.next_step()? {
+        times.push(&step);
         if options.is_interrupted() {
             return Err(Error::interrupted());
         }
@@ -142,6 +144,8 @@ fn record_one(
             progress(FitProgress::Reading { log: log.path, time_s: Some(step.time_s) });
         }
     }
+    steps.check_times()?;
+    times.check(log.path, !log.map.channels.is_empty())?;
     steps.finish(say)?;
     Ok(recorder.finish())
 }

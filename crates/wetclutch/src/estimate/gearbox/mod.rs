@@ -1,6 +1,6 @@
 //! Estimates of a drive of a car with a gearbox, by the gearbox filter.
 
-mod checks;
+pub(crate) mod checks;
 pub(crate) mod columns;
 mod learnt;
 mod passing;
@@ -206,6 +206,7 @@ pub fn estimate(
     })?;
     let drive = LoggedDrive { filter, shifts };
     let origin_s = shown_from_s(times.first_s());
+    source.check_times()?;
     let median_s = times.check(path, !log.map.channels.is_empty())?;
     source.finish(say)?;
     if let Some(warning) = heard.warning(car, tables) {

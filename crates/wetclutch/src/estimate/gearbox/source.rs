@@ -166,6 +166,14 @@ impl<'a> CarSource<'a> {
         Ok(next)
     }
 
+    /// Refuses a table most of whose rows have no time of their own: the time between the others says nothing.
+    pub(crate) fn check_times(&self) -> Result<(), Error> {
+        match &self.kind {
+            SourceKind::Rows(rows) => Ok(rows.check_times()?),
+            SourceKind::Channels(_) => Ok(()),
+        }
+    }
+
     /// Says what was met in the log, after its last step.
     ///
     /// # Errors
