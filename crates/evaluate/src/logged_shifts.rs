@@ -349,6 +349,9 @@ impl<'c> LoggedShifts<'c> {
         if self.checks.slipping.is_found() {
             self.checks.torques.leave_out();
         }
+        if self.checks.converter.has_other_sign() {
+            self.checks.lock_up.leave_out();
+        }
         let of_car = self.beyond_bounds.warning(self.car, self.tables);
         let warnings = self.checks.each().into_iter().flat_map(|check| check.warnings());
         let warnings = warnings.chain(of_readings).chain(of_car).collect();

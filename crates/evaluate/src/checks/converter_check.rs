@@ -25,6 +25,8 @@ pub(crate) struct ConverterCheck<'c> {
     car: &'c Car,
     ratio: RatioHistogram<100>,
     rows: (u64, f64),
+    /// Rows in which the reported torque has the other sign, and their time, s.
+    opposite: (u64, f64),
     /// An engine speed, rad/s, and when it was read, s.
     before: Option<(f64, f64)>,
     is_steady: bool,
@@ -34,7 +36,7 @@ pub(crate) struct ConverterCheck<'c> {
 impl<'c> ConverterCheck<'c> {
     pub(super) fn new(car: &'c Car) -> Self {
         let ratio = RatioHistogram::default();
-        Self { car, ratio, rows: (0, 0.0), before: None, is_steady: false, reported_n_m: None }
+        Self { car, ratio, rows: (0, 0.0), opposite: (0, 0.0), before: None, is_steady: false, reported_n_m: None }
     }
 
     /// Takes a row with the newest speeds of engine and turbine, rad/s.
@@ -54,15 +56,31 @@ impl<'c> ConverterCheck<'c> {
         }
         let (Some(reported), true) = (self.reported_n_m, self.is_steady && !step.input.lock_up_applied) else { return };
         let pump = converter.torques(engine, turbine).pump_n_m;
-        if pump > MIN_N_M && reported > MIN_N_M && turbine <= MAX_SPEED_RATIO * engine {
-            self.ratio.push(reported / pump);
-            self.rows.0 += 1;
-            self.rows.1 += step.input.dt_s.clamp(0.0, 1.0);
+        if pump > MIN_N_M && reported.abs() > MIN_N_M && turbine <= MAX_SPEED_RATIO * engine {
+            let (rows, time_s) = if reported > 0.0 { &mut self.rows } else { &mut self.opposite };
+            *rows += 1;
+            *time_s += step.input.dt_s.clamp(0.0, 1.0);
+            if reported > 0.0 {
+                self.ratio.push(reported / pump);
+            }
         }
+    }
+
+    /// Whether the reported torque has the other sign in most rows.
+    pub(crate) fn has_other_sign(&self) -> bool {
+        let (rows, time_s) = self.opposite;
+        rows >= ENOUGH.0 && time_s >= ENOUGH.1 && rows > 2 * self.rows.0
     }
 
     /// What contradicts the vehicle file, in a sentence.
     fn warning(&self) -> Option<String> {
+        if self.has_other_sign() {
+            return Some(format!(
+                "warning: reported_engine_torque is negative in {} rows with a steady engine speed in which the converter takes torque: its sign is the other way \
+                 round, and the estimates do not use it\nhint: multiply its column with -1, or give `scale = -1` in `[channel.engine_torque]` of a channel map",
+                self.opposite.0
+            ));
+        }
         let (rows, time_s) = self.rows;
         let errors = ErrorBudget::of_logged_car(self.car);
         let ratio = self.ratio.middle();
@@ -135,6 +153,8 @@ mod tests {
             let found: f64 = found.split_once(' ').unwrap().0.parse().unwrap();
             assert!((found / fraction - 1.0).abs() < 0.015, "{said}");
         }
+        let other_sign = said(-1.0, 0.0, false, 1000).unwrap();
+        assert!(other_sign.contains("the other way round") && other_sign.contains("`scale = -1`"), "{other_sign}");
         for fraction in [0.85, 1.0, 1.18] {
             assert_eq!(said(fraction, 0.0, false, 1000), None);
         }

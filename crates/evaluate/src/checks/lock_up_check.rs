@@ -77,6 +77,11 @@ impl<'c> LockUpCheck<'c> {
         self.alike_s += lasting_s(alike_s, is_alike, dt_s, ALIKE_S);
     }
 
+    /// Leaves out what the torque shows: its sign is wrong.
+    pub(crate) fn leave_out(&mut self) {
+        self.by_torque_s = 0.0;
+    }
+
     /// What the log leaves out, in a sentence.
     fn warning(&self) -> Option<String> {
         let closed_s = if self.reported_n_m.is_some() { self.by_torque_s } else { self.alike_s };
