@@ -59,7 +59,10 @@ fn init_takes_ratios_and_final_ratio_of_a_log_and_says_what_it_does_not_show() {
     }
     // Of a gearbox whose ratios alone are known no command is used, and the map may have them.
     let suggested = folder.read("map.toml");
-    assert!(suggested.contains("[channel.element_") && suggested.contains("\n# ratios = [2.4"), "{suggested}");
+    assert!(
+        suggested.contains("[channel.element_") && suggested.contains("\n# ratios = [2.399, 1.467, 1.001, 0.667]"),
+        "{suggested}"
+    );
     assert!(!suggested.contains("valid_range"), "{suggested}");
     // A value that means that there is none.
     let text = std::fs::read_to_string(&log).unwrap();

@@ -26,6 +26,8 @@ const VEHICLE_MIN_M_S: f64 = 3.0;
 const TOGETHER_S: f64 = 0.03;
 /// Longest time that one reading stands for, s.
 const STANDS_S: f64 = 0.2;
+/// Readings of the turbine that wait for the next one of the output.
+const WAITING: usize = 256;
 
 /// A gear in which the car was driven.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,8 +51,20 @@ pub struct SeenGears {
     vehicle_per_wheel: Middle,
     /// Time and value of the newest reading.
     newest: [(f64, f64); 5],
+    /// Turbine speeds since the newest output speed.
+    waiting: Vec<Waiting>,
     gear: Option<f64>,
     engine_torque_n_m: f64,
+}
+
+/// A turbine speed that waits for the output speed after it: with that before it alone, its ratio would be off while the car accelerates.
+#[derive(Debug, Clone, Copy)]
+struct Waiting {
+    time_s: f64,
+    turbine_rad_s: f64,
+    /// For how long it stands, s.
+    stands_s: f64,
+    gear: Option<f64>,
 }
 
 /// The places of signals in [`SeenGears::newest`].
@@ -70,6 +84,7 @@ impl Default for SeenGears {
             output_per_vehicle: Middle::default(),
             vehicle_per_wheel: Middle::default(),
             newest: [(f64::NEG_INFINITY, f64::NAN); 5],
+            waiting: Vec::new(),
             gear: None,
             engine_torque_n_m: f64::NEG_INFINITY,
         }
@@ -87,17 +102,24 @@ impl SeenGears {
         if role == Role::EngineTorque {
             self.engine_torque_n_m = self.engine_torque_n_m.max(value);
         }
-        let (before_s, _) = std::mem::replace(&mut self.newest[at], (time_s, value));
-        let [turbine, output, wheel, vehicle] = [TURBINE, OUTPUT, WHEEL, VEHICLE].map(|other| {
+        let before = std::mem::replace(&mut self.newest[at], (time_s, value));
+        let [output, wheel, vehicle] = [OUTPUT, WHEEL, VEHICLE].map(|other| {
             let (other_s, value) = self.newest[other];
             if time_s - other_s <= TOGETHER_S { value } else { f64::NAN }
         });
         let is_driven = output > OUTPUT_MIN_RAD_S;
         match at {
             // Neutral and reverse are no forward gears.
-            TURBINE if is_driven && turbine > TURBINE_MIN_RAD_S && self.gear.is_none_or(|gear| gear > 0.0) => {
-                self.take_ratio(turbine / output, (time_s - before_s).clamp(0.0, STANDS_S));
+            TURBINE if value > TURBINE_MIN_RAD_S && self.gear.is_none_or(|gear| gear > 0.0) => {
+                let stands_s = (time_s - before.0).clamp(0.0, STANDS_S);
+                let now = Waiting { time_s, turbine_rad_s: value, stands_s, gear: self.gear };
+                match self.newest[OUTPUT] {
+                    (same_s, output) if same_s == time_s => self.take_ratio(now, output),
+                    _ if self.waiting.len() < WAITING => self.waiting.push(now),
+                    _ => {}
+                }
             }
+            OUTPUT => self.take_waiting(before, (time_s, value)),
             WHEEL if wheel > 0.0 && is_driven => self.output_over_wheel.push(output / wheel),
             VEHICLE if vehicle > VEHICLE_MIN_M_S => {
                 self.output_per_vehicle.push(output / vehicle);
@@ -107,11 +129,27 @@ impl SeenGears {
         }
     }
 
-    fn take_ratio(&mut self, ratio: f64, time_s: f64) {
-        let place = (Real::ln(ratio) - LOWEST) * FINE;
-        if (0.0..BINS as f64).contains(&place) {
-            self.time_s[place as usize] += time_s;
-            self.gear_s[place as usize] += time_s * self.gear.unwrap_or(f64::NAN);
+    /// Takes the turbine speeds between two output speeds, each a time, s, and a value.
+    fn take_waiting(&mut self, (from_s, from): (f64, f64), (to_s, to): (f64, f64)) {
+        let between = from_s..=to_s;
+        let is_near = to_s - from_s <= STANDS_S;
+        let mut waiting = std::mem::take(&mut self.waiting);
+        for one in waiting.drain(..) {
+            if one.time_s == to_s {
+                self.take_ratio(one, to);
+            } else if is_near && between.contains(&one.time_s) {
+                self.take_ratio(one, from + (to - from) * (one.time_s - from_s) / (to_s - from_s));
+            }
+        }
+        self.waiting = waiting;
+    }
+
+    /// Takes the ratio of a turbine speed and the output speed at its time, rad/s.
+    fn take_ratio(&mut self, Waiting { turbine_rad_s, stands_s, gear, .. }: Waiting, output_rad_s: f64) {
+        let place = (Real::ln(turbine_rad_s / output_rad_s) - LOWEST) * FINE;
+        if output_rad_s > OUTPUT_MIN_RAD_S && (0.0..BINS as f64).contains(&place) {
+            self.time_s[place as usize] += stands_s;
+            self.gear_s[place as usize] += stands_s * gear.unwrap_or(f64::NAN);
         }
     }
 

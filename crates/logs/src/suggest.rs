@@ -237,10 +237,14 @@ const UNUSED: usize = 20;
 /// Minimum and maximum of the values of a channel, in its unit; none where they are not known.
 type Range = Option<[f64; 2]>;
 
+/// Signals that every estimate needs: of a channel of them without values it has to be said.
+const NEEDED: [Role; 4] = [Role::TurbineSpeed, Role::OutputSpeed, Role::Gear, Role::TargetGear];
+
 /// A channel map for a log, as the text of a TOML file. Channels in doubt stand beside it as comments. `ranges` are those of the values of the channels; it
 /// is empty where they are not known.
 pub fn suggest(channels: &[Channel], ranges: &[Range], dbc: Option<&str>) -> String {
     let range = |at: usize| ranges.get(at).copied().flatten();
+    let is_empty = |at: usize| ranges.get(at).is_some_and(Option::is_none);
     let source = if ranges.is_empty() { "names and units" } else { "names, units and values" };
     let mut text = format!("# A first channel map, from {source} alone: check every line.\n");
     if let Some(dbc) = dbc {
@@ -273,7 +277,11 @@ pub fn suggest(channels: &[Channel], ranges: &[Range], dbc: Option<&str>) -> Str
             Some(fraction) => sum_of([best, fraction], entry.role, channels),
             None => table_of(entry.role.name(), entry.role, best, channels, range(best)),
         };
-        text += &if best_fit == Fit::Fraction { of_fraction(&table) } else { table };
+        text += &match best_fit {
+            Fit::Fraction => of_fraction(&table),
+            _ if is_empty(best) && !NEEDED.contains(&entry.role) => of_empty(&table),
+            _ => table,
+        };
         if let Some((at, [low, high])) =
             named[best].and_then(|at| Some((at, range(at)?))).filter(|(at, _)| !is_fraction(at))
         {
@@ -294,7 +302,8 @@ pub fn suggest(channels: &[Channel], ranges: &[Range], dbc: Option<&str>) -> Str
     }
     for (key, at) in &elements {
         let role = Role::of_element(key).map_or(Role::ElementCurrent, |(role, _)| role);
-        text += &table_of(key, role, *at, channels, range(*at));
+        let table = table_of(key, role, *at, channels, range(*at));
+        text += &if is_empty(*at) { of_empty(&table) } else { table };
     }
     let may_be_command = |channel: &Channel| {
         is_solenoid_without_unit(channel) || element(channel).is_some_and(|(role, _)| role != Role::ElementPressure)
@@ -324,10 +333,11 @@ pub fn suggest(channels: &[Channel], ranges: &[Range], dbc: Option<&str>) -> Str
 fn unit_by_values(role: Role, range: Range) -> &'static str {
     let is_above = |maximum: f64| range.is_some_and(|[_, high]| high > maximum);
     match role.quantity() {
-        // 7600 rpm, 250 km/h and 20 A \[chosen\].
+        // 7600 rpm, 250 km/h, 20 A and 150 % \[chosen\].
         Some(Quantity::Rotation) if is_above(800.0) => "rpm",
         Some(Quantity::Velocity) if is_above(70.0) => "km/h",
         Some(Quantity::Current) if is_above(20.0) => "mA",
+        Some(Quantity::Fraction) if is_above(1.5) => "%",
         _ => role.unit(),
     }
 }
@@ -372,11 +382,20 @@ fn sum_of([whole, fraction]: [usize; 2], role: Role, channels: &[Channel]) -> St
 
 /// The table of a channel that is per cent of a torque, as a comment: without a scale it would be wrong by a factor.
 fn of_fraction(table: &str) -> String {
-    let lines: String = table.lines().filter(|line| !line.is_empty()).map(|line| format!("# {line}\n")).collect();
+    let lines = commented(table);
     format!(
         "\n# In per cent of a torque that is not in the log. To use it, remove the number signs and write how many N m one per cent is.\n\
          {lines}# scale =\n"
     )
+}
+
+/// The table of a channel without a value in the log, as a comment: with it the log would be refused.
+fn of_empty(table: &str) -> String {
+    format!("\n# Without a value in this log. For logs that have some, remove the number signs.\n{}", commented(table))
+}
+
+fn commented(table: &str) -> String {
+    table.lines().filter(|line| !line.is_empty()).map(|line| format!("# {line}\n")).collect()
 }
 
 /// A text as TOML writes it.

@@ -102,7 +102,9 @@ impl WatchedColumns {
             },
             Likely::OtherChannel => "its column may have another signal, or its sensor has failed".to_owned(),
             Likely::OtherSign => {
-                "`wetclutch inspect --suggest` writes a channel map, in which the channel gets `scale = -1`".to_owned()
+                format!(
+                    "`wetclutch inspect --suggest` writes a channel map; add `scale = -1` below `[channel.{name}]` in it"
+                )
             }
         };
         Err(Error::Input(format!("{message}\nhint: {hint}")))
