@@ -1,6 +1,6 @@
 //! Estimates over whole drives, every row of them, also where the car hardly moves and the filter does not run.
 
-use crate::any_car::numbers;
+use crate::any_car::{column, numbers};
 use crate::support::{Folder, ROOT, said, wetclutch};
 
 /// RMS error of the torque of the offgoing and the oncoming clutch over all rows, N m, by the estimate and by the valve models alone.
@@ -34,6 +34,42 @@ fn torques_are_good_in_every_row_of_a_drive_in_town() {
             let errors = errors_n_m(&folder.read("sim/city.csv"), &folder.read("out.csv"));
             println!("{vehicle}, {calibration}: RMS error by the estimate and by the valve models {errors:.1?} N m");
             assert!(errors.iter().all(|[estimate, valve]| *estimate < 7.2 && *estimate < 0.3 * valve), "{errors:?}");
+        }
+    }
+}
+
+/// A hard stop behind toothed wheels: their old teeth show a slip that is none, by which a clutch that locks had its whole capacity, up to 1,800 N m off.
+#[test]
+fn a_clutch_that_locks_in_a_hard_stop_carries_the_load_alone() {
+    let folder = Folder::new("hard-stops");
+    let city = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
+    let (head, _) = city.split_once("[[segment]]").unwrap();
+    let head = head.replacen("repetitions = 20", "repetitions = 1", 1);
+    let segment = |duration_s: u32, throttle: f64, brake: f64| {
+        format!("[[segment]]\nduration_s = {duration_s}\nthrottle = {throttle}\nbrake = {brake}\n")
+    };
+    let drive: String = [(3, 0.0, 0.3), (18, 1.0, 0.0), (12, 0.0, 0.3), (10, 0.4, 0.0), (8, 0.0, 0.3)]
+        .map(|(duration_s, throttle, brake)| segment(duration_s, throttle, brake))
+        .concat();
+    let bench = std::fs::read_to_string(format!("{ROOT}experiments/bench.toml")).unwrap();
+    let sensors = &bench[bench.find("[sensors]").unwrap()..bench.find("# The observers").unwrap()];
+    let stated = folder.write("sensors.toml", sensors);
+    let drive = folder.write("city.toml", format!("{head}{drive}{sensors}"));
+    for vehicle in ["six_speed", "nine_speed_9hp", "ten_speed", "eight_speed"] {
+        let car = format!("{ROOT}vehicles/{vehicle}.toml");
+        said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
+        for more in [&[][..], &["--sensors", stated.as_str()]] {
+            let (log, out) = (folder.path("sim/city_measured.csv"), folder.path("out.csv"));
+            said(&wetclutch(&[&["estimate", &log, "--vehicle", &car, "-o", &out], more].concat()));
+            let (truth, found) = (folder.read("sim/city.csv"), folder.read("out.csv"));
+            let health = column(&found, "health");
+            let [true_n_m, found_n_m] = [(truth, "oncoming_torque_n_m"), (found, "oncoming_torque_estimate_n_m")]
+                .map(|(table, name)| numbers(&table, name));
+            let rows = health.iter().zip(true_n_m.iter().zip(&found_n_m)).filter(|(health, _)| *health == "too_slow");
+            let errors: Vec<f64> = rows.map(|(_, (a, b))| (a - b).abs()).filter(|error| !error.is_nan()).collect();
+            let maximum = errors.iter().copied().fold(0.0, f64::max);
+            println!("{vehicle}, stated: {}: {maximum:.0} N m at most in {} rows", !more.is_empty(), errors.len());
+            assert!(maximum < 66.0, "{vehicle}: {maximum} N m");
         }
     }
 }

@@ -83,6 +83,8 @@ pub struct ShiftEstimate<T> {
 
 /// Standard deviation of the part of a load that one of two clutches carries while both hold: any from none to all of it, uniform.
 const SHARED: f64 = 0.29;
+/// Standard deviations of the load beyond which a clutch that could carry more does not slip \[chosen\].
+const STRONGER: f64 = 3.0;
 /// Standard deviation of the rate of a speed near a standstill that is not read, rad/s^2 \[chosen\].
 const UNREAD_RAD_S2: f64 = 100.0;
 
@@ -103,6 +105,19 @@ impl<T: Real> ShiftEstimate<T> {
             commands: [ChannelHealth::Lost; MAX_ELEMENTS],
         }
     }
+}
+
+/// Whether a clutch could carry far more than what the other one leaves of the load of both: then it does not slip, whatever slow wheels show.
+fn is_stronger<T: Real>(
+    clutches: &[ClutchEstimate<T>; 2],
+    shift: &ShiftRow<T>,
+    clutch: usize,
+    [load_n_m, std_dev_n_m]: [T; 2],
+) -> bool {
+    let [off_n_m, on_n_m] =
+        core::array::from_fn(|c: usize| shift.clutches[c.min(1)].alpha * clutches[c.min(1)].torque_n_m);
+    let (can_n_m, other_n_m) = if clutch == 0 { (off_n_m, on_n_m) } else { (on_n_m, off_n_m) };
+    can_n_m.abs() > (load_n_m - other_n_m).abs() + T::of(STRONGER) * std_dev_n_m
 }
 
 /// Limits the torques by the valve models of clutches that hold, as the readings show no slip: such a clutch carries what the other one leaves of the load of
@@ -275,12 +290,18 @@ impl<T: Real> GearboxFilter<'_, T> {
         let (_, since_s) = state.gears;
         let (then, is_read) = (self.measured(&state.newest, None), self.are_read(&state.newest));
         let learnt = state.learnt.known_mean(&self.acting(shift));
-        let slips = shift.clutches.each_ref().map(|clutch| self.slip(clutch.ratio, then));
         let is_tied = |c: usize| !state.held_may_slip && shift.is_tied(c, since_s);
         let load = turbine_n_m.filter(|_| self.is_slow(state) && !state.held_may_slip);
         let load = load.map(|turbine_n_m| self.load_of_both(state, shift, turbine_n_m));
         // Of readings without bound there is none.
         let load = load.filter(|[load_n_m, std_dev_n_m]| load_n_m.is_finite() && std_dev_n_m.is_finite());
+        let slips = shift.clutches.each_ref().map(|clutch| {
+            let slip = self.slip(clutch.ratio, then);
+            // Slow wheels have old teeth: while the car brakes they show a slip where there is none.
+            let bounded = self.bounded_slip(clutch.ratio, &state.newest);
+            let is_shown = load.is_none() || bounded.is_some_and(|[slip, error]| slip.abs() > error);
+            if is_shown { slip } else { Slip { value: T::zero(), ..slip } }
+        });
         let driving_n_m = load.map(|[load_n_m, _]| load_n_m).or(turbine_n_m);
         // Of a shaft that stands, a toothed wheel gives no reading.
         let is_read = is_read || load.is_some();
@@ -290,14 +311,20 @@ impl<T: Real> GearboxFilter<'_, T> {
             let direction = Self::direction_by_valve(is_read, &slips[c], driving_n_m);
             self.by_valve(&state.elements, clutch, [slips[c].value, direction], lasting)
         });
+        // A clutch that seems to slip, and could carry far more than there is to carry, does not: nothing follows from that slip.
+        let mut is_doubted = [false; 2];
         if let Some(load) = load {
-            let has_pressure = |c: usize| shift.clutches[c].has_pressure();
-            let holds = core::array::from_fn(|c| is_tied(c) && has_pressure(c) && !slips[c].is_over());
+            let may_hold = |c: usize| is_tied(c) && shift.clutches[c.min(1)].has_pressure();
+            is_doubted = core::array::from_fn(|c| {
+                may_hold(c) && slips[c.min(1)].is_over() && is_stronger(&clutches, shift, c, load)
+            });
+            let holds = core::array::from_fn(|c| may_hold(c) && (!slips[c.min(1)].is_over() || is_doubted[c.min(1)]));
             limit_to_load(&mut clutches, shift, holds, load);
         }
         [0, 1].map(|c: usize| {
-            let (estimate, clutch) = (clutches[c.min(1)], &shift.clutches[c.min(1)]);
-            self.in_range(estimate, &state.elements, (clutch, is_tied(c)), &state.newest)
+            let c = c.min(1);
+            let is_tied = is_tied(c) && !is_doubted[c];
+            self.in_range(clutches[c], &state.elements, (&shift.clutches[c], is_tied), &state.newest)
         })
     }
 
