@@ -424,7 +424,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         state.fading_s = state.fading_s + dt_s;
         let since_s = if state.gears.0 == input.gear { state.gears.1 + dt_s } else { T::zero() };
-        if state.gears.0 != input.gear && !input.gear.is_steady() {
+        // After a change of mind the offgoing clutch has not held the gear before: the commands of that shift are those of the first one.
+        if state.gears.0.is_steady() && !input.gear.is_steady() {
             state.elements.iter_mut().flatten().for_each(ElementState::begin_shift);
         }
         state.gears = (input.gear, since_s);
