@@ -83,8 +83,11 @@ pub struct ShiftEstimate<T> {
 
 /// Standard deviation of the part of a load that one of two clutches carries while both hold: any from none to all of it, uniform.
 const SHARED: f64 = 0.29;
-/// Standard deviations of the load beyond which a clutch that could carry more does not slip \[chosen\].
-const STRONGER: f64 = 3.0;
+/// A clutch that could carry so many times the load, and as many standard deviations of it, does not slip \[chosen\]: one whose readings show a slip beyond
+/// their errors, and another one.
+const FAR_STRONGER: [f64; 2] = [3.0, 1.5];
+/// Part of its largest torque from which on a clutch is said to be strong \[chosen\]: one that is filled for a shift has less.
+const STRONG: f64 = 0.1;
 /// Standard deviation of the rate of a speed near a standstill that is not read, rad/s^2 \[chosen\].
 const UNREAD_RAD_S2: f64 = 100.0;
 
@@ -112,12 +115,12 @@ fn is_stronger<T: Real>(
     clutches: &[ClutchEstimate<T>; 2],
     shift: &ShiftRow<T>,
     clutch: usize,
-    [load_n_m, std_dev_n_m]: [T; 2],
+    ([load_n_m, std_dev_n_m], times): ([T; 2], f64),
 ) -> bool {
     let [off_n_m, on_n_m] =
         core::array::from_fn(|c: usize| shift.clutches[c.min(1)].alpha * clutches[c.min(1)].torque_n_m);
     let (can_n_m, other_n_m) = if clutch == 0 { (off_n_m, on_n_m) } else { (on_n_m, off_n_m) };
-    can_n_m.abs() > (load_n_m - other_n_m).abs() + T::of(STRONGER) * std_dev_n_m
+    can_n_m.abs() > T::of(times) * ((load_n_m - other_n_m).abs() + std_dev_n_m)
 }
 
 /// Limits the torques by the valve models of clutches that hold, as the readings show no slip: such a clutch carries what the other one leaves of the load of
@@ -295,13 +298,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         let load = load.map(|turbine_n_m| self.load_of_both(state, shift, turbine_n_m));
         // Of readings without bound there is none.
         let load = load.filter(|[load_n_m, std_dev_n_m]| load_n_m.is_finite() && std_dev_n_m.is_finite());
-        let slips = shift.clutches.each_ref().map(|clutch| {
-            let slip = self.slip(clutch.ratio, then);
-            // Slow wheels have old teeth: while the car brakes they show a slip where there is none.
-            let bounded = self.bounded_slip(clutch.ratio, &state.newest);
-            let is_shown = load.is_none() || bounded.is_some_and(|[slip, error]| slip.abs() > error);
-            if is_shown { slip } else { Slip { value: T::zero(), ..slip } }
-        });
+        let slips = shift.clutches.each_ref().map(|clutch| self.slip(clutch.ratio, then));
         let driving_n_m = load.map(|[load_n_m, _]| load_n_m).or(turbine_n_m);
         // Of a shaft that stands, a toothed wheel gives no reading.
         let is_read = is_read || load.is_some();
@@ -316,7 +313,12 @@ impl<T: Real> GearboxFilter<'_, T> {
         if let Some(load) = load {
             let may_hold = |c: usize| is_tied(c) && shift.clutches[c.min(1)].has_pressure();
             is_doubted = core::array::from_fn(|c| {
-                may_hold(c) && slips[c.min(1)].is_over() && is_stronger(&clutches, shift, c, load)
+                let bounded = self.bounded_slip(shift.clutches[c.min(1)].ratio, &state.newest);
+                let is_shown = bounded.is_some_and(|[slip, error]| slip.abs() > error);
+                let [if_shown, if_not] = FAR_STRONGER;
+                let load = (load, if is_shown { if_shown } else { if_not });
+                let is_strong = self.is_strong(&state.elements, &shift.clutches[c.min(1)], &clutches[c.min(1)]);
+                may_hold(c) && slips[c.min(1)].is_over() && is_strong && is_stronger(&clutches, shift, c, load)
             });
             let holds = core::array::from_fn(|c| may_hold(c) && (!slips[c.min(1)].is_over() || is_doubted[c.min(1)]));
             limit_to_load(&mut clutches, shift, holds, load);
@@ -325,6 +327,19 @@ impl<T: Real> GearboxFilter<'_, T> {
             let c = c.min(1);
             let is_tied = is_tied(c) && !is_doubted[c];
             self.in_range(clutches[c], &state.elements, (&shift.clutches[c], is_tied), &state.newest)
+        })
+    }
+
+    /// Whether a clutch carries more than a part of its largest torque by its valve model: less is within what slow wheels show of the load.
+    fn is_strong(
+        &self,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        clutch: &ShiftClutch<T>,
+        estimate: &ClutchEstimate<T>,
+    ) -> bool {
+        self.element(elements, clutch.element).is_some_and(|(_, element)| {
+            let most_n_m = element.clutch.static_capacity(element.limits.pressure_max_pa);
+            estimate.torque_n_m.abs() > T::of(STRONG) * most_n_m
         })
     }
 
