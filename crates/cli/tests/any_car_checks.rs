@@ -316,7 +316,7 @@ fn cells_that_are_no_numbers_are_counted_and_most_of_them_are_an_error() {
     }
 }
 
-/// `N` and 0 are no gear, and both are read by a table and by a channel map.
+/// `N` and 0 are no gear, `R` and -1 reverse, and all are read by a table and by a channel map.
 #[test]
 fn letters_and_numbers_of_no_gear_mean_the_same_with_and_without_a_map() {
     let folder = simulated("gear-letters");
@@ -338,16 +338,19 @@ fn letters_and_numbers_of_no_gear_mean_the_same_with_and_without_a_map() {
         let said = said(&estimate(&folder, "log.csv", &all));
         assert!(!said.contains("no gear of this gearbox") && !said.contains("are not numbers"), "{said}");
         let found = numbers(&folder.read("out.csv"), "gear_number");
-        (found.iter().filter(|number| **number == 0.0).count(), found)
+        (found[300], found.iter().filter(|number| **number <= 0.0).count(), found)
     };
     written("N");
-    let by_letter = numbers_of(&[]);
-    assert_eq!(by_letter.0, 100);
+    let of_neutral = numbers_of(&[]);
+    written("R");
+    let of_reverse = numbers_of(&[]);
+    assert_eq!([&of_neutral, &of_reverse].map(|found| (found.0, found.1)), [(0.0, 100), (-1.0, 100)]);
     let map = folder.path("map.toml");
     std::fs::write(&map, wetclutch(&["inspect", &folder.path("log.csv"), "--suggest"]).stdout).unwrap();
-    for cell in ["N", "P", "0"] {
+    let cells = [("N", &of_neutral), ("P", &of_neutral), ("0", &of_neutral), ("R", &of_reverse), ("-1", &of_reverse)];
+    for (cell, expected) in cells {
         written(cell);
-        assert!(numbers_of(&[]) == by_letter && numbers_of(&["--map", &map]) == by_letter, "{cell}");
+        assert!(numbers_of(&[]) == *expected && numbers_of(&["--map", &map]) == *expected, "{cell}");
     }
 }
 

@@ -92,14 +92,19 @@ fn weak_plates_in_slow_shifts_are_no_early_commands() {
     let drive = std::fs::read_to_string(format!("{ROOT}drives/faults.toml")).unwrap();
     let (drive, _) = drive.split_once("# From `from_s`").unwrap();
     let drive = drive.replacen("controller = \"bench\"", "controller = \"comfort\"", 1);
+    assert!(drive.contains("controller = \"comfort\""));
     let drive = drive + "[[fault]]\nkind = \"wrong-fluid\"\nfriction_factor = 0.75\nfrom_s = 0\n";
     let drive = folder.write("weak.toml", drive.replacen("name = \"faults\"", "name = \"weak\"", 1));
     for vehicle in ["six_speed", "eight_speed_a8lr1"] {
         let car = format!("{ROOT}vehicles/{vehicle}.toml");
         said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
         let (log, out) = (folder.path("sim/weak_measured.csv"), folder.path("out.csv"));
-        let said = said(&wetclutch(&["estimate", &log, "--vehicle", &car, "-o", &out]));
-        assert!(!said.contains("the commands of the valves come"), "{vehicle}: {said}");
+        let weak = said(&wetclutch(&["estimate", &log, "--vehicle", &car, "-o", &out]));
+        assert!(!weak.contains("the commands of the valves come"), "{vehicle}: {weak}");
+        // They still would be found.
+        let early = folder.write("early.csv", late(&folder.read("sim/weak_measured.csv"), -20));
+        let early = said(&wetclutch(&["estimate", &early, "--vehicle", &car, "-o", &out]));
+        assert!(early.contains("the commands of the valves come"), "{vehicle}: {early}");
     }
 }
 

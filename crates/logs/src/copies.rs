@@ -4,7 +4,7 @@
 //! sensors of two shafts agree to the last digit where the shafts turn together, as behind a lock-up clutch, and then their speeds came together by
 //! and by. A channel is a copy where three things hold. Both speeds agree to the last digit for [`SAMPLES`] samples. Before that they differed, and a
 //! line through the last two differences does not reach zero: it misses it by [`SUDDEN`] times the usual error of such a line. And one of both speeds
-//! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. Where the difference has a noise much larger than its resolution,
+//! jumped: it is the wrong one, until they differ again or for [`LONGEST_S`]. A difference that is closed within a tenth of a second anyway shows none. Where the difference has a noise much larger than its resolution,
 //! two sensors hardly agree to the last digit, also while a clutch makes their shafts one: then it is enough that one of both leaves the line
 //! through its own last values by [`SUDDEN`] times its usual error, and the other one by less than half of that. Where two shafts turn
 //! together, turbine and output in the direct gear, engine and turbine behind a lock-up clutch, neither leaves its line. There the shaft behind them
@@ -23,6 +23,9 @@ use crate::speed_faults::{GONE_S, LONGEST_S};
 const SAMPLES: u32 = 3;
 /// How many times its usual error a difference that was to be expected closes by at once, with a size that is no rounding, rad/s \[chosen\].
 const SUDDEN: (f64, f64) = (8.0, 1.0);
+/// Of two speeds one jumps to the other by more than the difference over the first of these, and the other one by less than that over the second
+/// \[chosen\].
+const ONE: [f64; 2] = [1.5, 3.0];
 /// A difference that goes to zero within this time, s, and by so many times its usual error in a sample, is closed by a clutch \[chosen\]: its plates
 /// stick at once in the end, and a copy would be little off until then.
 const CLOSING: (f64, f64) = (0.1, 2.0);
@@ -480,7 +483,8 @@ impl Pair {
         let which = usize::from(by[1] > by[0]);
         let closed = difference.abs();
         // A clutch that sticks takes the speeds of both its shafts to each other.
-        let is_one = 1.5 * by[which] > closed && 3.0 * by[1 - which] < closed;
+        let [jumps, stays] = ONE;
+        let is_one = jumps * by[which] > closed && stays * by[1 - which] < closed;
         let (soon_s, clearly) = CLOSING;
         let closing = -self.change * difference.signum();
         let is_closing = closing > clearly * mean && expected.abs() * passed_s <= soon_s * closing;

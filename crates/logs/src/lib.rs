@@ -58,6 +58,7 @@ pub use columns::{Block, Column, Columns};
 pub use error::LogError;
 pub use format::{CanKind, Format};
 pub use frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
+pub use gear_letters::number_of_letter;
 pub use held::HeldSpeed;
 pub use inspect::{ChannelSummary, Inspection, inspect};
 pub use log::{Log, OpenOptions, bytes_need_map, needs_map};

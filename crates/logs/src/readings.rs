@@ -263,7 +263,7 @@ impl<'a> Readings<'a> {
         let entry = &channels.resolved.entry;
         let mut quality = sample.quality;
         let mut value = sample.value;
-        // A letter needs no unit, and is within every range.
+        // The letter of a gear in a CSV table needs no unit, and is within every range.
         let is_gear = matches!(entry.role, Role::Gear | Role::TargetGear) && channels.parts.len() == 1;
         let letter = Some(value).filter(|value| is_gear && quality == Quality::Missing && value.is_finite());
         if channels.parts.len() > 1 {

@@ -12,8 +12,8 @@ pub enum Quality {
     /// It can be used.
     Good,
     /// It is not a finite number, or the frame is too short for the signal. (An empty cell of a table, or NaN in it or in a
-    /// channel of an MDF file that has no conversion, is no sample.) A finite value of such a sample is the number of a gear whose letter a table
-    /// has.
+    /// channel of an MDF file that has no conversion, is no sample.) A finite value of such a sample is the number of a gear whose letter a CSV
+    /// table has.
     Missing,
     /// Its invalidation bit is set.
     Invalid,

@@ -265,7 +265,8 @@ pub fn suggest(channels: &[Channel], ranges: &[Range], dbc: Option<&str>) -> Str
             .filter(|(i, _)| !taken[*i])
             .filter_map(|(i, channel)| fit(entry, channel).map(|fit| (fit, i)))
             .collect();
-        found.sort_by_key(|(fit, i)| (std::cmp::Reverse(*fit), *i));
+        // Of channels without a value one that fits well says less than one with values.
+        found.sort_by_key(|(fit, i)| (is_empty(*i) && *fit != Fit::Fraction, std::cmp::Reverse(*fit), *i));
         let Some(&(best_fit, best)) = found.first() else {
             if elements.is_empty() || !entry.role.is_command() {
                 missing.push(entry.role.name());

@@ -56,15 +56,16 @@ const LOAD_S: f64 = 0.3;
 const LEFT: f64 = 0.9;
 
 /// Errors of the torque at the same pressure, over the bounds of friction and valve gain together, and offsets of the pressures, over the bound of
-/// the hysteresis or half of what the error of the commands does, whichever is larger, that are tried \[chosen\].
+/// the hysteresis or half of what the error of the commands does, whichever is larger, that are tried \[chosen\]: old oil and worn plates take more
+/// than new ones add. Both together stand for another scale of the commands.
 const STRENGTHS: [f64; 6] = [-1.6, -1.0, -0.5, 0.0, 0.5, 1.0];
 const OFFSETS: [f64; 3] = [-4.0, 0.0, 4.0];
 /// Smallest factor of the torque that is tried.
 const FACTOR_MIN: f64 = 0.2;
-const CARS: usize = STRENGTHS.len() * OFFSETS.len();
+const VARIANTS: usize = STRENGTHS.len() * OFFSETS.len();
 
 /// By factor of the torque and offset of the pressures, then by move.
-type Differences = [[f64; MOVES]; CARS];
+type Differences = [[f64; MOVES]; VARIANTS];
 
 /// What a row says.
 #[derive(Debug, Clone, Copy)]
@@ -101,7 +102,7 @@ struct Waiting {
 pub(crate) struct CommandDelay<'c> {
     tables: &'c ShiftTables<f64>,
     /// Factors of the torques by the valve models, and offsets of their pressures, Pa, that are tried.
-    cars: [(f64, f64); CARS],
+    variants: [(f64, f64); VARIANTS],
     /// Delay from which on it is reported, s.
     reported_s: f64,
     /// The last rows, at least about [`GRID_S`] apart.
@@ -129,20 +130,20 @@ impl<'c> CommandDelay<'c> {
         let more_delay_s = (budget.widest(ElementErrors::valve_delay) - DEFAULT_DELAY_S).max(0.0);
         let more_lag_s = LAG_S * (budget.widest(|of| most_off(of.valve_lag_factor)) - DEFAULT_LAG).max(0.0);
         let strength = gain + budget.widest(|of| most_off(of.friction_factor));
-        let cars = std::array::from_fn(|at| {
+        let variants = std::array::from_fn(|at| {
             let (of_strength, of_offset) = (STRENGTHS[at / OFFSETS.len()], OFFSETS[at % OFFSETS.len()]);
             ((1.0 + of_strength * strength).max(FACTOR_MIN), of_offset * offset_pa)
         });
         let more_strength_s = LOAD_S * (strength - DEFAULT_STRENGTH).max(0.0);
         Self {
             tables,
-            cars,
+            variants,
             reported_s: REPORTED_S + more_delay_s + more_lag_s + more_strength_s,
             rows: VecDeque::new(),
             waiting: VecDeque::new(),
             age_s: 0.0,
             shifts: [0; 2],
-            differences: Box::new([[0.0; MOVES]; CARS]),
+            differences: Box::new([[0.0; MOVES]; VARIANTS]),
             found: None,
         }
     }
@@ -195,9 +196,9 @@ impl<'c> CommandDelay<'c> {
             clutches.map(|(_, place, clutch)| factor * clutch.clamp_force(point.valve_pa[place] + offset_pa))
         };
         let forces: Vec<Vec<[f64; 2]>> =
-            self.cars.iter().map(|&car| points.iter().map(|point| force(point, car)).collect()).collect();
+            self.variants.iter().map(|&variant| points.iter().map(|point| force(point, variant)).collect()).collect();
         let [m11, m12] = shift.mass_kg_m2[0];
-        let (mut sums, mut used) = ([[0.0; MOVES]; CARS], 0);
+        let (mut sums, mut used) = ([[0.0; MOVES]; VARIANTS], 0);
         for at in AROUND..points.len().saturating_sub(AROUND) {
             let (point, before, after) = (&points[at], &points[at - RATE], &points[at + RATE]);
             let rate = |of: fn(&Point) -> f64| (of(after) - of(before)) / (2.0 * span_s(RATE));

@@ -79,7 +79,7 @@ impl<'c> LockUpCheck<'c> {
 
     /// Leaves out what the torque shows: its sign is wrong.
     pub(crate) fn leave_out(&mut self) {
-        self.by_torque_s = 0.0;
+        self.reported_n_m = None;
     }
 
     /// What the log leaves out, in a sentence.

@@ -10,8 +10,9 @@ use crate::Series;
 const SETTLES_S: f64 = 0.5;
 /// Longest time without a reading of a speed, s.
 const GAP_S: f64 = 0.1;
-/// Rows further apart are of two stretches, s \[chosen\]: where a recording was stopped, nothing is known of what lies between them.
-const HOLE_S: f64 = 0.5;
+/// Rows further apart are of two stretches, s \[chosen\]: where a recording was stopped, nothing is known of what lies between them. Logs whose rows are
+/// so far apart have no shifts, and are refused.
+const HOLE_S: f64 = 1.0;
 /// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
 const OUTPUT_MIN_RAD_S: f64 = 15.0;
 /// The engine pulls where the turbine turns slower than this fraction of its speed, and until it turns faster than the second one \[chosen\] ...
@@ -91,17 +92,12 @@ impl DrivingRecorder {
         }
         let is_settled = time_s > self.unsettled_s + SETTLES_S;
         match (self.open, gear) {
-            (Some((open, begin_s)), Some(gear)) if open == gear && self.pulls(gear, time_s, PULLS[1], PULLS_N_M[1]) => {
-                if time_s < begin_s {
-                    self.close();
-                }
-            }
+            (Some((open, _)), Some(gear)) if open == gear && self.pulls(gear, time_s, PULLS[1], PULLS_N_M[1]) => {}
             (Some(_), _) => self.close(),
             (None, Some(gear)) if is_settled && self.pulls(gear, time_s, PULLS[0], PULLS_N_M[0]) => {
                 self.open = Some((gear, time_s));
             }
-            (None, _) if time_s < self.unsettled_s => self.unsettled_s = time_s,
-            (None, _) => (),
+            (None, _) => {}
         }
         if self.open.is_none() {
             self.forget();

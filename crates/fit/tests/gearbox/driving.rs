@@ -238,11 +238,11 @@ fn what_no_car_does_is_no_driving() {
     assert_eq!(driving(&|_, row| row.input.lock_up_applied = true), 0.0);
     assert_eq!(driving(&|_, row| row.input.engine_rad_s = None), 0.0);
     // A recorder that was stopped for a minute or a day while the engine pulled, a clock that was set, and one time of another clock.
+    for hole_s in [60.0, 86_400.0, 1.7e9] {
+        let later_s = driving(&|at, row| row.time_s += if at >= rows.len() / 2 { hole_s } else { 0.0 });
+        assert!(later_s <= usual_s && later_s > 0.8 * usual_s, "{hole_s}: {later_s} of {usual_s}");
+    }
     for hole_s in [60.0, 86_400.0, 1.7e9, 1e300] {
-        if hole_s < 1e300 {
-            let later_s = driving(&|at, row| row.time_s += if at >= rows.len() / 2 { hole_s } else { 0.0 });
-            assert!(later_s <= usual_s && later_s > 0.8 * usual_s, "{hole_s}: {later_s} of {usual_s}");
-        }
         let one_s = driving(&|at, row| row.time_s = if at == rows.len() / 2 { hole_s } else { row.time_s });
         assert!(one_s <= usual_s && one_s > 0.8 * usual_s, "{hole_s}: {one_s} of {usual_s}");
     }

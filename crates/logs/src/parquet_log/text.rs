@@ -49,11 +49,9 @@ fn first_texts(reader: &SerializedFileReader<File>, column: usize) -> Option<(us
                 break;
             }
             rows += read;
-            for number in some
-                .iter()
-                .map(|text| csv_file::number(text.data()).unwrap_or(f64::INFINITY))
-                .filter(|number| !number.is_nan())
-            {
+            // Letters of gears say nothing: a log may begin in park.
+            let others = some.iter().map(|text| text.data()).filter(|text| number_of_letter(text).is_none());
+            for number in others.map(number_of).filter(|number| !number.is_nan()) {
                 texts += 1;
                 numbers += usize::from(number.is_finite());
             }
@@ -65,8 +63,8 @@ fn first_texts(reader: &SerializedFileReader<File>, column: usize) -> Option<(us
     Some((numbers, texts))
 }
 
-/// The number in a text: NaN where it is empty, which is no value, that of a gear of a letter, and infinite where it holds something else, which is
-/// missing.
+/// The number in a text: NaN where it is empty, which is no value, that of the letter of a gear, which is a number as others, and infinite where it
+/// holds something else, which is missing.
 pub(super) fn number_of(text: &[u8]) -> f64 {
     csv_file::number(text).or_else(|| number_of_letter(text)).unwrap_or(f64::INFINITY)
 }

@@ -83,9 +83,10 @@ pub struct ShiftEstimate<T> {
 
 /// Standard deviation of the part of a load that one of two clutches carries while both hold: any from none to all of it, uniform.
 const SHARED: f64 = 0.29;
-/// A clutch that could carry so many times the load, and as many standard deviations of it, does not slip \[chosen\]: one whose readings show a slip beyond
-/// their errors, and another one.
-const FAR_STRONGER: [f64; 2] = [3.0, 1.5];
+/// So many times the sum of the load and its standard deviation a clutch could carry that does not slip \[chosen\]: also where the readings show a slip
+/// beyond their errors.
+const STRONGER: f64 = 1.5;
+const STRONGER_THAN_SHOWN: f64 = 3.0;
 /// Part of its largest torque from which on a clutch is said to be strong \[chosen\]: one that is filled for a shift has less.
 const STRONG: f64 = 0.1;
 /// Standard deviation of the rate of a speed near a standstill that is not read, rad/s^2 \[chosen\].
@@ -110,20 +111,7 @@ impl<T: Real> ShiftEstimate<T> {
     }
 }
 
-/// Whether a clutch could carry far more than what the other one leaves of the load of both: then it does not slip, whatever slow wheels show.
-fn is_stronger<T: Real>(
-    clutches: &[ClutchEstimate<T>; 2],
-    shift: &ShiftRow<T>,
-    clutch: usize,
-    ([load_n_m, std_dev_n_m], times): ([T; 2], f64),
-) -> bool {
-    let [off_n_m, on_n_m] =
-        core::array::from_fn(|c: usize| shift.clutches[c.min(1)].alpha * clutches[c.min(1)].torque_n_m);
-    let (can_n_m, other_n_m) = if clutch == 0 { (off_n_m, on_n_m) } else { (on_n_m, off_n_m) };
-    can_n_m.abs() > T::of(times) * ((load_n_m - other_n_m).abs() + std_dev_n_m)
-}
-
-/// Limits the torques by the valve models of clutches that hold, as the readings show no slip: such a clutch carries what the other one leaves of the load of
+/// Limits the torques by the valve models of clutches that hold, as the readings show no slip or one that is doubted: such a clutch carries what the other one leaves of the load of
 /// both at the turbine, N m, which is given with its standard deviation; two of them share it as they could hold it. The drag of other plates is left
 /// out.
 fn limit_to_load<T: Real>(
@@ -312,13 +300,18 @@ impl<T: Real> GearboxFilter<'_, T> {
         let mut is_doubted = [false; 2];
         if let Some(load) = load {
             let may_hold = |c: usize| is_tied(c) && shift.clutches[c.min(1)].has_pressure();
+            let at_turbine_n_m: [T; 2] =
+                core::array::from_fn(|c: usize| shift.clutches[c.min(1)].alpha * clutches[c.min(1)].torque_n_m);
+            let [load_n_m, std_dev_n_m] = load;
             is_doubted = core::array::from_fn(|c| {
-                let bounded = self.bounded_slip(shift.clutches[c.min(1)].ratio, &state.newest);
+                let c = c.min(1);
+                let bounded = self.bounded_slip(shift.clutches[c].ratio, &state.newest);
                 let is_shown = bounded.is_some_and(|[slip, error]| slip.abs() > error);
-                let [if_shown, if_not] = FAR_STRONGER;
-                let load = (load, if is_shown { if_shown } else { if_not });
-                let is_strong = self.is_strong(&state.elements, &shift.clutches[c.min(1)], &clutches[c.min(1)]);
-                may_hold(c) && slips[c.min(1)].is_over() && is_strong && is_stronger(&clutches, shift, c, load)
+                let times = T::of(if is_shown { STRONGER_THAN_SHOWN } else { STRONGER });
+                let is_stronger =
+                    at_turbine_n_m[c].abs() > times * ((load_n_m - at_turbine_n_m[1 - c]).abs() + std_dev_n_m);
+                let is_strong = self.is_strong(&state.elements, &shift.clutches[c], &clutches[c]);
+                may_hold(c) && slips[c].is_over() && is_strong && is_stronger
             });
             let holds = core::array::from_fn(|c| may_hold(c) && (!slips[c.min(1)].is_over() || is_doubted[c.min(1)]));
             limit_to_load(&mut clutches, shift, holds, load);

@@ -424,8 +424,11 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         state.fading_s = state.fading_s + dt_s;
         let since_s = if state.gears.0 == input.gear { state.gears.1 + dt_s } else { T::zero() };
-        // After a change of mind the offgoing clutch has not held the gear before: the commands of that shift are those of the first one.
-        if state.gears.0.is_steady() && !input.gear.is_steady() {
+        // After a change of mind the offgoing clutch has not held the gear before: a shift that is withdrawn, or goes to another gear, begins nothing.
+        let before = state.gears.0;
+        let is_withdrawn = input.gear.from == before.to && input.gear.to == before.from;
+        let goes_on = !before.is_steady() && (is_withdrawn || input.gear.from == before.from) && dt_s <= T::of(LOST_S);
+        if before != input.gear && !input.gear.is_steady() && !goes_on {
             state.elements.iter_mut().flatten().for_each(ElementState::begin_shift);
         }
         state.gears = (input.gear, since_s);

@@ -21,10 +21,6 @@ use super::pressure_command::command_for;
 use crate::frozen_rows::{FrozenRows, SpeedReadings};
 use crate::row_clock::{RowClock, RowTime};
 use crate::row_samples::{RowSamples, refuse_misnamed_engine};
-
-/// Names for neither a forward gear nor reverse.
-const NEUTRAL: [&str; 2] = ["N", "P"];
-
 /// Places of a speed or a command in the log, and of the age of its readings.
 #[derive(Debug, Clone, Copy)]
 struct ReadingColumn {
@@ -298,11 +294,13 @@ impl<'c> CarLog<'c> {
             // A logger may write the gear as a number with decimals.
             let number = || text.parse::<f64>().ok();
             let whole = || number().map(|number| format!("{number}"));
-            // As in a channel map, zero is no gear and less than it reverse.
-            let not_forward = || self.numbers.gear(number().filter(|number| *number <= 0.0)?);
             let named = |name: &str| gears.iter().position(|gear| gear.name == name).map(Gear::at);
-            let neutral = || NEUTRAL.contains(&&*text).then_some(Gear::Neutral);
-            let found = named(&text).or_else(neutral).or_else(|| named(&whole()?)).or_else(not_forward);
+            // As in a channel map, zero is no gear and less than it reverse.
+            let not_forward = || {
+                let number = logs::number_of_letter(text.as_bytes()).or_else(number)?;
+                self.numbers.gear(number).filter(|_| number <= 0.0)
+            };
+            let found = named(&text).or_else(|| named(&whole()?)).or_else(not_forward);
             self.gears.take(which, found, || text.escape_debug().to_string());
         }
     }
