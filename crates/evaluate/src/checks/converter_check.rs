@@ -77,7 +77,8 @@ impl<'c> ConverterCheck<'c> {
         if self.has_other_sign() {
             return Some(format!(
                 "warning: reported_engine_torque is negative in {} rows with a steady engine speed in which the converter takes torque: its sign is the other way \
-                 round, and where the lock-up clutch is applied the estimates are wrong by twice that torque\nhint: multiply its column with -1, or give `scale = -1` in `[channel.engine_torque]` of a channel map",
+                 round, and where the lock-up clutch is applied the estimates are wrong by twice that torque\nhint: multiply its column with -1, or give \
+                 `scale = -1` in `[channel.engine_torque]` of a channel map",
                 self.opposite.0
             ));
         }

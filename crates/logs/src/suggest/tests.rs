@@ -310,3 +310,22 @@ fn values_tell_a_unit_and_a_fraction() {
     let fraction = [Some([0.0, 2615.0]), None, Some([0.0, 160.0]), Some([0.0, 0.99])];
     assert!(suggest(&channels, &fraction, None).contains("combine = \"sum\""));
 }
+
+/// A map with them would be refused; of a speed that every estimate needs the log has to be looked at.
+#[test]
+fn channels_without_a_value_stand_as_comments() {
+    let speeds = [("TurbineSpeed", "rpm"), ("WheelSpeed", "rpm"), ("Throttle", "")];
+    let speeds = speeds.map(|(name, unit)| channel(name, unit));
+    let commands = ["a", "b", "c", "d"].map(|name| channel(&format!("element_{name}_current_a"), "A"));
+    let used = Some([0.0, 0.8]);
+    let ranges = [None, None, Some([0.0, 80.0]), None, used, used, used];
+    let text = suggest(&[&speeds[..], &commands[..]].concat(), &ranges, None);
+    let table: toml::Table = text.parse().unwrap();
+    let found = table["channel"].as_table().unwrap();
+    assert!(found.contains_key("turbine_speed") && found["throttle"]["unit"].as_str() == Some("%"), "{text}");
+    for key in ["wheel_speed", "element_a_current"] {
+        let comment = "# Without a value in this log. For logs that have some, remove the number signs.\n";
+        assert!(!found.contains_key(key) && text.contains(&format!("{comment}# [channel.{key}]\n")), "{key}: {text}");
+    }
+    assert!(found.contains_key("element_b_current"), "{text}");
+}

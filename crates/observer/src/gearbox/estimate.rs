@@ -83,11 +83,11 @@ pub struct ShiftEstimate<T> {
 
 /// Standard deviation of the part of a load that one of two clutches carries while both hold: any from none to all of it, uniform.
 const SHARED: f64 = 0.29;
-/// So many times the sum of the load and its standard deviation a clutch could carry that does not slip \[chosen\]: also where the readings show a slip
-/// beyond their errors.
+/// A clutch that could carry more than so many times the load, with one standard deviation added to it, does not slip \[chosen\]. The second one is for
+/// readings that show a slip beyond their errors.
 const STRONGER: f64 = 1.5;
 const STRONGER_THAN_SHOWN: f64 = 3.0;
-/// Part of its largest torque from which on a clutch is said to be strong \[chosen\]: one that is filled for a shift has less.
+/// Part of its largest torque from which on the slip of a clutch may be doubted \[chosen\]: one that is filled for a shift carries less.
 const STRONG: f64 = 0.1;
 /// Standard deviation of the rate of a speed near a standstill that is not read, rad/s^2 \[chosen\].
 const UNREAD_RAD_S2: f64 = 100.0;
@@ -111,9 +111,9 @@ impl<T: Real> ShiftEstimate<T> {
     }
 }
 
-/// Limits the torques by the valve models of clutches that hold, as the readings show no slip or one that is doubted: such a clutch carries what the other one leaves of the load of
-/// both at the turbine, N m, which is given with its standard deviation; two of them share it as they could hold it. The drag of other plates is left
-/// out.
+/// Limits the torques by the valve models of clutches that hold, as the readings show no slip, or one that is doubted: such a clutch carries what the
+/// other one leaves of the load of both at the turbine, N m, which is given with its standard deviation; two of them share it as they could hold it. The
+/// drag of other plates is left out.
 fn limit_to_load<T: Real>(
     clutches: &mut [ClutchEstimate<T>; 2],
     shift: &ShiftRow<T>,
