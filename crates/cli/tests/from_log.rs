@@ -90,7 +90,8 @@ fn init_takes_ratios_and_final_ratio_of_a_log_and_says_what_it_does_not_show() {
         assert!(text.contains(&format!("warning: {words}")), "{text}");
         std::fs::read_to_string(file).unwrap()
     };
-    unused(&["--gearbox", "ravigneaux_4"], "--from-log has no effect: ");
+    // The converter is one more number of the log.
+    unused(&["--gearbox", "ravigneaux_4", "--launch", "clutch"], "--from-log has no effect: ");
     assert!(!unused(&["--stroke"], "--stroke has no effect: ").contains("[fill]"));
     // A file that is there stays, and what is missing is asked for.
     assert!(refused(&init(&["--wheel-radius-m", "0.31"])).contains("the file is there already"));

@@ -50,7 +50,8 @@ fn speeds_that_come_late_are_found_in_the_gears() {
     println!("turbine 0.04 s late and stated so: {stated:.2} N m");
     for (channel, late_s, times) in [
         ("turbine", 0.01, 1.8),
-        ("output", 0.01, 1.8),
+        // A quarter above what was found: beside a ratio that may be off as well it takes a gear more to be known.
+        ("output", 0.01, 2.3),
         ("turbine", 0.02, 3.5),
         ("output", 0.02, 3.5),
         // A quarter above what was found; stated, such a delay has its price too: the filter is ahead of its readings by four rows.

@@ -55,6 +55,7 @@ mod studies;
 mod support;
 mod tables;
 mod units;
+mod unstated_sensors;
 mod watch;
 mod whole_drives;
 mod write_map;

@@ -107,11 +107,14 @@ impl Extremes {
         self.maximum.abs().max(self.minimum.abs()).min(limit)
     }
 
-    /// The maximum magnitude of a speed. A shaft passes every speed between two others: a tenth of the values or less that is parted from
-    /// all others by a factor of two and more are readings that are wrong, as of a sensor that says by a number that it has no value.
+    /// The maximum magnitude of a speed. A shaft passes every speed between two others: a tenth or less of the values of a shaft that turns, parted from
+    /// all others by a factor of two and more, are readings that are wrong, as of a sensor that says by a number that it has no value.
     fn speed(&self) -> f64 {
+        // From 2^2 rad/s on. The noise of a shaft that stands, which it may do for most of a log, is no speed.
+        const TURNS: usize = 34;
+
         let octaves = self.octaves();
-        let all: u64 = octaves.iter().sum();
+        let all: u64 = octaves.iter().skip(TURNS).sum();
         let (mut above, mut limit) = (0, f64::INFINITY);
         for (size, count) in (0_i32..64).zip(&octaves).rev() {
             if *count == 0 && above > 0 {
@@ -426,6 +429,18 @@ mod tests {
         let creeping = [of(Role::EngineSpeed, "rpm", 70..79, 1.0), of(Role::TurbineSpeed, "rpm", 0..84, 0.1)];
         assert_eq!(findings(&creeping, Seen::All), []);
         assert_eq!(findings(&[of(Role::Throttle, "%", 0..80, 1e-4)], Seen::All), []);
+    }
+
+    #[test]
+    fn the_speeds_of_a_car_that_mostly_stands_are_no_wrong_readings() {
+        // The first reading of a toothed wheel that begins to turn is of a speed already.
+        let log = |fastest: f64| {
+            let standing = (0..9500).map(|i| 0.02 * f64::from(i % 11) - 0.1);
+            standing.chain((0..500).map(move |i| 40.0 + (fastest - 40.0) * f64::from(i) / 500.0)).collect::<Vec<_>>()
+        };
+        let [turbine, output] = [(Role::TurbineSpeed, 194.0), (Role::OutputSpeed, 318.0)]
+            .map(|(role, fastest)| summary(role, "rad/s", &log(fastest)));
+        assert_eq!(findings(&[turbine, output], Seen::All), []);
     }
 
     #[test]

@@ -69,7 +69,8 @@ impl<'c> GearSpeeds<'c> {
         let moves = is_at_speed || output > MOVES_RAD_S && turbine > RATIO_FROM_RAD_S;
         // Where one of both is lost, the other shows no ratio; behind a one-way clutch that overruns the turbine turns freely.
         let is_tied = health != Health::OneWayOverruns && !(turbine - ratio * output).is_nan();
-        let is_compared = is_at_speed && is_tied;
+        // Sensors of toothed wheels do not tell which way a car in reverse goes.
+        let is_compared = is_at_speed && is_tied && ratio > 0.0;
         Some(RowInGear { gear, ratio, moves: moves && !is_rightly_slow, is_compared })
     }
 }

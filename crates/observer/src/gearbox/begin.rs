@@ -28,7 +28,10 @@ impl<T: Real> GearboxFilter<'_, T> {
         let overruns = self.overruns(input.gear, speeds);
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
-            let blind = running.silent_s[TURBINE].min(running.silent_s[OUTPUT]) > lost;
+            // In a gear one speed is that of the other; in a shift it takes both to see which clutch holds.
+            let [turbine_s, output_s] = [TURBINE, OUTPUT].map(|k| running.silent_s[k]);
+            let silent_s = if running.shift.is_some() { turbine_s.max(output_s) } else { turbine_s.min(output_s) };
+            let blind = silent_s > lost;
             let slow = running.x.mean[OUTPUT].abs() <= self.uncertainty.output_least_rad_s;
             let possible = running.x.is_sound()
                 && self.limits.shaft_torque_possible(running.x.mean[SPRING])

@@ -1,11 +1,14 @@
 //! Corrections by the readings of turbine, output and wheel speed.
 
 use super::{
-    ChannelHealth, GAP_S, GearboxFilter, MISFIT_S, Measured, Moment, OUTPUT, Rates, Reading, Running, SCALE, SPEEDS,
-    TOOTH, TURBINE, TWIST_RAD, Verdict, WHEEL, WHEEL_S, square,
+    ChannelHealth, GAP_S, GearboxFilter, INERTIA, MISFIT_S, Measured, Moment, OUTPUT, Rates, Reading, Running, SCALE,
+    SPEEDS, TOOTH, TURBINE, TWIST_RAD, Verdict, WHEEL, WHEEL_S, square,
 };
 use crate::gearbox::learnt::EDGE;
 use drivetrain::Real;
+
+/// The least inertia that is believed, as a fraction of that of the tables \[chosen\].
+const LIGHTEST: f64 = 0.5;
 
 impl<T: Real> GearboxFilter<'_, T> {
     /// Takes the readings of turbine, output and wheel, each against the speed at its time.
@@ -20,7 +23,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         let unseen = self.may_slip_unseen(running, speeds);
         let Some(torques) = running.torques else { return health.map(unused) };
         let torques = torques.without(running.phase.phase.holding());
-        let rates = Rates::new(&self.response(running), &torques, &self.driveline, self.wheels_kg_m2);
+        let response = self.response(running);
+        let rates = Rates::new(&response, &torques, &self.driveline, self.wheels_kg_m2);
         let by_timing = torques.by_timing();
         running.x.timing.add_pressure(&by_timing);
         for k in 0..SPEEDS {
@@ -35,6 +39,13 @@ impl<T: Real> GearboxFilter<'_, T> {
         health[SPEEDS] = self.take_acceleration(running, (acceleration.as_ref(), health[SPEEDS]), &rates, *dt_s);
         running.x.timing.add_pressure(&by_timing.map(|by| by.map(|by| -by)));
         running.rates = [TURBINE, OUTPUT, WHEEL].map(|k| rates.of(k, &running.x));
+        if let Some(shift) = &running.shift {
+            // The rate by the inertia as estimated, and not by that times the rate before: from step to step that would grow where the estimate is far off.
+            let (error, row) = (running.x.mean[INERTIA], rates.rows[TURBINE][INERTIA]);
+            let share = self.uncertainty.inertia_share * shift.mass_kg_m2[0][0] * response[0][0];
+            let heavier = (T::one() + error * share).at_least(T::of(LIGHTEST));
+            running.rates[TURBINE] = (running.rates[TURBINE] - error * row) / heavier;
+        }
         if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {
             running.before = None;
         }

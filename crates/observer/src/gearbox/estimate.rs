@@ -4,7 +4,7 @@ use car::ShiftCommand;
 use drivetrain::Real;
 
 use super::elements::{ElementState, PressureError};
-use super::phases::Slip;
+use super::phases::{STRONG, STRONGER_THAN_SHOWN, Slip};
 use super::powertrain::{ClutchTorque, Torques};
 use super::turbine::MIN_N_M;
 use super::{
@@ -83,12 +83,8 @@ pub struct ShiftEstimate<T> {
 
 /// Standard deviation of the part of a load that one of two clutches carries while both hold: any from none to all of it, uniform.
 const SHARED: f64 = 0.29;
-/// A clutch that could carry more than so many times the load, with one standard deviation added to it, does not slip \[chosen\]. The second one is for
-/// readings that show a slip beyond their errors.
+/// A clutch that could carry more than so many times the load, with one standard deviation added to it, does not slip \[chosen\].
 const STRONGER: f64 = 1.5;
-const STRONGER_THAN_SHOWN: f64 = 3.0;
-/// Part of its largest torque from which on the slip of a clutch may be doubted \[chosen\]: one that is filled for a shift carries less.
-const STRONG: f64 = 0.1;
 /// Standard deviation of the rate of a speed near a standstill that is not read, rad/s^2 \[chosen\].
 const UNREAD_RAD_S2: f64 = 100.0;
 
@@ -330,10 +326,8 @@ impl<T: Real> GearboxFilter<'_, T> {
         clutch: &ShiftClutch<T>,
         estimate: &ClutchEstimate<T>,
     ) -> bool {
-        self.element(elements, clutch.element).is_some_and(|(_, element)| {
-            let most_n_m = element.clutch.static_capacity(element.limits.pressure_max_pa);
-            estimate.torque_n_m.abs() > T::of(STRONG) * most_n_m
-        })
+        self.element(elements, clutch.element)
+            .is_some_and(|(_, element)| estimate.torque_n_m.abs() > T::of(STRONG) * element.most_n_m())
     }
 
     /// A clutch by its valve model and what is learnt of it, where the speeds cannot be used; `slip` is the slip at the turbine and the

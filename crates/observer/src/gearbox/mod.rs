@@ -57,6 +57,7 @@ mod readings;
 mod reported;
 mod running;
 mod skew;
+mod slip_fit;
 mod systematic;
 mod tables;
 mod timing;
@@ -83,6 +84,7 @@ use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, out
 use ratios::RatioErrors;
 use reported::Compared;
 use skew::Skew;
+use slip_fit::SlipFit;
 use timing::Timing;
 use turbine::InputSide;
 
@@ -352,7 +354,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             newest: [None; SPEEDS],
             noise: ReadingNoise::stated(),
             skew: Skew::nothing(),
-            ratios: RatioErrors::nothing(),
+            ratios: RatioErrors::nothing(self.lag_variances()),
             late: Late::nothing(),
             by_torque: None,
             felt: None,
@@ -414,7 +416,9 @@ impl<T: Real> GearboxFilter<'_, T> {
         state.started = true;
         // All that fades has done so, and larger numbers have no square in single precision.
         let dt_s = dt_s.at_most(T::of(LONGEST_S));
-        let of_one_time = state.skew.taken_off(input);
+        let signed = self.with_signs(state, input);
+        let input = signed.as_ref().unwrap_or(input);
+        let of_one_time = state.skew.taken_off(input, &state.newest, self.uncertainty.output_least_rad_s);
         let input = of_one_time.as_ref().unwrap_or(input);
         let at_ratios = self.at_ratios(state, input);
         let input = at_ratios.as_ref().unwrap_or(input);

@@ -28,8 +28,14 @@ const CAUGHT: (f64, u8) = (0.7, 2);
 const MEAN: f64 = 0.3;
 /// Readings in a row above the threshold after which a slip is believed.
 const BELIEVED: u8 = 3;
-/// Multiple of the threshold above which the oncoming clutch slips again.
+/// Multiple of the threshold above which the oncoming clutch slips again, and for a clutch that holds far more than it has to \[chosen\]: teeth that have passed
+/// some time ago show a slip of the second size where a car brakes hard.
 const SLIPS_AGAIN: f64 = 1.5;
+const SLIPS_THOUGH_STRONG: f64 = 3.0;
+/// A clutch that could carry more than so many times the load is stronger than a slip that the readings show \[chosen\].
+pub(super) const STRONGER_THAN_SHOWN: f64 = 3.0;
+/// Part of its largest torque from which on the slip of a clutch may be doubted \[chosen\]: one that is filled for a shift carries less.
+pub(super) const STRONG: f64 = 0.1;
 
 /// Which of the shift clutches hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -134,6 +140,16 @@ pub(super) struct Contact<T> {
     pub(super) needed_n_m: T,
     /// What it holds at most by the estimate, N m.
     pub(super) holds_n_m: T,
+    /// Whether it holds far more than it has to.
+    pub(super) is_strong: bool,
+}
+
+/// Whether a clutch that holds so much holds far more than it needs, N m; the most that it can hold at all is the measure below which that is not known. One without
+/// a command, which is known by the speeds alone, holds an infinite torque here.
+pub(super) fn is_strong<T: Real>(holds_n_m: T, needed_n_m: T, most_n_m: T) -> bool {
+    holds_n_m.is_finite()
+        && holds_n_m > T::of(STRONGER_THAN_SHOWN) * needed_n_m.abs()
+        && holds_n_m > T::of(STRONG) * most_n_m
 }
 
 impl<T: Real> Contact<T> {
@@ -240,25 +256,26 @@ impl<T: Real> PhaseMemory<T> {
 
     /// Whether the clutch that holds slips: by its slip, above this multiple of the threshold or small and lasting, or by its load.
     fn lets_go(&mut self, held: &Contact<T>, multiple: T, is_new: bool) -> bool {
-        let threshold = multiple * held.slip.threshold();
+        let times = if held.is_strong { T::of(SLIPS_THOUGH_STRONG) } else { T::one() };
+        let threshold = times.at_least(multiple) * held.slip.threshold();
         let slips = is_new && {
             let grows = self.new_slip.take(held.slip.value, threshold);
-            self.slip_lasts(&held.slip) || grows
+            self.slip_lasts(&held.slip, times) || grows
         };
         slips || held.is_overloaded()
     }
 
-    /// Whether the slip of the clutch that holds is small and lasts: the mean of it is over a threshold of its own.
-    fn slip_lasts(&mut self, slip: &Slip<T>) -> bool {
+    /// Whether the slip of the clutch that holds is small and lasts: the mean of it is over a threshold of its own, times a factor.
+    fn slip_lasts(&mut self, slip: &Slip<T>, times: T) -> bool {
         let fraction = T::of(MEAN);
         if slip.value.is_finite() {
             // What is above the threshold is judged by itself.
-            let limit = slip.threshold();
+            let limit = times * slip.threshold();
             let value = slip.value.at_least(-limit).at_most(limit);
             self.mean_rad_s = self.mean_rad_s + fraction * (value - self.mean_rad_s);
         }
         let std_dev = slip.std_dev * (fraction / (T::of(2.0) - fraction)).sqrt();
-        Slip { value: self.mean_rad_s, std_dev }.is_over()
+        Slip { value: self.mean_rad_s / times, std_dev }.is_over()
     }
 
     fn both_slip(&mut self, off: &Contact<T>, on: &Contact<T>) -> ShiftPhase {
@@ -280,7 +297,25 @@ mod tests {
     use super::*;
 
     fn contact(slip: f64, needed_n_m: f64) -> Contact<f64> {
-        Contact { slip: Slip { value: slip, std_dev: 0.1 }, needed_n_m, holds_n_m: 60.0 }
+        Contact { slip: Slip { value: slip, std_dev: 0.1 }, needed_n_m, holds_n_m: 60.0, is_strong: false }
+    }
+
+    #[test]
+    fn a_clutch_that_holds_far_more_than_it_has_to_slips_by_a_large_slip_alone() {
+        let after = |slips: &[f64]| {
+            let mut memory = PhaseMemory::new(ShiftPhase::OncomingHolds);
+            for &slip in slips {
+                let held = Contact { is_strong: true, ..contact(slip, 1.0) };
+                memory.step(&[contact(90.0, 0.0), held], [true; 2]);
+            }
+            memory.phase
+        };
+        assert_eq!(after(&[1.0; 30]), ShiftPhase::OncomingHolds);
+        assert_eq!(after(&[2.5, 5.0]), ShiftPhase::BothSlip);
+        assert_eq!(after(&[2.0; 3]), ShiftPhase::BothSlip);
+        assert!(is_strong(300.0, -60.0, 1000.0));
+        assert!(!is_strong(300.0, 120.0, 1000.0) && !is_strong(90.0, 1.0, 1000.0));
+        assert!(!is_strong(f64::INFINITY, 1.0, 1000.0) && !is_strong(f64::NAN, 1.0, 1000.0));
     }
 
     /// The phase after these samples of slip and torque needed, of offgoing and oncoming clutch.

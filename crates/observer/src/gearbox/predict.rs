@@ -7,6 +7,7 @@ use super::{
     tied, turbine,
 };
 use crate::gearbox::elements::positive_part;
+use crate::gearbox::phases::is_strong;
 use drivetrain::Real;
 
 impl<T: Real> GearboxFilter<'_, T> {
@@ -199,27 +200,30 @@ impl<T: Real> GearboxFilter<'_, T> {
             if holding.is_none() && running.has_turned(c, clutch) {
                 slip.value = T::zero();
             }
-            if slip.is_over() || holding.is_some_and(|held| held != c) {
-                // Its slip alone decides.
-                return Contact { slip, needed_n_m: T::zero(), holds_n_m: T::zero() };
+            // Its slip alone decides.
+            let by_slip = Contact { slip, needed_n_m: T::zero(), holds_n_m: T::zero(), is_strong: false };
+            if holding.is_some_and(|held| held != c) || (slip.is_over() && holding.is_none()) {
+                return by_slip;
             }
             let (row, rest) = self.held_torque(&shift, c, torques);
             let needed_n_m = running.x.value(&row) + rest;
+            let by_load = |holds_n_m: T| {
+                if slip.is_over() { by_slip } else { Contact { needed_n_m, holds_n_m, ..by_slip } }
+            };
             if clutch.element.is_dog() {
-                return Contact { slip, needed_n_m, holds_n_m: T::infinity() };
+                return by_load(T::infinity());
             }
             if clutch.is_one_way() {
-                let holds_n_m = if needed_n_m * clutch.alpha > T::zero() { T::infinity() } else { T::zero() };
-                return Contact { slip, needed_n_m, holds_n_m };
+                return by_load(if needed_n_m * clutch.alpha > T::zero() { T::infinity() } else { T::zero() });
             }
             if clutch.element.is_one_sided() && needed_n_m < T::zero() {
-                return Contact { slip, needed_n_m, holds_n_m: T::zero() };
+                return by_load(T::zero());
             }
+            let Some((memory, element)) = self.element(elements, clutch.element) else { return by_load(T::zero()) };
             let (factor, wrong) = (running.x.mean[FRICTION[c.min(1)]], running.x.pressure_error(c));
-            let holds_n_m = self
-                .element(elements, clutch.element)
-                .map_or(T::zero(), |(memory, element)| memory.holds(element, clutch, factor, &wrong));
-            Contact { slip, needed_n_m, holds_n_m }
+            let holds_n_m = memory.holds(element, clutch, factor, &wrong);
+            let most_n_m = clutch.alpha.abs() * element.most_n_m();
+            Contact { is_strong: is_strong(holds_n_m, needed_n_m, most_n_m), ..by_load(holds_n_m) }
         };
         let contacts = [contact(0), contact(1)];
         let before = running.phase.phase;

@@ -1,13 +1,7 @@
 //! By how much turbine over output speed differs from the ratio of each gear, found while that gear holds.
 //!
-//! A vehicle file has ratios of a few digits, and a sensor may be described with a wrong scale. In a gear whose ratio is `(1 + e) i`, with a turbine
-//! speed that is late by `d` against the output,
-//!
-//! ```text
-//! w_t - i w_o = e i w_o - d i w_o'
-//! ```
-//!
-//! Least squares over the time in the gears give `e` of each, with one `d` of all as another unknown. Turbine readings are divided by `1 + e`, in a
+//! A vehicle file has ratios of a few digits, and a sensor may be described with a wrong scale. The slip in the gears shows by how much each ratio is off, beside
+//! what the readings' ages make of it ([`super::slip_fit`]). Turbine readings are divided by one plus that, in a
 //! shift by what lies between those of both gears, as far as the ratio has come. A gear that was not driven yet is taken to have the mean of the
 //! others, as by a sensor's scale. A slip is distinguished by
 //! its changes: one that is steady at a steady speed looks alike until one of both changes.
@@ -15,30 +9,28 @@
 use car::ShiftCommand;
 use drivetrain::Real;
 
-use super::{GearboxFilter, GearboxState, OUTPUT, ShiftInput, TURBINE, square};
+use super::skew::WIDEST_S;
+use super::slip_fit::{GEARS, InGear};
+use super::{GearboxFilter, GearboxState, OUTPUT, ShiftInput, SlipFit, TURBINE, square};
 
-/// Gears whose ratios are followed \[chosen\]; those beyond are taken to have the mean of these.
-const GEARS: usize = 12;
 /// Largest error of a ratio that is taken off, as a fraction \[chosen\]: two digits of a ratio of 0.5 have half of it.
 const LARGEST: f64 = 0.02;
-/// Standard deviation of the error before the gear is driven, as a fraction \[chosen\].
-const UNKNOWN: f64 = 0.005;
 /// Standard deviations of it above which it is shown, and standard deviation below which it is known \[chosen\].
-const SHOWN: f64 = 4.0;
+const SHOWN: f64 = 2.0;
 const KNOWN: f64 = 2e-4;
 /// Smallest error that is taken off \[chosen\]: at 300 rad/s 0.15 rad/s, half of what counts as a slip of noiseless speeds. One that is taken off is until it is
 /// half of that.
 const SMALLEST: f64 = 5e-4;
 /// Change of an error that is known from which on it is taken anew \[chosen\].
 const CHANGED: f64 = 2.5e-4;
-/// The same from which on a skew that was found before is one of other speeds \[chosen\].
-const OTHER: f64 = 1e-3;
 /// Time for which the speeds have to be off a ratio with its error until that is forgotten, s \[chosen\].
 const OFF_S: f64 = 1.0;
-/// Time for which the speeds are those of a gear before they are compared, how long they are, and how long they count, s \[chosen\].
+/// Time for which the speeds are those of a gear before they are compared, and how long they are until an error is known, s \[chosen\].
 const SETTLED_S: f64 = 0.4;
 const COMPARED_S: f64 = 0.5;
-const MEMORY_S: f64 = 60.0;
+/// Multiple of its standard deviation from which on a rate counts \[chosen\]: the noise of the output speed is in rate and slip, and a weaker one would look
+/// like a delay.
+const RATE_SHOWN: f64 = 4.0;
 /// Root mean square of what the error does not explain, in thresholds of a slip, above which an element slips \[chosen\].
 const UNEXPLAINED: f64 = 0.5;
 /// Time constant with which slip and output speed are low-passed twice before they are compared, s \[chosen\]: the noise of the output speed is in slip and
@@ -47,21 +39,13 @@ const SMOOTH_S: f64 = 0.1;
 /// Time between two readings, and the longest one, s \[chosen\]: 20 readings a second are compared.
 const READ_S: f64 = 0.01;
 const LONGEST_S: f64 = 0.06;
-/// Of a sensor without noise, rad^2/s^2 \[chosen\].
-const SMALLEST_VARIANCE: f64 = 1e-6;
-
 /// What the readings in gears have shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct RatioErrors<T> {
     /// The speeds, as long as they are those of a gear.
     smooth: Option<Smooth<T>>,
-    gears: [Compared<T>; GEARS],
-    /// The gear that was driven last, and what the others show of the skew.
-    last: usize,
-    skew_of_others: [T; 2],
-    /// The skew `d` by all gears, s, and its standard deviation.
-    skew_s: [T; 2],
+    pub(super) slip: SlipFit<T>,
     /// Since when the speeds are off the ratio with its error, s.
     off_s: T,
     /// The error of each gear, as a fraction, once it is known.
@@ -84,87 +68,12 @@ struct Smooth<T> {
     since_s: T,
 }
 
-/// Least squares for `slip = e x + d rate` in a gear.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Compared<T> {
-    time_s: T,
-    /// Sums of the weights, and of them times `x x`, `x rate`, `rate rate`, and the slip times `x`, `rate` and itself.
-    weight: T,
-    sums: [T; 6],
-    /// Whether both explain the slip.
-    explains: bool,
-}
-
-impl<T: Real> Compared<T> {
-    fn nothing() -> Self {
-        Self { time_s: T::zero(), weight: T::zero(), sums: [T::zero(); 6], explains: false }
-    }
-
-    /// Takes `x`, the rate and the slip over a step, with the variances of slip and rate.
-    fn take(&mut self, [x, rate, slip]: [T; 3], dt_s: T, [variance, of_rate]: [T; 2]) {
-        // A reading that is repeated in faster rows counts once.
-        let weight = (dt_s / T::of(READ_S)).at_most(T::one()) / variance.at_least(T::of(SMALLEST_VARIANCE));
-        let products = [x * x, x * rate, rate * rate - of_rate, x * slip, rate * slip, slip * slip];
-        for (sum, product) in self.sums.iter_mut().zip(products) {
-            *sum = *sum + weight * product;
-        }
-        self.weight = self.weight + weight;
-        self.time_s = self.time_s + dt_s;
-        let kept = T::of(MEMORY_S) / self.time_s;
-        if kept < T::one() {
-            self.sums = self.sums.map(|sum| kept * sum);
-            self.weight = kept * self.weight;
-            self.time_s = T::of(MEMORY_S);
-        }
-    }
-
-    /// Information on the error.
-    fn of_error(&self) -> T {
-        self.sums[0] + T::of(1.0 / (UNKNOWN * UNKNOWN))
-    }
-
-    /// Information on the skew `d`, and that times its value.
-    fn of_skew(&self) -> [T; 2] {
-        let [_, mixed, rates, by_x, by_rate, _] = self.sums;
-        let per = mixed / self.of_error();
-        let information = rates - per * mixed;
-        // Of slow changes the noise alone may be left.
-        if information > T::zero() { [information, by_rate - per * by_x] } else { [T::zero(); 2] }
-    }
-
-    /// The skew `d` with what other gears show of it, s, and its standard deviation.
-    fn skew_s(&self, others: [T; 2]) -> [T; 2] {
-        let here = self.of_skew();
-        let information = others[0] + here[0];
-        [(others[1] + here[1]) / information, information.sqrt().recip()]
-    }
-
-    /// The error `e` once it is known, with this skew and its standard deviation, s; `largest_rad_s` bounds the root mean square of what both do not explain.
-    fn error(&mut self, [skew_s, skew_std_dev_s]: [T; 2], largest_rad_s: T) -> Option<T> {
-        let [_, mixed, _, by_x, by_rate, slips] = self.sums;
-        let of_error = self.of_error();
-        let error = (by_x - mixed * skew_s) / of_error;
-        let std_dev = (of_error.recip() + square(mixed / of_error * skew_std_dev_s)).sqrt();
-        let unexplained = (slips - error * by_x - skew_s * by_rate) / self.weight;
-        // A comparison with NaN is false.
-        self.explains = unexplained <= square(largest_rad_s);
-        let is_known = self.explains
-            && self.time_s >= T::of(COMPARED_S)
-            && std_dev <= T::of(KNOWN).at_least(error.abs() / T::of(SHOWN))
-            && error.abs() <= T::of(LARGEST);
-        is_known.then_some(error)
-    }
-}
-
 impl<T: Real> RatioErrors<T> {
-    pub(super) fn nothing() -> Self {
+    /// Before anything was read, with the variances of the lags of turbine and output, rad^2.
+    pub(super) fn nothing(lag_variances: [T; 2]) -> Self {
         Self {
             smooth: None,
-            gears: [Compared::nothing(); GEARS],
-            last: GEARS,
-            skew_of_others: [T::zero(); 2],
-            skew_s: [T::zero(), T::infinity()],
+            slip: SlipFit::nothing(lag_variances),
             off_s: T::zero(),
             found: [None; GEARS],
             others: T::zero(),
@@ -179,20 +88,6 @@ impl<T: Real> RatioErrors<T> {
         self.smooth = None;
     }
 
-    /// What the gears but this one show of the skew, which is at most so large, s.
-    fn skew_of_others(&mut self, place: usize, max_s: T) -> [T; 2] {
-        if place != self.last {
-            self.last = place;
-            // Of one that may be any up to the largest.
-            let mut sum = [T::of(3.0) / square(max_s.at_least(T::of(1e-3))), T::zero()];
-            for (_, gear) in self.gears.iter().enumerate().filter(|(other, gear)| *other != place && gear.explains) {
-                sum = core::array::from_fn(|k| sum[k] + gear.of_skew()[k]);
-            }
-            self.skew_of_others = sum;
-        }
-        self.skew_of_others
-    }
-
     fn of(&self, place: Option<u8>) -> T {
         place.and_then(|place| *self.found.get(usize::from(place))?).unwrap_or(self.others)
     }
@@ -203,23 +98,28 @@ impl<T: Real> RatioErrors<T> {
         from + self.way * (to - from)
     }
 
-    /// The skew of turbine and output speed, s, once it is known.
-    pub(super) fn skew_s(&self) -> Option<T> {
-        let [skew_s, std_dev_s] = self.skew_s;
-        (skew_s.abs() > T::of(3.0) * std_dev_s).then_some(skew_s)
+    /// The error of the ratio of the gear at hand once it is known, and from then on; `largest_rad_s` bounds the root mean square of what it does not explain
+    /// of the slip.
+    fn known(&self, place: usize, largest_rad_s: T) -> Option<T> {
+        let ([error, std_dev], time_s, unexplained) = self.slip.ratio()?;
+        let is_found = self.found.get(place).is_some_and(Option::is_some);
+        // A comparison with NaN is false.
+        let is_known = unexplained <= square(largest_rad_s)
+            && time_s >= T::of(COMPARED_S)
+            && (is_found || std_dev <= T::of(KNOWN).at_least(error.abs() / T::of(SHOWN)))
+            && error.abs() <= T::of(LARGEST);
+        is_known.then_some(error)
     }
 
-    /// Keeps what is known of a gear. By how much that changes what is taken off in it.
-    fn keep(&mut self, place: usize, error: T) -> T {
-        let Some(found) = self.found.get(place).copied() else { return T::zero() };
+    /// Keeps what is known of a gear.
+    fn keep(&mut self, place: usize, error: T) {
+        let Some(found) = self.found.get(place).copied() else { return };
         let before = found.unwrap_or(self.others);
         let smallest = T::of(if before == T::zero() { SMALLEST } else { 0.5 * SMALLEST });
         let error = if error.abs() >= smallest { error } else { T::zero() };
-        if found.is_some() && (error - before).abs() < T::of(CHANGED) {
-            return T::zero();
+        if found.is_none() || (error - before).abs() >= T::of(CHANGED) {
+            self.set(place, Some(error));
         }
-        self.set(place, Some(error));
-        error - before
     }
 
     fn set(&mut self, place: usize, error: Option<T>) {
@@ -239,7 +139,7 @@ impl<T: Real> RatioErrors<T> {
         self.off_s = if rest.abs() > threshold { self.off_s + dt_s } else { T::zero() };
         if self.off_s >= T::of(OFF_S) {
             self.off_s = T::zero();
-            self.gears[place.min(GEARS - 1)] = Compared::nothing();
+            self.slip.forget(place);
             self.set(place, None);
         }
     }
@@ -301,7 +201,8 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// Takes what a step of this time, s, has shown of the ratio of a gear. The filter may not run yet: another ratio looks like a slip.
     pub(super) fn take_ratio(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>, dt_s: T) {
-        let is_in_gear = input.gear.is_steady() && dt_s <= T::of(LONGEST_S);
+        // A clutch that takes up the load of a car that starts slips, which looks like a lag.
+        let is_in_gear = input.gear.is_steady() && dt_s <= T::of(LONGEST_S) && !state.launches;
         let gear = input.gear.to.place().filter(|place| is_in_gear && *place < GEARS);
         let Some((place, row)) = gear.and_then(|place| Some((place, self.tables.gears.get(place)?))) else {
             state.ratios.pause();
@@ -309,7 +210,9 @@ impl<T: Real> GearboxFilter<'_, T> {
         };
         let before = state.ratios.now();
         let found = self.compared(state, (place, row.ratio), dt_s);
-        let change = found.map_or(T::zero(), |error| state.ratios.keep(place, error));
+        if let Some(error) = found {
+            state.ratios.keep(place, error);
+        }
         if !state.ratios.differs && before == T::zero() {
             return;
         }
@@ -317,9 +220,6 @@ impl<T: Real> GearboxFilter<'_, T> {
         let now = state.ratios.now();
         if let Some(turbine) = state.newest[TURBINE].as_mut().filter(|_| now != before) {
             turbine.scale((T::one() + before) / (T::one() + now));
-        }
-        if change.abs() >= T::of(OTHER) {
-            state.skew.forget_turbine();
         }
     }
 
@@ -346,10 +246,11 @@ impl<T: Real> GearboxFilter<'_, T> {
         };
         pass(&mut smooth.output, now);
         let rate = ratio * (smooth.output[0] - smooth.output[1]) / T::of(SMOOTH_S);
-        let [late, earlier, _] = state.skew.late_s();
-        let (value, max_s) = (value - (late - earlier) * rate, self.uncertainty.channel_skew_s);
+        let [late, earlier, _] = state.skew.all_taken_s();
+        let value = value - (late - earlier) * rate;
+        let widest_s = (T::of(2.0) * self.uncertainty.channel_skew_s).at_least(T::of(WIDEST_S));
         let x = ratio * smooth.output[1];
-        let largest = slip.threshold() + T::of(2.0) * max_s * rate.abs() + T::of(LARGEST) * x.abs();
+        let largest = slip.threshold() + widest_s * rate.abs() + T::of(LARGEST) * x.abs();
         // A comparison with NaN is false.
         if value.abs() <= largest {
             pass(&mut smooth.slip, value);
@@ -358,18 +259,25 @@ impl<T: Real> GearboxFilter<'_, T> {
             if smooth.since_s < T::of(SETTLED_S) {
                 return None;
             }
-            let others = state.ratios.skew_of_others(place, max_s);
-            let of_rate =
-                T::of(0.25) * fraction * square(ratio * self.readings[OUTPUT].std_dev_rad_s / T::of(SMOOTH_S));
-            let gear = state.ratios.gears.get_mut(place)?;
-            gear.take([x, rate, smooth.slip[1]], dt_s, [square(slip.std_dev), of_rate]);
-            let skew_s = gear.skew_s(others);
-            let error = gear.error(skew_s, T::of(UNEXPLAINED) * slip.threshold());
-            state.ratios.skew_s = skew_s;
-            let taken = state.ratios.of(u8::try_from(place).ok());
-            let rest = smooth.slip[1] - taken * x - skew_s[0] * rate;
+            let of_output = self.readings[OUTPUT].std_dev_rad_s / T::of(SMOOTH_S);
+            let of_rate = T::of(0.5) * fraction.sqrt() * of_output;
+            let is_shown = rate.abs() > T::of(RATE_SHOWN) * ratio.abs() * of_rate;
+            let at = InGear {
+                slip: smooth.slip[1],
+                variance: square(slip.std_dev),
+                ratio,
+                output_rad_s: smooth.output[1],
+                rate_rad_s2: if is_shown { rate / ratio } else { T::zero() },
+            };
+            // A reading that is repeated in faster rows counts once.
+            let counts = (dt_s / T::of(READ_S)).at_most(T::one());
+            let ratios = &mut state.ratios;
+            ratios.slip.take((place, ratios.others), &at, (dt_s, counts));
+            let error = ratios.known(place, T::of(UNEXPLAINED) * slip.threshold());
+            let taken = ratios.of(u8::try_from(place).ok());
+            let rest = at.slip - taken * x - ratios.slip.late_rad_s(&at);
             if taken != T::zero() {
-                state.ratios.follow_off(place, rest, slip.threshold(), dt_s);
+                ratios.follow_off(place, rest, slip.threshold(), dt_s);
             }
             return error;
         }
@@ -383,14 +291,15 @@ mod tests {
 
     /// What 20 s of pulling away and coasting by turns show of a slip, rad/s, of speed and rate.
     fn found(slip: impl Fn(f64, f64, f64) -> f64) -> Option<f64> {
-        let mut compared = Compared::nothing();
+        let mut ratios = RatioErrors::nothing([0.0; 2]);
         for row in 0..2000 {
             let time_s = 0.01 * f64::from(row);
             let (speed, rate) = (200.0 + 60.0 * (0.5 * time_s).sin(), 30.0 * (0.5 * time_s).cos());
-            compared.take([speed, rate, slip(time_s, speed, rate)], 0.01, [0.15 * 0.15, 0.0]);
+            let slip = slip(time_s, speed, rate);
+            let at = InGear { slip, variance: 0.15 * 0.15, ratio: 1.0, output_rad_s: speed, rate_rad_s2: rate };
+            ratios.slip.take((0, 0.0), &at, (0.01, 1.0));
         }
-        let skew_s = compared.skew_s([3e4, 0.0]);
-        compared.error(skew_s, 0.4)
+        ratios.known(0, 0.4)
     }
 
     #[test]
@@ -414,28 +323,26 @@ mod tests {
 
     #[test]
     fn a_gear_that_was_not_driven_has_the_mean_of_the_others() {
-        let mut ratios = RatioErrors::nothing();
-        assert_eq!(
-            [(0, 0.004), (1, 0.002), (1, 0.0021)].map(|(place, error)| ratios.keep(place, error)),
-            [0.004, -0.002, 0.0]
-        );
+        let mut ratios = RatioErrors::nothing([0.0; 2]);
+        [(0, 0.004), (1, 0.002), (1, 0.0021)].map(|(place, error)| ratios.keep(place, error));
         assert_eq!([0, 1, 2, 99].map(|place| ratios.of(Some(place))), [0.004, 0.002, 0.003, 0.003]);
-        assert_eq!([(2, 0.0), (99, 0.01)].map(|(place, error)| ratios.keep(place, error)), [-0.003, 0.0]);
+        [(2, 0.0), (99, 0.01)].map(|(place, error)| ratios.keep(place, error));
+        assert_eq!(ratios.others, 0.002);
         (ratios.between, ratios.way) = ([Some(0), Some(1)], 0.25);
         assert_eq!(ratios.now(), 0.0035);
     }
 
     #[test]
     fn sensors_without_noise_show_it_too() {
-        let mut compared = Compared::nothing();
-        (0..200).for_each(|_| compared.take([200.0_f32, 0.0, 0.8], 0.01, [0.0; 2]));
-        let skew_s = compared.skew_s([3e4, 0.0]);
-        assert!(compared.error(skew_s, 0.4).is_some_and(|error| (error - 0.004).abs() < 1e-4));
+        let mut ratios = RatioErrors::nothing([0.0_f32; 2]);
+        let at = InGear { slip: 0.8, variance: 0.0, ratio: 1.0, output_rad_s: 200.0, rate_rad_s2: 0.0 };
+        (0..200).for_each(|_| ratios.slip.take((0, 0.0), &at, (0.01, 1.0)));
+        assert!(ratios.known(0, 0.4).is_some_and(|error| (error - 0.004).abs() < 1e-4));
     }
 
     #[test]
     fn an_error_about_the_smallest_does_not_come_and_go() {
-        let mut ratios = RatioErrors::nothing();
+        let mut ratios = RatioErrors::nothing([0.0; 2]);
         let kept = [4.9e-4, 5.1e-4, 4.9e-4, 5.1e-4, 3e-4, 2e-4, 4e-4].map(|error| {
             ratios.keep(0, error);
             ratios.of(Some(0))
@@ -445,7 +352,7 @@ mod tests {
 
     #[test]
     fn an_error_that_was_a_slip_is_forgotten() {
-        let mut ratios = RatioErrors::nothing();
+        let mut ratios = RatioErrors::nothing([0.0; 2]);
         ratios.keep(3, 0.01);
         for (rest, is_kept) in [(0.1, true), (2.0, true), (0.1, true), (2.0, false)] {
             (0..99).for_each(|_| ratios.follow_off(3, rest, 0.8, 0.01));

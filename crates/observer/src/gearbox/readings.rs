@@ -1,7 +1,7 @@
 //! What a step gives: commands, readings, and from them slip and torque at the gearbox input.
 
 use super::{
-    ChannelHealth, Channels, ElementState, Engine, FIRST_S, GearboxFilter, GearboxState, InputSide, LOST_S,
+    ChannelHealth, Channels, ElementState, Engine, FIRST_S, GearRow, GearboxFilter, GearboxState, InputSide, LOST_S,
     MAX_ELEMENTS, Newest, OUTPUT, Reading, Running, SPEEDS, ShiftElement, ShiftInput, Slip, SpeedReading, TURBINE,
     Verdict, WHEEL, pieces, square,
 };
@@ -11,7 +11,29 @@ use drivetrain::Real;
 /// Largest torque over the largest speed that is one of an engine, N m s \[chosen\]: far above all.
 const MAX_TORQUE_S: f64 = 10.0;
 
+/// Standard deviation of the angle by which a toothed wheel lags that is not described, rad \[chosen\]: half of the mean over six of sixty teeth.
+const LAG_RAD: f64 = 0.3;
+
 impl<T: Real> GearboxFilter<'_, T> {
+    /// The input with output and wheel speeds that turn backward, if they come without a sign: toothed wheels give none, and in a reverse gear both shafts do not
+    /// turn forward.
+    pub(super) fn with_signs(&self, state: &GearboxState<T>, input: &ShiftInput<T>) -> Option<ShiftInput<T>> {
+        let is_reverse = |gear: &GearRow<T>| gear.ratio < T::zero();
+        self.tables.gear(input.gear.to).filter(|gear| input.gear.is_steady() && is_reverse(gear))?;
+        let turbine = input.turbine_rad_s.map(|reading| reading.value);
+        let turbine = turbine.or(state.newest[TURBINE].map(|newest| newest.value))?;
+        let turns_forward = |speed: &Option<Reading<T>>| speed.is_some_and(|reading| reading.value > T::zero());
+        let is_unsigned = turns_forward(&input.output_rad_s) || turns_forward(&input.wheel_rad_s);
+        (turbine > T::zero() && is_unsigned).then(|| {
+            let backward = |reading: Reading<T>| Reading { value: -reading.value.abs(), ..reading };
+            ShiftInput {
+                output_rad_s: input.output_rad_s.map(backward),
+                wheel_rad_s: input.wheel_rad_s.map(backward),
+                ..*input
+            }
+        })
+    }
+
     /// Lets the valve models go on and takes the commands. The health of each element's command.
     pub(super) fn pass_elements(
         &self,
@@ -124,6 +146,12 @@ impl<T: Real> GearboxFilter<'_, T> {
             }
         }
         ChannelHealth::Good
+    }
+
+    /// Variances of the angles by which turbine and output speed lag beside what is stated, rad^2.
+    pub(super) fn lag_variances(&self) -> [T; 2] {
+        let of = |pitch_rad: T| if pitch_rad > T::zero() { T::zero() } else { square(T::of(LAG_RAD)) };
+        [TURBINE, OUTPUT].map(|k| of(self.readings[k].pitch_rad))
     }
 
     /// Speed of turbine, output or wheel below which the teeth of its sensor are not waited for, rad/s: that of the output, at the wheels.

@@ -1,21 +1,20 @@
 //! By how much the readings of turbine, output and wheel speed are late against each other, found while a gear holds.
 //!
-//! In the gear `w_t = i w_o`, and but for the twist of the shafts `w_o = i_df w_w`. Readings that are late by `d_t`, `d_o` and `d_w`, with a wheel speed that
-//! reads `1 + s` times the true one, differ by
+//! Delay and lags of turbine and output speed are those of the slip in gears ([`super::slip_fit`]). But for the twist of the shafts `w_o = i_df w_w`. Readings that
+//! are late by `d_o` and `d_w`, with a wheel speed that reads `1 + s` times the true one, differ by
 //!
 //! ```text
-//! w_t - i w_o    = -(d_t - d_o) i w_o'
 //! w_o/i_df - w_w = (d_w - d_o) w_w' - s w_w
 //! ```
 //!
-//! Least squares over the time in gears give `d_t - d_o` and `d_w - d_o`. A delay that all have in common does not show, and a wheel speed that is earlier than
-//! both others is taken to be of their time. A clutch that creeps with the torque looks like a skew; a slip as another unknown beside it makes the skew
-//! uncertain where the teeth of the sensors are not known.
+//! Least squares over the time in gears give `d_w - d_o`. A delay that all have in common does not show, and a wheel speed that is earlier than
+//! both others is taken to be of their time. A clutch that creeps with the torque looks like a skew.
 
 use drivetrain::Real;
 
 use super::{
-    FIRST_S, GearboxFilter, GearboxState, LONGEST_DELAY_S, Newest, OUTPUT, SPEEDS, ShiftInput, TURBINE, WHEEL, square,
+    FIRST_S, GearboxFilter, GearboxState, LONGEST_DELAY_S, Newest, OUTPUT, SPEEDS, ShiftInput, SlipFit, TURBINE, WHEEL,
+    square,
 };
 
 /// Smallest delays that are taken off, s \[chosen\]: of turbine against output, more than the lags of toothed wheels leave, and of the wheels.
@@ -32,14 +31,10 @@ const LONG_STD_DEV_S: f64 = 2e-3;
 const CHANGED_S: f64 = 2e-3;
 /// A delay is long from so much above the largest skew of the error budget on, and until it is so much below, as a fraction \[chosen\].
 const APART: f64 = 0.25;
-/// Standard deviations below which what came long ago counts less, s \[chosen\].
-const KNOWN_S: f64 = 2e-4;
+/// Standard deviation below which what came long ago counts less, s \[chosen\].
 const WHEEL_KNOWN_S: f64 = 1e-3;
-/// Multiple of its standard deviation from which on a rate counts \[chosen\]: the noise of the output speed is in rate and slip, and a weaker one would look
-/// like a skew.
-const RATE_SHOWN: f64 = 4.0;
 /// Longest delay by which speeds may look like a slip and are those of the gear, s \[chosen\]: the longest that is taken off and a fifth of it.
-const WIDEST_S: f64 = 1.2 * LONGEST_DELAY_S;
+pub(super) const WIDEST_S: f64 = 1.2 * LONGEST_DELAY_S;
 /// Slip at the turbine below which speeds are near those of a gear, as a fraction of its speed \[chosen\].
 const NEAR: f64 = 0.03;
 /// Density of the rate of twist of the shafts, rad^2/s \[chosen\]: 0.1 rad/s for 0.3 s each way. It is noise here, as it changes its sign with each change of
@@ -53,20 +48,22 @@ const SMOOTH_S: f64 = 0.1;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Skew<T> {
     smooth: Option<Smooth<T>>,
-    turbine: Delay<T>,
     wheel: Delay<T>,
     /// By how much turbine, output and wheel speed are late against the earlier one of the first two, s: delays that are taken as ages of the readings.
     late_s: [T; SPEEDS],
+    /// The angles by which turbine and output lag beside them, rad, once they have shown themselves.
+    lags_rad: Option<[T; 2]>,
+    /// What of both has been taken off the newest readings, s.
+    taken_s: [T; SPEEDS],
     /// Longer ones, s, which are taken as delays of the sensors ([`super::late`]).
     delays_s: [T; SPEEDS],
 }
 
-/// Speed of the output, slip of the turbine against it, and of the output over the final ratio against the wheels, low-passed, rad/s.
+/// Speed of the output, and slip of the output over the final ratio against the wheels, low-passed, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Smooth<T> {
     output: T,
-    slip: T,
     twist: Option<T>,
 }
 
@@ -110,22 +107,22 @@ impl<T: Real> Delay<T> {
             }
         }
     }
+}
 
-    /// The delay if it is known to this standard deviation, s; zero as long as it may be none or is smaller than the minimum.
-    fn shown(&self, min_s: f64, std_dev_max_s: f64) -> Option<T> {
-        let [delay_s, std_dev_s] = self.found.filter(|[_, std_dev_s]| *std_dev_s <= T::of(std_dev_max_s))?;
-        let is_shown = delay_s.abs() > (T::of(SHOWN) * std_dev_s).at_least(T::of(min_s));
-        Some(if is_shown { delay_s } else { T::zero() })
-    }
+/// The delay if it is known to this standard deviation, s; zero as long as it may be none or is smaller than the minimum.
+fn shown<T: Real>([delay_s, std_dev_s]: [T; 2], min_s: f64, std_dev_max_s: f64) -> Option<T> {
+    let is_shown = delay_s.abs() > (T::of(SHOWN) * std_dev_s).at_least(T::of(min_s));
+    (std_dev_s <= T::of(std_dev_max_s)).then_some(if is_shown { delay_s } else { T::zero() })
 }
 
 impl<T: Real> Skew<T> {
     pub(super) fn nothing() -> Self {
         Self {
             smooth: None,
-            turbine: Delay::nothing(),
             wheel: Delay::nothing(),
             late_s: [T::zero(); SPEEDS],
+            lags_rad: None,
+            taken_s: [T::zero(); SPEEDS],
             delays_s: [T::zero(); SPEEDS],
         }
     }
@@ -135,14 +132,30 @@ impl<T: Real> Skew<T> {
         self.smooth = None;
     }
 
-    /// The input with readings that are older by what was found, if something was.
-    pub(super) fn taken_off(&self, input: &ShiftInput<T>) -> Option<ShiftInput<T>> {
-        if self.late_s == [T::zero(); SPEEDS] {
+    /// The input with readings that are older by what was found, if something was. Those of toothed wheels are the older the slower these turn, down to a
+    /// least speed.
+    pub(super) fn taken_off(
+        &mut self,
+        input: &ShiftInput<T>,
+        newest: &[Option<Newest<T>>; SPEEDS],
+        least_rad_s: T,
+    ) -> Option<ShiftInput<T>> {
+        self.taken_s = self.late_s;
+        if let Some(lags_rad) = self.lags_rad {
+            let given = [input.turbine_rad_s, input.output_rad_s];
+            let [turbine_s, output_s]: [T; 2] = core::array::from_fn(|k| {
+                let value = given[k].map(|reading| reading.value).or(newest[k].map(|newest| newest.value));
+                self.late_s[k] + lags_rad[k] / value.map_or(least_rad_s, T::abs).at_least(least_rad_s)
+            });
+            let earlier_s = turbine_s.min(output_s);
+            (self.taken_s[TURBINE], self.taken_s[OUTPUT]) = (turbine_s - earlier_s, output_s - earlier_s);
+        }
+        if self.taken_s == [T::zero(); SPEEDS] {
             return None;
         }
         let mut input = *input;
         let speeds = [&mut input.turbine_rad_s, &mut input.output_rad_s, &mut input.wheel_rad_s];
-        for (reading, late_s) in speeds.into_iter().zip(self.late_s) {
+        for (reading, late_s) in speeds.into_iter().zip(self.taken_s) {
             if let Some(reading) = reading {
                 reading.age_s = reading.age_s + late_s;
             }
@@ -160,26 +173,29 @@ impl<T: Real> Skew<T> {
         (self.delays_s != [T::zero(); SPEEDS]).then_some(self.delays_s)
     }
 
-    /// Forgets what turbine and output speed have shown. What is taken off stays until they show it anew.
-    pub(super) fn forget_turbine(&mut self) {
-        self.turbine = Delay::nothing();
+    /// All that is taken off the newest readings of turbine, output and wheel speed, s.
+    pub(super) fn all_taken_s(&self) -> [T; SPEEDS] {
+        core::array::from_fn(|k| self.taken_s[k] + self.delays_s[k])
     }
 
-    /// Takes what is found off from now on. By the error budget turbine and output have at most this skew, s; it may be longer where `joint`, the same found
-    /// with errors of the ratios as other unknowns, is too.
-    fn take_off(&mut self, max_s: T, joint: Option<T>) {
+    /// Takes what the slip in the gear of this ratio and the wheels have shown off from now on. By the error budget turbine and output have at most this skew,
+    /// s; it may be longer where it is known well.
+    fn take_off(&mut self, slip: &SlipFit<T>, ratio: T, max_s: T) {
         let zero = T::zero();
-        let is_long = self.turbine.found.zip(joint).is_some_and(|([delay_s, std_dev_s], joint_s)| {
-            std_dev_s <= T::of(LONG_STD_DEV_S) && delay_s * joint_s > zero && joint_s.abs() > max_s && max_s > zero
+        if self.lags_rad.is_some() || slip.shows_lag(ratio) {
+            self.lags_rad = Some(slip.lags_rad());
+        }
+        let found = slip.delay_s();
+        let is_long = found.is_some_and(|[delay_s, std_dev_s]| {
+            std_dev_s <= T::of(LONG_STD_DEV_S) && delay_s.abs() > max_s && max_s > zero
         });
         let is_kept = self.delays_s != [zero; SPEEDS];
         let longest_s = if is_long || is_kept { T::of(LONGEST_DELAY_S).at_least(max_s) } else { max_s };
-        let turbine = -self.turbine.shown(MIN_S, f64::INFINITY).unwrap_or(zero);
+        // Beside lags that are taken off, a delay is what they leave.
+        let min_s = if self.lags_rad.is_some() { 0.0 } else { MIN_S };
+        let turbine = -found.and_then(|found| shown(found, min_s, f64::INFINITY)).unwrap_or(zero);
         let turbine = turbine.at_least(-longest_s).at_most(longest_s);
-        let mut late_s = [turbine.at_least(zero), (-turbine).at_least(zero)];
-        if self.turbine.found.is_none() {
-            late_s = [TURBINE, OUTPUT].map(|k| self.late_s()[k]);
-        }
+        let late_s = [turbine.at_least(zero), (-turbine).at_least(zero)];
         for ((late_s, as_age_s), delay_s) in late_s.into_iter().zip(&mut self.late_s).zip(&mut self.delays_s) {
             // Around the longest age it does not change from one to the other and back.
             let longest_age_s = T::of(if *delay_s > zero { 1.0 - APART } else { 1.0 + APART }) * max_s;
@@ -189,7 +205,8 @@ impl<T: Real> Skew<T> {
                 *delay_s = if is_long { late_s } else { zero };
             }
         }
-        let wheel = self.wheel.shown(WHEEL_MIN_S, WHEEL_STD_DEV_MAX_S).map_or(zero, |wheel| wheel + late_s[1]);
+        let wheel = self.wheel.found.and_then(|found| shown(found, WHEEL_MIN_S, WHEEL_STD_DEV_MAX_S));
+        let wheel = wheel.map_or(zero, |wheel| wheel + late_s[1]);
         self.late_s[WHEEL] = wheel.at_least(zero).at_most(T::of(LONGEST_DELAY_S));
     }
 }
@@ -204,19 +221,18 @@ impl<T: Real> GearboxFilter<'_, T> {
     /// Takes what a step of this time, s, has shown of the skew in a gear. The filter may not run yet: late readings look like a slip.
     pub(super) fn take_skew(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>, dt_s: T) {
         let gear = self.tables.gear(input.gear.to).filter(|_| input.gear.is_steady() && dt_s <= T::of(FIRST_S));
-        let (skew, newest) = (&mut state.skew, &state.newest);
-        let joint = state.ratios.skew_s();
-        skew.smooth = gear.and_then(|gear| self.smoothed((skew, joint), newest, (gear.ratio, dt_s)));
+        let (skew, slip, newest) = (&mut state.skew, &state.ratios.slip, &state.newest);
+        skew.smooth = gear.and_then(|gear| self.smoothed((skew, slip), newest, (gear.ratio, dt_s)));
     }
 
     fn smoothed(
         &self,
-        (skew, joint): (&mut Skew<T>, Option<T>),
+        (skew, of_slip): (&mut Skew<T>, &SlipFit<T>),
         newest: &[Option<Newest<T>>; SPEEDS],
         (ratio, dt_s): (T, T),
     ) -> Option<Smooth<T>> {
         let (max_s, final_ratio) = (self.uncertainty.channel_skew_s, self.driveline.final_ratio);
-        let (late_s, all_s) = (skew.late_s, skew.late_s());
+        let (late_s, all_s) = (skew.taken_s, skew.all_taken_s());
         // A reading, and its age with nothing taken off.
         let fresh = |k: usize| {
             let newest = newest[k].filter(|newest| !newest.refused)?;
@@ -231,7 +247,7 @@ impl<T: Real> GearboxFilter<'_, T> {
         }
         let older_s = turbine.age_s.at_least(output_speed.age_s);
         let slip = self.slip(ratio, [turbine.reached(older_s)?, output_speed.reached(older_s)?]);
-        let before = skew.smooth.unwrap_or(Smooth { output: now, slip: T::zero(), twist: None });
+        let before = skew.smooth.unwrap_or(Smooth { output: now, twist: None });
         let fraction = dt_s / (dt_s + T::of(SMOOTH_S));
         let output = before.output + fraction * (now - before.output);
         let output_rate = (now - output) / T::of(SMOOTH_S);
@@ -248,16 +264,11 @@ impl<T: Real> GearboxFilter<'_, T> {
             let before = before.twist.unwrap_or(value);
             Some(before + fraction * (value - before))
         });
-        let smooth = Smooth { output, slip: before.slip + fraction * (value - before.slip), twist };
-        let noise = ratio.abs() * self.readings[OUTPUT].std_dev_rad_s / T::of(SMOOTH_S);
+        let smooth = Smooth { output, twist };
         if !is_gear {
             // Speeds near those of the gear may be as late as this once their rate is known.
             let is_near = value.abs() <= slip.threshold() + T::of(NEAR) * (ratio * now).abs();
             return is_near.then_some(smooth);
-        }
-        if rate.abs() > T::of(RATE_SHOWN) * noise {
-            let noise = (square(slip.std_dev) * dt_s, T::one());
-            skew.turbine.take([T::zero(), rate, smooth.slip], dt_s, noise, T::of(KNOWN_S));
         }
         if let Some(twist) = smooth.twist.filter(|_| before.twist.is_some()) {
             let sensors =
@@ -266,27 +277,29 @@ impl<T: Real> GearboxFilter<'_, T> {
             let row = [output / final_ratio, output_rate / final_ratio, twist];
             skew.wheel.take(row, dt_s, noise, T::of(WHEEL_KNOWN_S));
         }
-        skew.take_off(max_s, joint);
+        skew.take_off(of_slip, ratio, max_s);
         Some(smooth)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::slip_fit::InGear;
     use super::*;
 
     /// The skew after pulling away and coasting by turns for so many seconds, with these delays of turbine and wheel speed against the output,
     /// s, and a wheel speed that reads 1 % too little.
     fn found_s([turbine_s, wheel_s]: [f64; 2], seconds: u32) -> [f64; SPEEDS] {
-        let mut skew = Skew::nothing();
+        let (mut skew, mut fit) = (Skew::nothing(), SlipFit::nothing([0.0; 2]));
         for row in 0..100 * seconds {
             let time_s = 0.01 * f64::from(row);
             let (speed, rate) = (30.0 + 8.0 * (0.5 * time_s).sin(), 4.0 * (0.5 * time_s).cos());
             let slip = -turbine_s * 10.0 * rate;
-            skew.turbine.take([0.0, 10.0 * rate, slip], 0.01, (0.1 * 0.1 * 0.01, 1.0), KNOWN_S);
+            let at = InGear { slip, variance: 0.1 * 0.1, ratio: 10.0, output_rad_s: speed, rate_rad_s2: rate };
+            fit.take((0, 0.0), &at, (0.01, 1.0));
             let twist = 0.01 * speed + wheel_s * rate;
             skew.wheel.take([speed, rate, twist], 0.01, (TWIST_RAD2_S, 0.01), WHEEL_KNOWN_S);
-            skew.take_off(0.02, skew.turbine.found.map(|[delay_s, _]| delay_s));
+            skew.take_off(&fit, 10.0, 0.02);
         }
         skew.late_s()
     }
@@ -320,11 +333,12 @@ mod tests {
 
     #[test]
     fn without_an_acceleration_nothing_is_found() {
-        let mut skew = Skew::nothing();
+        let (mut skew, mut fit) = (Skew::nothing(), SlipFit::nothing([0.0; 2]));
         for rate in [0.0, 1e-3, -1e-3] {
-            skew.turbine.take([0.0, rate, 0.3], 0.01, (1e-3, 1.0), KNOWN_S);
+            let at = InGear { slip: 0.3, variance: 0.1, ratio: 1.0, output_rad_s: 30.0, rate_rad_s2: rate };
+            fit.take((0, 0.0), &at, (0.01, 1.0));
             skew.wheel.take([30.0, rate, 0.3], 0.01, (TWIST_RAD2_S, 0.01), WHEEL_KNOWN_S);
-            skew.take_off(0.01, None);
+            skew.take_off(&fit, 1.0, 0.01);
             assert_eq!(skew.late_s(), [0.0; SPEEDS]);
         }
     }

@@ -286,6 +286,11 @@ impl<T: Real> GearRow<T> {
 }
 
 impl<T: Real> FrictionElement<T> {
+    /// The most that it holds, N m.
+    pub(super) fn most_n_m(&self) -> T {
+        self.clutch.static_capacity(self.limits.pressure_max_pa)
+    }
+
     /// The same in another precision.
     pub fn cast<U: Real>(&self) -> FrictionElement<U> {
         FrictionElement {

@@ -129,14 +129,14 @@ const MATRIX_DRAWS: u64 = 40;
 type Ratios = [(ShiftKind, [f64; 2]); 4];
 
 const DOCUMENTED: Ratios = [
-    (ShiftKind::PowerOnUp, [0.78, 0.32]),
+    (ShiftKind::PowerOnUp, [0.78, 0.315]),
     (ShiftKind::PowerOnDown, [0.49, 0.56]),
     (ShiftKind::PowerOffUp, [0.455, 0.50]),
     (ShiftKind::CoastDown, [0.70, 0.365]),
 ];
 
 const DOCUMENTED_OF_WHOLE_BUDGET: Ratios = [
-    (ShiftKind::PowerOnUp, [0.70, 0.36]),
+    (ShiftKind::PowerOnUp, [0.70, 0.355]),
     (ShiftKind::PowerOnDown, [0.67, 0.50]),
     (ShiftKind::PowerOffUp, [0.47, 0.57]),
     (ShiftKind::CoastDown, [0.64, 0.38]),
@@ -167,7 +167,7 @@ fn matrix_of_cars_of_the_whole_budget() {
     let rows = rows(&cars(), MATRIX_DRAWS, true);
     print(&rows);
     is_not_worse_than_the_open_loop(&rows);
-    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 197);
+    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 196);
 }
 
 /// All values are in their guaranteed ranges, and of no kind and no phase is the filter worse than the valve model, over all
