@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
-    UInt32Type, UInt64Type,
+    Decimal128Type, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type,
+    UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{
     Array, ArrayRef, ArrowPrimitiveType, BooleanArray, LargeStringArray, PrimitiveArray, StringArray, StringViewArray,
@@ -19,7 +19,11 @@ use wetclutch::{Cell, Codes, Column, Table, TableRows, Values};
 /// Columns of Arrow data in batches.
 #[derive(Debug)]
 pub(crate) struct ArrowRows {
+    /// Places of the columns that are read.
+    places: Vec<usize>,
     names: Vec<String>,
+    /// The others, with their kinds.
+    left_out: Vec<String>,
     /// Whether each has words.
     is_words: Vec<bool>,
     /// The columns of each batch.
@@ -31,22 +35,40 @@ pub(crate) struct ArrowRows {
 impl ArrowRows {
     /// Columns without a batch.
     pub(crate) fn of_fields<'a>(fields: impl Iterator<Item = &'a Field>) -> Self {
-        let (names, is_words) = fields.map(|field| (field.name().clone(), has_words(field.data_type()))).unzip();
-        Self { names, is_words, batches: Vec::new(), ends: Vec::new() }
+        let mut rows = Self {
+            places: Vec::new(),
+            names: Vec::new(),
+            left_out: Vec::new(),
+            is_words: Vec::new(),
+            batches: Vec::new(),
+            ends: Vec::new(),
+        };
+        for (place, field) in fields.enumerate() {
+            let kind = field.data_type();
+            if is_words(kind) || is_numbers(kind) {
+                rows.places.push(place);
+                rows.names.push(field.name().clone());
+                rows.is_words.push(is_words(kind));
+            } else {
+                rows.left_out.push(format!("{} ({kind})", field.name()));
+            }
+        }
+        rows
+    }
+
+    /// Columns that are neither of numbers, times nor words, with their kinds.
+    pub(crate) fn left_out(&self) -> &[String] {
+        &self.left_out
     }
 
     /// Takes the next batch.
     ///
     /// # Errors
-    /// A column is neither of numbers, times nor words.
+    /// A column is of another kind than its field.
     pub(crate) fn push(&mut self, columns: &[ArrayRef], rows: usize) -> Result<(), PyErr> {
-        let cells = columns.iter().zip(&self.names).map(|(array, name)| {
-            Cells::of(array).ok_or_else(|| {
-                let kind = array.data_type();
-                PyTypeError::new_err(format!(
-                    "column `{name}` is of Arrow's type {kind}, expected numbers, times or text"
-                ))
-            })
+        let cells = self.places.iter().zip(&self.names).map(|(place, name)| {
+            let cells = columns.get(*place).and_then(Cells::of);
+            cells.ok_or_else(|| PyTypeError::new_err(format!("column `{name}` cannot be read")))
         });
         self.batches.push(cells.collect::<Result<_, _>>()?);
         self.ends.push(self.rows() + rows);
@@ -108,11 +130,23 @@ impl TableRows for ArrowRows {
     }
 }
 
-fn has_words(kind: &DataType) -> bool {
+fn is_words(kind: &DataType) -> bool {
     match kind {
         DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => true,
-        DataType::Dictionary(_, values) => has_words(values),
+        DataType::Dictionary(_, values) => is_words(values),
         _ => false,
+    }
+}
+
+fn is_numbers(kind: &DataType) -> bool {
+    match kind {
+        DataType::Boolean
+        | DataType::Null
+        | DataType::Decimal128(..)
+        | DataType::Timestamp(..)
+        | DataType::Duration(_) => true,
+        DataType::Dictionary(_, values) => is_numbers(values),
+        kind => kind.is_integer() || kind.is_floating(),
     }
 }
 
@@ -133,11 +167,13 @@ enum Cells {
     Boolean(BooleanArray),
     /// Times in ticks, and how many of them make a second.
     Ticks(PrimitiveArray<Int64Type>, f64),
+    /// Decimals, and how many of their last digits make one.
+    Decimal(PrimitiveArray<Decimal128Type>, f64),
     Null,
     Utf8(StringArray),
     LargeUtf8(LargeStringArray),
     Utf8View(StringViewArray),
-    /// Words of a dictionary: the place of each in it, and which there are.
+    /// Values of a dictionary: the place of each in it, and which there are.
     Dictionary(Codes, Option<NullBuffer>, Box<Cells>),
 }
 
@@ -161,11 +197,14 @@ impl Cells {
                 let ticks = array.to_data().into_builder().data_type(DataType::Int64).build().ok()?;
                 Self::Ticks(ticks.into(), ticks_per_s(*unit))
             }
+            DataType::Decimal128(_, scale) => {
+                Self::Decimal(array.as_primitive_opt()?.clone(), format!("1e{scale}").parse().ok()?)
+            }
             DataType::Null => Self::Null,
             DataType::Utf8 => Self::Utf8(array.as_string_opt()?.clone()),
             DataType::LargeUtf8 => Self::LargeUtf8(array.as_string_opt()?.clone()),
             DataType::Utf8View => Self::Utf8View(array.as_string_view_opt()?.clone()),
-            DataType::Dictionary(_, values) if has_words(values) => {
+            DataType::Dictionary(..) => {
                 let values = array.as_any_dictionary_opt()?.values();
                 Self::Dictionary(places(array), array.nulls().cloned(), Box::new(Self::of(values)?))
             }
@@ -201,12 +240,21 @@ impl Cells {
             Self::Boolean(array) if array.is_null(row) => Cell::Number(f64::NAN),
             Self::Boolean(array) => Cell::Number(f64::from(u8::from(array.value(row)))),
             Self::Ticks(array, per_s) => number(array, row, |ticks| ticks as f64 / per_s),
+            Self::Decimal(array, per_one) => number(array, row, |digits| digits as f64 / per_one),
             Self::Null => Cell::Number(f64::NAN),
             Self::Utf8(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
             Self::LargeUtf8(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
             Self::Utf8View(array) => Cell::Word(if array.is_null(row) { "" } else { array.value(row) }),
-            Self::Dictionary(_, Some(nulls), _) if nulls.is_null(row) => Cell::Word(""),
-            Self::Dictionary(places, _, values) => places.get(row).map_or(Cell::Word(""), |place| values.get(place)),
+            Self::Dictionary(_, Some(nulls), values) if nulls.is_null(row) => values.missing(),
+            Self::Dictionary(places, _, values) => places.get(row).map_or(values.missing(), |place| values.get(place)),
+        }
+    }
+
+    /// A cell without a value.
+    fn missing(&self) -> Cell<'_> {
+        match self {
+            Self::Utf8(_) | Self::LargeUtf8(_) | Self::Utf8View(_) => Cell::Word(""),
+            _ => Cell::Number(f64::NAN),
         }
     }
 }

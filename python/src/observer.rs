@@ -82,6 +82,7 @@ impl Observer {
         learnt: Option<&str>,
     ) -> PyResult<Self> {
         let py = car.py();
+        py.import("wetclutch._car")?.call_method1("check_car", (car,))?;
         let (name, text, gearbox): (String, String, Option<String>) = car.getattr("_native")?.extract()?;
         let vehicle = parsed(py, &name, &text, gearbox.as_deref())?;
         let sensors = sensors.map(GivenFile::source).transpose().map_err(|error| exception(py, &error))?;

@@ -75,6 +75,15 @@ impl Table {
         self.table().columns.iter().map(Column::unit).collect()
     }
 
+    /// Columns of Arrow data that are neither of numbers, times nor words, with their kinds.
+    #[getter]
+    fn left_out(&self) -> &[String] {
+        match &self.rows {
+            Rows::Own(_) => &[],
+            Rows::Arrow(rows, _) => rows.left_out(),
+        }
+    }
+
     fn __len__(&self) -> usize {
         self.rows().rows()
     }

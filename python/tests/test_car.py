@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -103,8 +105,6 @@ def test_arguments_that_cannot_be_right_are_named() -> None:
         with pytest.raises(wc.InputError, match=f"{name} is {value}, expected .* to ") as raised:
             wc.Car.template("8hp", **{"mass_kg": 1900.0, name: value})
         assert raised.value.key == name
-    for mass_kg in (200.0, 60000.0):
-        assert wc.Car.template("8hp", mass_kg=mass_kg, engine_torque_n_m=300.0).gears
     with pytest.raises(TypeError):
         wc.Car.template("8hp")  # type: ignore[call-arg]
 
@@ -151,3 +151,55 @@ def test_a_budget_takes_the_place_of_that_of_the_car(car: wc.Car, measured: wc.T
     assert raised.value.key == "vehicle.mass_kg" and raised.value.hint
     with pytest.raises(wc.InputError, match="expected"):
         wc.estimate(car, measured, budget={"clutch.C.error_bounds.friction_factor": [-1.0, 2.0]})
+
+
+def test_a_vehicle_file_and_a_gearbox_file_do_not_replace_each_other(tmp_path: Path) -> None:
+    car = wc.Car.template("8hp", mass_kg=1900.0)
+    with pytest.raises(FileExistsError, match="same name"):
+        car.write(tmp_path / "8hp.toml")
+    car.write(tmp_path / "car.toml")
+    before = (tmp_path / "8hp.toml").read_text()
+    with pytest.raises(FileExistsError, match="is a gearbox file"):
+        wc.Car.template("lepelletier_6", mass_kg=1900.0).write(tmp_path / "8hp.toml")
+    assert (tmp_path / "8hp.toml").read_text() == before
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OSError):
+        car.write(tmp_path / "folder")
+    assert not list(tmp_path.glob("*.partial"))
+
+
+@pytest.mark.parametrize("mass_kg", [200.0, 20_000.0, 60_000.0])
+@pytest.mark.parametrize("gearbox", wc.gearboxes())
+def test_every_mass_has_a_template(gearbox: str, mass_kg: float) -> None:
+    assert wc.Car.template(gearbox, mass_kg=mass_kg).gears
+
+
+def test_a_gear_is_not_called_as_none_is(car: wc.Car) -> None:
+    gearbox = car.gearbox_toml()
+    assert gearbox is not None
+    for name in ("N", "P", "0", "nan"):
+        with pytest.raises(wc.InputError, match="stands for no gear"):
+            wc.Car(car.to_toml(), gearbox.replace('name = "2"', f'name = "{name}"'))
+
+
+def test_wrong_arguments_of_every_function_are_named(car: wc.Car, tmp_path: Path) -> None:
+    drive = wc.Drive("name = 'start'\n[[segment]]\nduration_s = 1.0\nthrottle = 0.2\n")
+    frame = {"time_s": [0.0, 0.01]}
+    x: Any = "x"
+    calls: list[Callable[[], object]] = [
+        lambda: wc.design(x),
+        lambda: wc.export(x, tmp_path),
+        lambda: wc.simulate(x, drive),
+        lambda: wc.Observer(x),
+        lambda: car.replace({"vehicle.mass_kg": np.array([1950.0, 1.0])}),
+        lambda: car.replace(cast("Any", {1: 1})),
+        lambda: wc.estimate(car, frame, budget=cast("Any", [1])),
+        lambda: wc.estimate(car, frame, columns=cast("Any", [1])),
+        lambda: wc.estimate(car, frame, shift=cast("Any", 1.5)),
+        lambda: wc.read(frame, channels=cast("Any", ["a"])),
+        lambda: wc.read(frame, channels=cast("Any", {"turbine_speed": None})),
+        lambda: wc.fit(car, []),
+    ]
+    for call in calls:
+        with pytest.raises(wc.InputError):
+            call()

@@ -225,6 +225,19 @@ def test_a_drive_is_drawn(car: wc.Car, measured: wc.Table) -> None:
         wc.estimate(car, measured, columns=["health"]).plot(shift=None)
 
 
+def test_a_shift_is_drawn_by_its_number(car: wc.Car, measured: wc.Table) -> None:
+    pytest.importorskip("matplotlib").use("Agg")
+    found = wc.estimate(car, measured, shifts=["2-3", "4-5"])
+    numbers = [int(number) for number in found.shifts["number"]]
+    assert numbers[0] > 1
+    for number, begin_s in zip(numbers, found.shifts["time_s"], strict=True):
+        title = found.plot(number)[0].get_title()
+        assert title.startswith(f"shift {number}: ") and begin_s > 0.0
+    assert found.plot()[0].get_title() == found.plot(numbers[0])[0].get_title()
+    with pytest.raises(IndexError, match=f"from {numbers[0]} to {numbers[-1]}"):
+        found.plot(1)
+
+
 def test_a_frame_of_any_layout_is_estimated_where_it_stands(car: wc.Car, measured: wc.Table) -> None:
     expected = wc.estimate(car, measured)
     frame = measured.to_polars()

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import math
 import pickle
+from datetime import date, datetime, timedelta, timezone
+from decimal import Decimal
 from typing import Any
 
 import pytest
@@ -146,3 +148,54 @@ def test_a_table_has_its_columns_as_a_dict() -> None:
     assert table.get("gear") == ["1", "", "N"] and table.get("none") is None and table.get("none", 1) == 1
     with pytest.raises(KeyError):
         table["none"]
+
+
+def test_missing_times_and_masked_values_are_no_numbers() -> None:
+    times = np.array(["2020-01-01", "NaT", "3020-01-01"], dtype="datetime64[s]")
+    first, second, third = wc.Table({"t": times})["t"]
+    assert first == 1_577_836_800.0 and math.isnan(second) and third == pl.Series(times).cast(pl.Datetime("ms")).dt.epoch("s")[2]
+    lengths = np.array([1500, "NaT"], dtype="timedelta64[ms]")
+    assert wc.Table({"t": lengths})["t"][0] == 1.5 and math.isnan(wc.Table({"t": lengths})["t"][1])
+    masked = np.ma.masked_array([1.0, -999.0, 3.0], mask=[False, True, False])
+    one, none, three = wc.Table({"x": masked})["x"]
+    assert (one, three) == (1.0, 3.0) and math.isnan(none)
+    words = wc.Table({"gear": pd.array(["1", None], dtype="string")})
+    assert words["gear"] == ["1", ""]
+    day = datetime(2020, 1, 1)
+    listed = wc.Table({"t": [day, None, day.replace(tzinfo=timezone(timedelta(hours=1)))], "d": [timedelta(seconds=2)] * 3})
+    assert listed["t"][0] == 1_577_836_800.0 and math.isnan(listed["t"][1]) and listed["t"][2] == 1_577_833_200.0
+    assert list(listed["d"]) == [2.0] * 3
+
+
+def test_columns_of_other_kinds_are_left_out_with_a_warning() -> None:
+    frame = pl.DataFrame({"time_s": [0.0, 0.01], "day": [date(2024, 1, 1)] * 2, "tags": [["a"], []]})
+    with pytest.warns(UserWarning, match=r"day \(Date32\), tags"):
+        table = wc.Table(frame)
+    assert list(table) == ["time_s"]
+    decimals = pa.table({"x": pa.array([Decimal("1.25"), None]), "g": pa.array([1.5, None]).dictionary_encode()})
+    numbers = wc.Table(decimals)
+    assert numbers["x"][0] == 1.25 and math.isnan(numbers["x"][1])
+    assert numbers["g"][0] == 1.5 and math.isnan(numbers["g"][1])
+
+
+def test_a_mixed_column_of_pandas_leaves_index_times_and_words_as_they_are() -> None:
+    times = pd.to_datetime(["2020-01-01T00:00:00", None, "2020-01-01T00:00:01"], utc=True)
+    words = pd.array(["1", None, "2"], dtype="string")
+    frame = pd.DataFrame({"when": times, "gear": words, "comment": [1, "a", None]})
+    table = wc.Table(frame.set_index(pd.Index([0.0, 0.01, 0.02], name="time_s")))
+    assert list(table["time_s"]) == [0.0, 0.01, 0.02] and table["gear"] == ["1", "", "2"]
+    assert table["comment"] == ["1", "a", ""]
+    assert table["when"][2] - table["when"][0] == 1.0 and math.isnan(table["when"][1])
+
+
+def test_every_unit_of_a_name_is_known() -> None:
+    names = ["w_j", "m_kg", "k_n_m_rad", "d_m", "x_rad", "t_n_m", "jerk_m_s3", "dose_m_s1_75", "count"]
+    units = wc.Table({name: [1.0] for name in names}).units
+    assert list(units.values()) == ["J", "kg", "N m/rad", "m", "rad", "N m", "m/s^3", "m/s^1.75", None]
+
+
+def test_what_is_no_table_is_named() -> None:
+    with pytest.raises(TypeError, match="collect"):
+        wc.Table(pl.LazyFrame({"time_s": [0.0]}))
+    with pytest.raises(wc.InputError, match="time_s"):
+        wc.Table({"time_s": 1.0})

@@ -126,16 +126,19 @@ class Car:
         names and that is there already stays where it is.
 
         Raises:
-            FileExistsError: The gearbox file is there already and is another one.
+            FileExistsError: The gearbox file is there already and is another one, or a gearbox file has the name of the vehicle file.
         """
         path = os.fspath(path)
         text = self._text
+        _refuse_gearbox_at(path)
         if self._gearbox is not None:
             import tomllib
 
             folder, named = os.path.dirname(path), tomllib.loads(text)["gearbox"]
             if _text_of(os.path.join(folder, named)) != self._gearbox:
                 beside = os.path.basename(named)
+                if beside == os.path.basename(path):
+                    raise FileExistsError(f"{path}: the gearbox file of this car has the same name; give the vehicle file another one")
                 there = _text_of(os.path.join(folder, beside))
                 if there is None:
                     _write_whole(os.path.join(folder, beside), self._gearbox)
@@ -179,8 +182,10 @@ class Car:
         """The same car with these bounds on errors in place of those of its file."""
         import tomllib
 
+        if not isinstance(budget, Mapping):
+            raise InputError(f"budget is a {type(budget).__name__}", hint="give bounds by their keys, as car.budget has them", key="budget")
         for key in budget:
-            if not _is_bound(key):
+            if not isinstance(key, str) or not _is_bound(key):
                 hint = "a bound is a key below `error_bounds`, as in car.budget"
                 raise InputError(f"budget: `{key}` is no bound on an error", hint=hint, key=key)
         others = toml(without(_BOUNDS, tomllib.loads(self._text)))
@@ -234,6 +239,18 @@ def _text_of(path: str) -> str | None:
         return ""
 
 
+def _refuse_gearbox_at(path: str) -> None:
+    """Refuses to write a vehicle file where a gearbox file is."""
+    import tomllib
+
+    try:
+        is_gearbox = "element" in tomllib.loads(_text_of(path) or "")
+    except tomllib.TOMLDecodeError:
+        is_gearbox = False
+    if is_gearbox:
+        raise FileExistsError(f"{path}: this file is there already, and is a gearbox file")
+
+
 def _with_gearbox(text: str, named: str) -> str:
     """The text of a vehicle file that names another gearbox file; its comments stay."""
     import re
@@ -247,4 +264,8 @@ def _write_whole(path: str, text: str) -> None:
     partial = f"{path}.partial"
     with open(partial, "w", encoding="utf-8", newline="\n") as file:
         file.write(text)
-    os.replace(partial, path)
+    try:
+        os.replace(partial, path)
+    except OSError:
+        os.remove(partial)
+        raise

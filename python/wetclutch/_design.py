@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import _wetclutch as native
-from ._car import Car
+from ._car import Car, check_car
 from ._errors import InputError
 
 
@@ -188,6 +188,7 @@ def design(
     >>> certificate.inertia_phase.bound_pa < certificate.inertia_phase.open_loop_bound_pa
     True
     """
+    check_car(car)
     options = {
         "observer": observer,
         "method": method,

@@ -93,6 +93,22 @@ def check_range(name: str, value: float | None, low: float, high: float) -> None
         raise InputError(f"{name} is {value}, expected {low} to {high}", key=name)
 
 
+def whole(name: str, value: Any) -> int:
+    """An argument as a whole number."""
+    if isinstance(value, bool) or value != int(value):
+        raise InputError(f"{name} is {value}, expected a whole number", key=name)
+    return int(value)
+
+
+def words(name: str, values: Any) -> list[str]:
+    """An argument of one word or several."""
+    given = [values] if isinstance(values, str) else list(values)
+    odd = next((value for value in given if not isinstance(value, str)), None)
+    if odd is not None:
+        raise InputError(f"{name}: {odd!r} is no word", hint=f"give a list of words as {name}", key=name)
+    return given
+
+
 @contextmanager
 def of_files(*paths: object) -> Iterator[None]:
     """Raises all errors of these files where one of them has several, in place of the first; what is no path is passed over."""

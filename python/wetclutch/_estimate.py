@@ -6,11 +6,11 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypedDict, Unpack, overload
+from typing import Any, Literal, TypedDict, Unpack, overload
 
 from . import _wetclutch as native
 from ._car import Car, check_car
-from ._errors import InputError, check_range, of_files
+from ._errors import InputError, check_range, of_files, whole, words
 from ._executor import each
 from ._foreign import columns_of
 from ._progress import Progress, Report, reported
@@ -94,6 +94,8 @@ def read(
     """
     if log is None:
         raise InputError("there is no log", hint="give a path, a data frame, or columns by their names")
+    if channels is not None:
+        channels = mapped(channels)
     path = os.fspath(log) if isinstance(log, (str, os.PathLike)) else None
     columns = log if path is None else columns_of(path)
     return Log(
@@ -103,6 +105,14 @@ def read(
         dbc=None if dbc is None else os.fspath(dbc),
         mapped=dict(channels or {}),
     )
+
+
+def mapped(channels: Any) -> dict[str, str]:
+    """Channels by signals, checked."""
+    if not isinstance(channels, Mapping) or not all(isinstance(of, str) for of in (*channels, *channels.values())):
+        hint = 'give names of channels by signals, such as {"engine_speed": "N_Eng [rpm]"}'
+        raise InputError("channels is no mapping from words to words", hint=hint, key="channels")
+    return dict(channels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,11 +139,11 @@ class Estimates:
     def __repr__(self) -> str:
         return f"Estimates({self.rows.rows} rows, {self.shifts.rows} shifts)"
 
-    def plot(self, shift: int | None = 1) -> Any:
+    def plot(self, shift: int | Literal["first"] | None = "first") -> Any:
         """Draws pressures and torques of a shift with their guaranteed ranges, or the whole drive; needs matplotlib.
 
         Args:
-            shift: Number of the shift, from 1; None for the drive of a car with a gearbox.
+            shift: Number of the shift, as in ``shifts["number"]``, or ``"first"``; None for the drive of a car with a gearbox.
 
         Returns:
             The axes of the figure: pressures above, torques below; of a drive gear, torque at the gearbox input, pressures of the elements.
@@ -143,7 +153,7 @@ class Estimates:
         """
         from ._plot import plot_drive, plot_shift
 
-        return plot_drive(self) if shift is None else plot_shift(self, shift)
+        return plot_drive(self) if shift is None else plot_shift(self, None if shift == "first" else shift)
 
 
 def framed(page: str | None) -> str | None:
@@ -235,18 +245,22 @@ def estimate(
     check_range("threads", threads, 1, 1024)
     check_range("shift", shift, 1, 10**9)
     check_car(car)
+    if shift is not None:
+        shift = whole("shift", shift)
+    if threads is not None:
+        threads = whole("threads", threads)
     if learnt is not None and (not isinstance(learnt, str) or "\n" not in learnt):
         raise InputError(f"learnt: `{learnt}` is no text of what was learnt", hint="give Estimates.learnt, or the text of such a file")
     options = {
         "observer": observer,
         "method": method,
         "sensors": file_or_sensors(sensors),
-        "columns": [columns] if isinstance(columns, str) else list(columns),
+        "columns": words("columns", columns),
         "shift": shift,
-        "shifts": [shifts] if isinstance(shifts, str) else list(shifts),
+        "shifts": words("shifts", shifts),
         "learnt": learnt,
         "threads": threads,
-        "with_page": page,
+        "with_page": bool(page),
     }
     if budget is not None:
         car = car._with_budget(budget)

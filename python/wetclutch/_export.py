@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from . import _wetclutch as native
-from ._car import Car
+from ._car import Car, check_car
 from ._errors import of_files
 from ._sensors import Sensors, file_or_sensors
 
@@ -22,8 +22,8 @@ def export(
     sensors: Sensors | str | os.PathLike[str] | None = None,
     program: str | os.PathLike[str] | None = None,
     c: str | os.PathLike[str] | None = None,
-    fmu: Iterable[str | os.PathLike[str]] = (),
-    car_fmu: Iterable[str | os.PathLike[str]] = (),
+    fmu: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] = (),
+    car_fmu: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] = (),
 ) -> list[Path]:
     """Writes the gearbox filter of a car for a controller into a folder. The files are those of ``wetclutch export``; files with their names are replaced.
 
@@ -54,6 +54,10 @@ def export(
     def content(path: str | os.PathLike[str] | None) -> bytes | None:
         return None if path is None else Path(path).read_bytes()
 
+    def paths(given: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[Path]:
+        return [Path(path) for path in ([given] if isinstance(given, (str, os.PathLike)) else given)]
+
+    check_car(car)
     own_name, text, gearbox = car._native
     with of_files(sensors):
         files = native.export(
@@ -62,8 +66,8 @@ def export(
             file_or_sensors(sensors),
             content(program),
             content(c),
-            [Path(path).read_bytes() for path in fmu],
-            [Path(path).read_bytes() for path in car_fmu],
+            [path.read_bytes() for path in paths(fmu)],
+            [path.read_bytes() for path in paths(car_fmu)],
         )
     into = Path(folder)
     into.mkdir(parents=True, exist_ok=True)

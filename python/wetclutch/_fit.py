@@ -10,7 +10,7 @@ from typing import Any, overload
 
 from . import _wetclutch as native
 from ._car import Car, check_car
-from ._errors import of_files
+from ._errors import InputError, of_files
 from ._estimate import Log, framed, read
 from ._executor import each
 from ._progress import Progress, Report, reported
@@ -151,6 +151,8 @@ def fit(
 
 def _logs(logs: Any) -> list[Log]:
     many = logs if isinstance(logs, (list, tuple)) else [logs]
+    if not many:
+        raise InputError("there is no log", hint="give a log, or a list of logs", key="logs")
     return [log if isinstance(log, Log) else read(log) for log in many]
 
 

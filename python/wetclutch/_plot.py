@@ -16,14 +16,19 @@ _COLOURS = {"offgoing": "#b5541c", "oncoming": "#1f6fb4"}
 _IDENTIFIED, _PARTLY = (1.0 / 3.0, "#2e7d32"), (0.7, "#d98200")
 
 
-def plot_shift(estimates: Estimates, number: int) -> Any:
-    """Pressures and torques of both clutches of a shift, with their guaranteed ranges."""
+def plot_shift(estimates: Estimates, number: int | None) -> Any:
+    """Pressures and torques of both clutches of a shift, with their guaranteed ranges; of the first one if no number is given."""
     import matplotlib.pyplot as plt
     import numpy as np
 
-    if not 1 <= number <= estimates.shifts.rows:
-        raise IndexError(f"there is no shift {number}: the log has {estimates.shifts.rows}")
-    rows, shifts, at = estimates.rows, estimates.shifts, number - 1
+    rows, shifts = estimates.rows, estimates.shifts
+    numbers = [int(of) for of in shifts["number"]]
+    if number is None and numbers:
+        number = numbers[0]
+    if number not in numbers:
+        there = f"the estimates have {len(numbers)}, from {numbers[0]} to {numbers[-1]}" if numbers else "the estimates have none"
+        raise IndexError(f"there is no shift {number}: {there}" if numbers else f"there is no shift: {there}")
+    at = numbers.index(number)
     begin_s = float(shifts["time_s"][at])
     length_s = float(shifts["length_s"][at]) if "length_s" in shifts else 1.0
     time_s = np.asarray(rows["time_s"])

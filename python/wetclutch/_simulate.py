@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from . import _wetclutch as native
-from ._car import Car
+from ._car import Car, check_car
 from ._drive import Drive
 from ._errors import check_range, of_files
 from ._progress import Progress, reported
@@ -63,6 +63,7 @@ def simulate(
         InputError: A file is wrong, or the car is one of a single shift.
         WorkError: The simulation failed.
     """
+    check_car(car)
     check_range("seed", seed, 0, 2**64 - 1)
     path = drive if isinstance(drive, Drive) else os.fspath(drive)
     with of_files(path, sensors), reported(progress) as report:

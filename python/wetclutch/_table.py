@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Iterator, Mapping
+from datetime import datetime, timedelta, timezone
 from typing import Any, ClassVar
 
 from . import _wetclutch as native
@@ -32,7 +34,9 @@ class Table:
 
         Args:
             data: Anything with Arrow data (polars, pyarrow, pandas with pyarrow, DuckDB), a pandas data frame, or a mapping from names
-                to NumPy arrays, lists of numbers or lists of words. None and NaN are missing values.
+                to NumPy arrays, lists of numbers, times or words. None, NaN and masked values are missing. Times are seconds since
+                1970, those without a time zone in UTC. Columns of Arrow data of other kinds, such as dates or lists, are left out with a
+                warning.
 
         Raises:
             InputError: A column is neither of numbers, times nor words, two have one name, or they have different lengths.
@@ -135,20 +139,30 @@ def _native(data: Any) -> native.Table:
         _refuse_twice([str(name) for name in data.columns])
     if hasattr(data, "iloc") and not is_pandas:
         raise InputError(f"a {type(data).__name__} is one column", hint="give a data frame, such as `series.to_frame()`")
+    if type(data).__name__ == "LazyFrame":
+        raise TypeError("a LazyFrame has no rows yet: give its `.collect()`")
     if hasattr(data, "__arrow_c_stream__"):
         try:
-            return native.Table.from_arrow(_plain_columns(data))
+            return _of_arrow(_plain_columns(data))
         except ImportError:
             pass  # pandas exports Arrow data with pyarrow only.
         except WetclutchError:
             raise
         except Exception as error:
-            # pandas: a column of numbers and words is no Arrow data, and is read below.
             if not is_pandas:
                 raise InputError(f"the table cannot be read: {error}", hint="give columns of numbers, times or words") from error
+            # A column of numbers and words is no Arrow data.
+            try:
+                return _of_arrow(_of_words(data))
+            except WetclutchError:
+                raise
+            except Exception:
+                pass  # Column by column then, which says which of them cannot be read.
     elif hasattr(data, "__arrow_c_array__"):
-        return native.Table.from_arrow(data)
+        return _of_arrow(data)
     if is_pandas:
+        if any(name is not None for name in data.index.names):
+            data = data.reset_index()
         return _of_columns({str(name): data.iloc[:, at] for at, name in enumerate(data.columns)})
     if isinstance(data, Mapping):
         return _of_columns(data)
@@ -157,13 +171,43 @@ def _native(data: Any) -> native.Table:
     )
 
 
+def _of_arrow(data: Any) -> native.Table:
+    table = native.Table.from_arrow(data)
+    if table.left_out:
+        warnings.warn(
+            f"columns that are neither numbers, times nor words are left out: {', '.join(table.left_out)}", stacklevel=4
+        )
+    return table
+
+
+def _of_words(data: Any) -> Any:
+    """A pandas data frame with words where a column has values of several kinds."""
+    import pandas as pd
+
+    mixed = [at for at in range(data.shape[1]) if pd.api.types.infer_dtype(data.iloc[:, at]).startswith(("mixed", "unknown"))]
+    data = data.copy()
+    for at in mixed:
+        words = [None if _is_missing(value) else str(value) for value in data.iloc[:, at]]
+        data.isetitem(at, pd.Series(words, index=data.index, dtype=object))
+    return data
+
+
 def _of_columns(columns: Mapping[Any, Any]) -> native.Table:
+    read: dict[Any, Any] = {}
+    for name, values in columns.items():
+        try:
+            read[name] = _column(values)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, WetclutchError):
+                raise
+            raise InputError(f"column `{name}`: {error}", hint=_COLUMNS) from error
     try:
-        return native.Table.from_columns({name: _column(values) for name, values in columns.items()})
+        return native.Table.from_columns(read)
     except (TypeError, ValueError) as error:
-        if isinstance(error, WetclutchError):
-            raise
-        raise InputError(str(error), hint="give columns of numbers, times or words, all of one length") from error
+        raise InputError(str(error), hint=_COLUMNS) from error
+
+
+_COLUMNS = "give columns of numbers, times or words, all of one length"
 
 
 def _refuse_twice(names: list[str]) -> None:
@@ -191,15 +235,32 @@ def _column(values: Any) -> Any:
         values = values.reshape(-1)
     if getattr(values, "ndim", 1) != 1:
         raise InputError(f"a column has one dimension, got {values.ndim}", hint="give each column of a matrix its name")
-    if kind in ("f", "i", "u", "b"):
-        import numpy as np
+    if kind is None or kind not in "fiubMm":
+        return [_plain_value(value) for value in values]
+    import numpy as np
 
-        return np.ascontiguousarray(values, dtype=np.float64)
-    if kind == "M":
-        return (values.astype("datetime64[ns]").astype("int64") / 1e9).tolist()
-    if kind == "m":
-        return (values.astype("timedelta64[ns]").astype("int64") / 1e9).tolist()
-    return [None if value is None or value != value else value for value in values]
+    is_missing = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
+    numbers = np.ma.getdata(values)
+    if kind in "Mm":
+        is_missing = np.isnat(numbers) if is_missing is None else is_missing | np.isnat(numbers)
+        # In us the years of all calendars have numbers.
+        numbers = numbers.astype("datetime64[us]" if kind == "M" else "timedelta64[us]").astype(np.int64) / 1e6
+    numbers = np.ascontiguousarray(numbers, dtype=np.float64)
+    return numbers if is_missing is None else np.where(is_missing, np.nan, numbers)
+
+
+def _plain_value(value: Any) -> Any:
+    """A value of a list: a number, a word, or None."""
+    if _is_missing(value):
+        return None
+    if isinstance(value, datetime):
+        return (value if value.tzinfo else value.replace(tzinfo=timezone.utc)).timestamp()
+    return value.total_seconds() if isinstance(value, timedelta) else value
+
+
+def _is_missing(value: Any) -> bool:
+    # Pandas' NA is not equal to itself, and not unequal either; a masked value of NumPy neither.
+    return value is None or type(value).__name__ in ("NAType", "NaTType", "MaskedConstant") or (isinstance(value, float) and value != value)
 
 
 def _plain(table: Table, name: str) -> Any:

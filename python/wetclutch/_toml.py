@@ -13,13 +13,21 @@ def replaced(text: str, values: Mapping[str, Any] | None, keys: Mapping[str, Any
     import tomllib
 
     table = tomllib.loads(text)
+    if values is not None and not isinstance(values, Mapping):
+        raise InputError(f"a {type(values).__name__} is no mapping from keys to values", hint='give {"vehicle.mass_kg": 1900.0}')
     for key, value in {**(values or {}), **{key.replace("__", "."): value for key, value in keys.items()}}.items():
+        if not isinstance(key, str):
+            raise InputError(f"{key!r} is no key", hint='give words, such as "vehicle.mass_kg"')
         parts = key.split(".")
         at = table
         for part in parts[:-1]:
             at = at.setdefault(part, {})
             if not isinstance(at, dict):
                 raise InputError(f"`{key}`: `{part}` is no table of the file", key=key)
+        try:
+            _value(value)
+        except InputError as error:
+            raise InputError(f"`{key}`: {error.message}", hint=error.hint, key=key) from None
         at[parts[-1]] = value
     return toml(table)
 
@@ -72,7 +80,8 @@ def _value(value: Any) -> str:
             return "[" + ", ".join(_value(item) for item in value) + "]"
         case dict():
             return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
-        case _ if hasattr(value, "item"):
-            return _value(value.item())
+        case _ if hasattr(value, "tolist"):
+            # Of NumPy.
+            return _value(value.tolist())
         case _:
             raise InputError(f"a {type(value).__name__} is no value of a file in TOML")

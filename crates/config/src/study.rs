@@ -157,7 +157,7 @@ pub const QUALITY: [&str; 7] = [
     "flare_rad_s",
     "least_shaft_torque_n_m",
     "jerk_peak_m_s3",
-    "vibration_dose_m_s175",
+    "vibration_dose_m_s1_75",
     "friction_work_j",
 ];
 

@@ -12,6 +12,21 @@ pub(crate) fn upper(name: &str) -> String {
     identifier(name).to_ascii_uppercase()
 }
 
+/// Macro names of several things, each another one: where two would have the same, or one no letter, its place is in it.
+pub(crate) fn distinct_upper<'n>(names: impl Iterator<Item = &'n str>) -> Vec<String> {
+    let plain: Vec<String> = names.map(upper).collect();
+    let mut distinct: Vec<String> = Vec::new();
+    for (at, name) in plain.iter().enumerate() {
+        let is_plain = name.chars().any(|c| c != '_') && plain.iter().filter(|other| *other == name).count() == 1;
+        let mut macro_name = if is_plain { name.clone() } else { format!("{name}_{at}") };
+        while distinct.contains(&macro_name) || (!is_plain && plain.contains(&macro_name)) {
+            macro_name.push('_');
+        }
+        distinct.push(macro_name);
+    }
+    distinct
+}
+
 /// Text that may stand in a comment of C.
 pub(crate) fn comment(text: &str) -> String {
     text.replace("*/", "* /").replace("/*", "/ *").replace(|c: char| c.is_control(), " ").replace("??", "? ?")
@@ -40,6 +55,14 @@ pub(crate) fn hex_float(value: f32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_that_c_cannot_tell_apart_have_their_places() {
+        let distinct = |names: &[&str]| distinct_upper(names.iter().copied());
+        assert_eq!(distinct(&["B1", "c 2"]), ["B1", "C_2"]);
+        assert_eq!(distinct(&["ü", "ö", "B1"]), ["__0", "__1", "B1"]);
+        assert_eq!(distinct(&["Bä", "Bö", "B__0"]), ["B__0_", "B__1", "B__0"]);
+    }
 
     #[test]
     fn a_number_in_hexadecimal_has_all_of_its_digits() {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use ecu::{LEARNT_WORDS, status};
 use observer::Health;
 
-use crate::c_text::{comment, upper};
+use crate::c_text::{comment, distinct_upper, upper};
 use crate::{CSource, ExportedFilter, Image};
 
 /// `wetclutch.h`, the same for every car.
@@ -42,18 +42,15 @@ pub(crate) fn memory(image: &Image, c_source: Option<&CSource>) -> (usize, Strin
 pub(crate) fn of_car(filter: &ExportedFilter, image: &Image, c_source: Option<&CSource>) -> String {
     let (name, macros) = (&filter.name, upper(&filter.name));
     let mut places = String::new();
-    for (at, element) in filter.elements().iter().enumerate() {
-        let _ =
-            writeln!(places, "#define WETCLUTCH_{macros}_ELEMENT_{} {at} /* {} */", upper(element), comment(element));
+    let elements = filter.elements();
+    let element_macros = distinct_upper(elements.iter().map(AsRef::as_ref));
+    for (at, (element, of)) in elements.iter().zip(element_macros).enumerate() {
+        let _ = writeln!(places, "#define WETCLUTCH_{macros}_ELEMENT_{of} {at} /* {} */", comment(element));
     }
-    for (at, gear) in filter.car.gearbox.gears.iter().enumerate() {
-        let (gear, ratio) = (&gear.name, gear.ratio);
-        let _ = writeln!(
-            places,
-            "#define WETCLUTCH_{macros}_GEAR_{} {at} /* {}, ratio {ratio:.3} */",
-            upper(gear),
-            comment(gear)
-        );
+    let gears = &filter.car.gearbox.gears;
+    for (at, (gear, of)) in gears.iter().zip(distinct_upper(gears.iter().map(|gear| gear.name.as_str()))).enumerate() {
+        let (name, ratio) = (comment(&gear.name), gear.ratio);
+        let _ = writeln!(places, "#define WETCLUTCH_{macros}_GEAR_{of} {at} /* {name}, ratio {ratio:.3} */");
     }
     let shifts: Vec<String> = filter.shifts().map(|shift| filter.shift_name(shift)).collect();
     let (bytes, of) = memory(image, c_source);

@@ -191,7 +191,7 @@ pub fn quality_rows(q: &ShiftQuality) -> Vec<(&'static str, String)> {
         ("turbine speed flare", quantity(q.flare_rad_s, "rad/s", 2)),
         ("lowest drive-shaft torque", quantity(q.least_shaft_torque_n_m, "N m", 0)),
         ("jerk over 0.3 s", format!("{:.1} m/s³", q.jerk_peak_m_s3)),
-        ("vibration dose value above 0.4 Hz", format!("{:.2} m/s^1.75", q.vibration_dose_m_s175)),
+        ("vibration dose value above 0.4 Hz", format!("{:.2} m/s^1.75", q.vibration_dose_m_s1_75)),
         ("friction work of the oncoming clutch", format!("{:.1} kJ", 1e-3 * q.friction_work_j)),
     ]
 }

@@ -211,7 +211,7 @@ pub struct ShiftQuality {
     pub jerk_peak_m_s3: f64,
     /// Vibration dose value of the longitudinal acceleration, m/s^1.75: the fourth root of the integral of
     /// its fourth power, above 0.4 Hz, the lower limit of the weighting of ISO 2631-1.
-    pub vibration_dose_m_s175: f64,
+    pub vibration_dose_m_s1_75: f64,
     /// Work of friction in the oncoming clutch, J.
     pub friction_work_j: f64,
 }
@@ -348,7 +348,7 @@ impl ShiftRating {
             flare_rad_s: self.flare_rad_s,
             least_shaft_torque_n_m: self.least_shaft_torque_n_m,
             jerk_peak_m_s3: self.jerk.peak_m_s3().unwrap_or(0.0),
-            vibration_dose_m_s175: Real::powf(self.vibration.dose, 0.25),
+            vibration_dose_m_s1_75: Real::powf(self.vibration.dose, 0.25),
             friction_work_j: self.friction_work_j,
         })
     }

@@ -103,7 +103,9 @@ fn column_hint(wanted: &str, present: &[String]) -> String {
         && let Some(near) = present.iter().find(|name| name.contains("time") || name.contains("date"))
     {
         let near = TraceError::shown(near);
-        return format!("rename `{near}` to `time_s` or `time_ms` if it is in s or ms; {TIME_BY_MAP}");
+        return format!(
+            "rename `{near}` to `time_s` or `time_ms` if it is in s or ms, and a time of a data frame to `time_s`; {TIME_BY_MAP}"
+        );
     }
     let endings = endings_like(wanted);
     const MAXIMUM: usize = 20;

@@ -34,11 +34,26 @@ pub enum Values {
     Words(Words),
 }
 
+/// Units of what no log has, by the ending of a name.
+const DERIVED: [(&str, &str); 8] = [
+    ("_m_s3", "m/s^3"),
+    ("_m_s1_75", "m/s^1.75"),
+    ("_n_m_rad", "N m/rad"),
+    ("_kg_m2", "kg m^2"),
+    ("_kg", "kg"),
+    ("_rad", "rad"),
+    ("_j", "J"),
+    ("_m", "m"),
+];
+
 impl Column {
     /// The unit of its values by its name, such as `Pa`; `None` without one.
     pub fn unit(&self) -> Option<&'static str> {
         match self.values {
-            Values::Numbers(_) => Unit::of_name(&self.name).map(|unit| unit.name),
+            Values::Numbers(_) => {
+                let derived = || DERIVED.iter().find(|(ending, _)| self.name.ends_with(ending)).map(|(_, unit)| *unit);
+                Unit::of_name(&self.name).map(|unit| unit.name).or_else(derived)
+            }
             Values::Words(_) => None,
         }
     }

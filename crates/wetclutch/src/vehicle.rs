@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use car::{Car, CarSize, Drive, GainMethod, ObserverKind, Sensors};
-use config::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
+use config::vehicle::short::{CarFacts, ENGINE_TORQUES_N_M, short_car_file, sized_gearbox};
 use config::{CarFile, DriveFile, Kind, Source, read_learnt, write_learnt};
 use observer::gearbox::Learnt;
 use trace::ShownPath as _;
@@ -17,6 +17,7 @@ pub fn gearboxes() -> [&'static str; config::gearbox::SHIPPED.len()] {
 
 /// The gearbox whose ratios contain that of the axle, and which has no converter.
 const DUAL_CLUTCH: &str = "dual_clutch_7";
+
 /// The numbers of a template. Nothing but the mass has to be known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TemplateNumbers {
@@ -45,7 +46,8 @@ impl TemplateNumbers {
             mass_kg,
             wheel_radius_m: size.wheel_radius_m,
             final_ratio: None,
-            engine_torque_n_m: size.engine_torque_n_m,
+            // A vehicle file has no larger one.
+            engine_torque_n_m: size.engine_torque_n_m.min(*ENGINE_TORQUES_N_M.end()),
             has_converter: None,
             has_stroke: false,
         }

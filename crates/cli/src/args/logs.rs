@@ -294,7 +294,8 @@ impl Init {
     /// Whether everything is given that a log could show.
     pub(crate) fn has_all_of_a_log(&self) -> bool {
         let numbers = [self.wheel_radius_m, self.final_ratio, self.engine_torque_n_m];
-        self.gearbox.is_some() && numbers.iter().all(Option::is_some)
+        // The converter is one more number of the log.
+        self.gearbox.is_some() && numbers.iter().all(Option::is_some) && self.launch() == LaunchChoice::Clutch
     }
 }
 

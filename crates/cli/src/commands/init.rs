@@ -71,6 +71,14 @@ fn car(options: &Init, numbers: &Numbers, gearbox: &str, log: Option<&FromLog>) 
         Some((name, text)) => {
             let file = format!("{name}.toml");
             let path = options.output.with_file_name(&file);
+            if path == options.output {
+                let message = format!(
+                    "{}: the gearbox file has this name\nhint: choose another name after -o, such as `{}`",
+                    path.shown(),
+                    path.with_file_name("car.toml").shown()
+                );
+                return Err(Failure::Input(message));
+            }
             let text = sized_gearbox(&Source::built_in(&file, text), torque_n_m)?;
             refuse_existing(&path, &text)?;
             (Source { path: path.clone(), text }, file, Some(path))

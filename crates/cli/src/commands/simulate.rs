@@ -85,7 +85,7 @@ fn of_shift(quality: &ShiftQuality) -> Value {
         "flare_rad_s": quality.flare_rad_s,
         "least_shaft_torque_n_m": quality.least_shaft_torque_n_m,
         "jerk_peak_m_s3": quality.jerk_peak_m_s3,
-        "vibration_dose_m_s175": quality.vibration_dose_m_s175,
+        "vibration_dose_m_s1_75": quality.vibration_dose_m_s1_75,
         "friction_work_j": quality.friction_work_j,
     })
 }

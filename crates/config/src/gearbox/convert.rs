@@ -131,7 +131,7 @@ pub(super) fn shares(check: &Check<'_>, raw: &RawShares) -> Result<Read, ConfigE
         Ok((name, kind(element.kind), pack))
     });
     let gears = raw.gear.get_ref().iter().map(|gear| {
-        let name = name(check, "gear.name", &gear.name)?;
+        let name = gear_name(check, &gear.name)?;
         Ok(SharedGear {
             ratio: ratio(check, &name, &gear.ratio)?,
             shares: gear.shares.iter().map(|(element, share)| (element.clone(), *share)).collect(),
@@ -153,7 +153,7 @@ pub(super) fn ratios(check: &Check<'_>, raw: &RawRatios) -> Result<Read, ConfigE
     spans.named("gear", raw.gear.get_ref().iter().map(|entry| &entry.name));
     spans.unnamed("shift_mass", raw.shift_mass.iter());
     let gears = raw.gear.get_ref().iter().map(|gear| {
-        let name = name(check, "gear.name", &gear.name)?;
+        let name = gear_name(check, &gear.name)?;
         Ok(Ratio { ratio: ratio(check, &name, &gear.ratio)?, name })
     });
     let ratios = Ratios {
@@ -182,6 +182,18 @@ fn read(
 
 fn name(check: &Check<'_>, key: &str, name: &Word) -> Result<String, ConfigError> {
     check.name(key, name.get_ref(), start(name))
+}
+
+/// The name of a gear: none that stands for no gear in a log.
+fn gear_name(check: &Check<'_>, word: &Word) -> Result<String, ConfigError> {
+    let name = name(check, "gear.name", word)?;
+    let is_none = |number: f64| number == 0.0 || !number.is_finite();
+    if ["N", "P"].contains(&name.as_str()) || name.parse().is_ok_and(is_none) {
+        let message = format!("\"{name}\" stands for no gear in a log");
+        let hint = "give the gear a name such as \"1\" or \"R\"";
+        return Err(check.meaning("gear.name", start(word), message, Some(hint.to_owned())));
+    }
+    Ok(name)
 }
 
 /// Refuses elements whose columns in a table would have the same name. The same name twice is an error of the gearbox itself.
@@ -287,7 +299,7 @@ fn turbine_max(check: &Check<'_>, gear: &str, value: Option<&Number>) -> Result<
 }
 
 fn engaged_gear(check: &Check<'_>, raw: &RawEngagedGear) -> Result<EngagedGear, ConfigError> {
-    let name = name(check, "gear.name", &raw.name)?;
+    let name = gear_name(check, &raw.name)?;
     let stated = |value: &Number| -> Result<StatedRatio, ConfigError> {
         let number = check.number(format_args!("gear.{name}.stated_ratio"), value, -50.0..=50.0)?;
         Ok(StatedRatio { value: number, decimals: decimals(check.text(value.span())) })

@@ -262,7 +262,7 @@ fn quality_numbers(quality: &ShiftQuality) -> [f64; QUALITY.len()] {
         quality.flare_rad_s,
         quality.least_shaft_torque_n_m,
         quality.jerk_peak_m_s3,
-        quality.vibration_dose_m_s175,
+        quality.vibration_dose_m_s1_75,
         quality.friction_work_j,
     ]
 }

@@ -40,8 +40,8 @@ pub enum ValveKind {
     PulseWidth,
 }
 
-/// Maximum torques of engines, N m.
-pub(super) const ENGINE_TORQUES_N_M: std::ops::RangeInclusive<f64> = 20.0..=2000.0;
+/// Maximum torque of an engine, N m.
+pub const ENGINE_TORQUES_N_M: std::ops::RangeInclusive<f64> = 20.0..=2000.0;
 /// Ratios of gears.
 const RATIOS: std::ops::RangeInclusive<f64> = 0.6..=20.0;
 /// A shift changes the ratio by more than this factor.

@@ -28,7 +28,7 @@ pub(super) use car::{car_defaults, car_defaults_taken};
 pub use complete::DefaultTaken;
 use facts::located;
 pub(super) use facts::refuse_facts;
-pub use facts::{Facts, ValveKind};
+pub use facts::{ENGINE_TORQUES_N_M, Facts, ValveKind};
 pub use first_file::{complete_file, short_file};
 pub use uncertainty::Uncertainty;
 
