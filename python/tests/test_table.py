@@ -100,8 +100,6 @@ def test_what_is_no_table_is_refused() -> None:
             wc.Table(wrong)
     with pytest.raises(ValueError, match="has 1 values"):
         wc.Table({"x": [1.0, 2.0], "y": [1.0]})
-    with pytest.raises(wc.InputError, match="Arrow's type"):
-        wc.Table(pa.table({"x": [[1.0], [2.0]]}))
     with pytest.raises(ValueError, match="one dimension"):
         wc.Table({"x": np.zeros((2, 2))})
     with pytest.raises(KeyError):
@@ -153,7 +151,7 @@ def test_a_table_has_its_columns_as_a_dict() -> None:
 def test_missing_times_and_masked_values_are_no_numbers() -> None:
     times = np.array(["2020-01-01", "NaT", "3020-01-01"], dtype="datetime64[s]")
     first, second, third = wc.Table({"t": times})["t"]
-    assert first == 1_577_836_800.0 and math.isnan(second) and third == pl.Series(times).cast(pl.Datetime("ms")).dt.epoch("s")[2]
+    assert first == 1_577_836_800.0 and math.isnan(second) and third == 33_134_745_600.0
     lengths = np.array([1500, "NaT"], dtype="timedelta64[ms]")
     assert wc.Table({"t": lengths})["t"][0] == 1.5 and math.isnan(wc.Table({"t": lengths})["t"][1])
     masked = np.ma.masked_array([1.0, -999.0, 3.0], mask=[False, True, False])

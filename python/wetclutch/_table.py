@@ -134,13 +134,13 @@ def _native(data: Any) -> native.Table:
         return data
     if isinstance(data, Table):
         return data._table
+    if type(data).__name__ == "LazyFrame":
+        raise TypeError("a LazyFrame has no rows yet: give its `.collect()`")
     is_pandas = hasattr(data, "columns") and hasattr(data, "iloc")
     if is_pandas:
         _refuse_twice([str(name) for name in data.columns])
     if hasattr(data, "iloc") and not is_pandas:
         raise InputError(f"a {type(data).__name__} is one column", hint="give a data frame, such as `series.to_frame()`")
-    if type(data).__name__ == "LazyFrame":
-        raise TypeError("a LazyFrame has no rows yet: give its `.collect()`")
     if hasattr(data, "__arrow_c_stream__"):
         try:
             return _of_arrow(_plain_columns(data))

@@ -324,9 +324,9 @@ mod tests {
     #[test]
     fn a_gear_that_was_not_driven_has_the_mean_of_the_others() {
         let mut ratios = RatioErrors::nothing([0.0; 2]);
-        [(0, 0.004), (1, 0.002), (1, 0.0021)].map(|(place, error)| ratios.keep(place, error));
+        [(0, 0.004), (1, 0.002), (1, 0.0021)].into_iter().for_each(|(place, error)| ratios.keep(place, error));
         assert_eq!([0, 1, 2, 99].map(|place| ratios.of(Some(place))), [0.004, 0.002, 0.003, 0.003]);
-        [(2, 0.0), (99, 0.01)].map(|(place, error)| ratios.keep(place, error));
+        [(2, 0.0), (99, 0.01)].into_iter().for_each(|(place, error)| ratios.keep(place, error));
         assert_eq!(ratios.others, 0.002);
         (ratios.between, ratios.way) = ([Some(0), Some(1)], 0.25);
         assert_eq!(ratios.now(), 0.0035);
