@@ -28,6 +28,19 @@ fn errors([truth, estimate]: [&str; 2], [of, by]: [&str; 2]) -> Vec<f64> {
     truth.iter().zip(found).map(|(truth, found)| (truth - found).abs()).collect()
 }
 
+/// A log without the values of a column from 60 s on.
+fn ended(log: &str, column: &str) -> String {
+    let at = log.lines().next().unwrap().split(',').position(|name| name == column).unwrap();
+    let rows = log.lines().enumerate().map(|(row, line)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if row > 0 && cells[0].parse::<f64>().unwrap() >= 60.0 {
+            cells[at] = "";
+        }
+        cells.join(",") + "\n"
+    });
+    rows.collect()
+}
+
 /// The largest of them.
 fn largest(errors: &[f64]) -> f64 {
     errors.iter().copied().filter(|error| !error.is_nan()).fold(0.0, f64::max)
@@ -74,16 +87,7 @@ fn after_a_speed_has_ended_the_estimate_is_no_worse_than_the_valve_models() {
         said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
         let (truth, log) = (folder.read("sim/city.csv"), folder.read("sim/city_measured.csv"));
         for speed in ["output_speed_rad_s", "turbine_speed_rad_s"] {
-            let names: Vec<&str> = log.lines().next().unwrap().split(',').collect();
-            let at = names.iter().position(|name| *name == speed).unwrap();
-            let ended = log.lines().enumerate().map(|(row, line)| {
-                let mut cells: Vec<&str> = line.split(',').collect();
-                if row > 0 && cells[0].parse::<f64>().unwrap() >= 60.0 {
-                    cells[at] = "";
-                }
-                cells.join(",") + "\n"
-            });
-            let log = folder.write("log.csv", ended.collect::<String>());
+            let log = folder.write("log.csv", ended(&log, speed));
             said(&wetclutch(&["estimate", &log, "--vehicle", &car, "-o", &out]));
             let found = folder.read("out.csv");
             for clutch in ["offgoing", "oncoming"] {
@@ -106,6 +110,26 @@ fn after_a_speed_has_ended_the_estimate_is_no_worse_than_the_valve_models() {
                 assert!(estimate < 1.5 * valve + 1.0, "{vehicle}, {speed}, {clutch}: {estimate} {valve}");
             }
         }
+    }
+}
+
+/// A channel that ends is named, and nothing else is said in its place.
+#[test]
+fn a_channel_that_ends_is_named() {
+    let folder = Folder::new("ended-channels");
+    let car = format!("{ROOT}vehicles/eight_speed.toml");
+    let city = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
+    let drive = drive(&folder, "bench", &city[city.find("[[segment]]").unwrap()..]);
+    said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
+    let log = folder.read("sim/city_measured.csv");
+    for (column, words) in [
+        ("reported_engine_torque_n_m", "reported_engine_torque has no usable reading from "),
+        ("element_a_current_a", "the command of A has no usable reading from "),
+    ] {
+        let log = folder.write("log.csv", ended(&log, column));
+        let found = said(&wetclutch(&["estimate", &log, "--vehicle", &car, "-o", &folder.path("out.csv")]));
+        let warnings: Vec<&str> = found.lines().filter(|line| line.starts_with("warning")).collect();
+        assert!(warnings.len() == 1 && warnings[0].contains(words), "{found}");
     }
 }
 

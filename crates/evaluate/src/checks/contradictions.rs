@@ -6,8 +6,8 @@
 
 use car::ErrorBudget;
 use car::{Car, Gear};
-use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
+use observer::{ChannelHealth, ShiftTables};
 
 use super::check::{Check, CheckedRow};
 use super::pressing::Pressing;
@@ -18,6 +18,8 @@ const STEADY_S: f64 = 1.0;
 const FITS: f64 = 0.02;
 /// Output speed below which an element may be left open, as in idle, rad/s.
 const OUTPUT_MIN_RAD_S: f64 = 20.0;
+/// Time without a reading at the end of a log after which a command has ended, s \[chosen\].
+const ENDED_S: f64 = 5.0;
 /// Rows in a gear that are needed to judge \[chosen\]: a second at 100 Hz. More than half of them have to contradict.
 const ENOUGH: u64 = 100;
 
@@ -28,6 +30,16 @@ pub(crate) struct CommandCheck<'c> {
     gear: Option<Gear>,
     since_s: f64,
     of_gears: Vec<OfGear>,
+    /// The readings of each command, by its place.
+    readings: [Readings; MAX_ELEMENTS],
+}
+
+/// The readings of a command: how many were used, when the last one was, s, and for how long there has been none, s.
+#[derive(Debug, Clone, Copy, Default)]
+struct Readings {
+    count: u64,
+    last_s: f64,
+    without_s: f64,
 }
 
 /// Rows of a steady gear.
@@ -42,7 +54,26 @@ struct OfGear {
 impl<'c> CommandCheck<'c> {
     pub(crate) fn new(car: &'c Car, tables: &ShiftTables<f64>, budget: &ErrorBudget) -> Self {
         let of_gears = vec![OfGear::default(); car.gearbox.gears.len()];
-        Self { car, pressing: Pressing::new(car, tables, budget), gear: None, since_s: f64::NAN, of_gears }
+        Self {
+            car,
+            pressing: Pressing::new(car, tables, budget),
+            gear: None,
+            since_s: f64::NAN,
+            of_gears,
+            readings: Default::default(),
+        }
+    }
+
+    /// A command that has no reading any more, in a sentence.
+    fn ended(&self, element: usize, place: usize) -> Option<String> {
+        let Readings { count, last_s, without_s } = *self.readings.get(place)?;
+        let name = &self.car.gearbox.elements[element].name;
+        (count >= ENOUGH && without_s >= ENDED_S).then(|| {
+            format!(
+                "warning: the command of {name} has no usable reading from {last_s:.1} s to the end of the log\nhint: check its channel; the torque of {name} is by \
+                 the speeds alone then"
+            )
+        })
     }
 
     /// The gear in which the most rows contradict the command of this element, in a sentence.
@@ -86,6 +117,15 @@ impl Check for CommandCheck<'_> {
         let time_s = row.step.time_s;
         let gear = Some(row.step.input.gear).filter(|gear| gear.is_steady()).map(|gear| gear.from);
         self.pressing.push(row);
+        for (readings, health) in self.readings.iter_mut().zip(&row.estimate.commands) {
+            match health {
+                ChannelHealth::Good => {
+                    *readings = Readings { count: readings.count + 1, last_s: time_s, without_s: 0.0 };
+                }
+                ChannelHealth::Lost => readings.without_s += row.step.input.dt_s.clamp(0.0, 1.0),
+                _ => {}
+            }
+        }
         let [_, turbine, output] = row.came_rad_s;
         let ratio = gear.and_then(|gear| self.car.ratio(gear)).unwrap_or(f64::NAN);
         let in_gear = ratio * output;
@@ -105,6 +145,9 @@ impl Check for CommandCheck<'_> {
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.pressing.places().iter().filter_map(|&(element, place)| self.warning(element, place)).collect()
+        let places = self.pressing.places().iter();
+        places
+            .filter_map(|&(element, place)| self.ended(element, place).or_else(|| self.warning(element, place)))
+            .collect()
     }
 }

@@ -1,11 +1,13 @@
-//! Whether a speed has no usable reading from some time on: a sensor that has failed, or a channel that ends.
+//! Whether a speed, or the reported engine torque, has no usable reading from some time on: a sensor that has failed, or a channel that ends.
 
 use observer::Reading;
 
 use super::check::{Check, CheckedRow};
 
-/// The speeds, in the order of a row.
-const NAMES: [&str; 4] = ["engine_speed", "turbine_speed", "output_speed", "wheel_speed"];
+/// The speeds, in the order of a row, and the engine torque.
+const NAMES: [&str; 5] = ["engine_speed", "turbine_speed", "output_speed", "wheel_speed", "reported_engine_torque"];
+/// Place of the torque, which has no shaft that stands.
+const TORQUE: usize = 4;
 /// Readings that are needed before \[chosen\].
 const ENOUGH: u64 = 100;
 /// Speed of another shaft from which on the car runs, speed below which a shaft may stand, rad/s, and time in which the car runs after the last
@@ -17,10 +19,10 @@ const LASTS_S: f64 = 5.0;
 /// The usable readings of each speed so far.
 #[derive(Default)]
 pub(super) struct FailedSpeeds {
-    speeds: [Usable; 4],
+    speeds: [Usable; 5],
 }
 
-/// The usable readings of a speed.
+/// The usable readings of one of them.
 #[derive(Debug, Clone, Copy, Default)]
 struct Usable {
     count: u64,
@@ -39,15 +41,16 @@ impl Check for FailedSpeeds {
             (input.turbine_rad_s, channels.turbine),
             (input.output_rad_s, channels.output),
             (input.wheel_rad_s, channels.wheel),
+            (row.step.reported_n_m, channels.engine_torque),
         ];
         let usable = readings.map(|(reading, health)| {
             let Reading { value, .. } = reading.filter(|of| of.value.is_finite() && !health.is_refused())?;
             Some(value)
         });
-        let turns = |at: usize| usable[at].is_some_and(|rad_s: f64| rad_s.abs() > RUNS_RAD_S);
+        let turns = |at: usize| at != TORQUE && usable[at].is_some_and(|rad_s: f64| rad_s.abs() > RUNS_RAD_S);
         for (at, speed) in self.speeds.iter_mut().enumerate() {
             match usable[at] {
-                Some(rad_s) if rad_s.abs() < STANDS_RAD_S => speed.stands = true,
+                Some(rad_s) if rad_s.abs() < STANDS_RAD_S && at != TORQUE => speed.stands = true,
                 Some(_) => *speed = Usable { count: speed.count + 1, last_s: row.step.time_s, ..Usable::default() },
                 // Of a shaft that stands the next reading may come late; it does not stand while the car moves.
                 None => {

@@ -29,7 +29,8 @@ const LASTING_S: f64 = 1.0;
 pub(crate) struct LockUpCheck<'c> {
     car: &'c Car,
     is_named: bool,
-    reported_n_m: Option<f64>,
+    /// The newest reported torque, N m, and when it came, s.
+    reported_n_m: Option<[f64; 2]>,
     /// By the reported torque, s; by the speeds alone, and since the last break.
     by_torque_s: f64,
     alike_s: f64,
@@ -59,7 +60,7 @@ impl<'c> LockUpCheck<'c> {
         let Some(converter) = self.car.converter.as_ref() else { return };
         self.is_named |= step.input.lock_up_applied;
         if let Some(reported) = step.reported_n_m {
-            self.reported_n_m = Some(reported.value);
+            self.reported_n_m = Some([reported.value, step.time_s]);
         }
         let (before, at_s) = self.before.unwrap_or((engine, step.time_s));
         let passed_s = step.time_s - at_s;
@@ -70,7 +71,9 @@ impl<'c> LockUpCheck<'c> {
         let dt_s = step.input.dt_s.clamp(0.0, 1.0);
         let is_driven = turbine > DRIVEN_RAD_S && turbine >= MIN_SPEED_RATIO * engine;
         let pump_n_m = converter.torques(engine, turbine).pump_n_m.max(0.0);
-        let is_more = self.reported_n_m.is_some_and(|n_m| n_m - pump_n_m > MORE_N_M + MORE_FRACTION * pump_n_m);
+        let is_more = self.reported_n_m.is_some_and(|[n_m, at_s]| {
+            step.time_s - at_s <= LASTING_S && n_m - pump_n_m > MORE_N_M + MORE_FRACTION * pump_n_m
+        });
         let is_alike = is_driven && (engine - turbine).abs() <= ALIKE_RAD_S;
         let [by_torque_s, alike_s] = &mut self.since_s;
         self.by_torque_s += lasting_s(by_torque_s, is_driven && self.is_slow && is_more, dt_s, LASTING_S);

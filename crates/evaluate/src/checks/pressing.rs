@@ -1,8 +1,8 @@
 //! Which elements press their plates by their commands, with all errors of their valves.
 
 use car::{Car, ErrorBudget};
-use observer::ShiftTables;
 use observer::gearbox::MAX_ELEMENTS;
+use observer::{ChannelHealth, ShiftTables};
 
 use super::check::CheckedRow;
 
@@ -47,8 +47,11 @@ impl Pressing {
         &self.places
     }
 
-    /// Whether the element at this place presses in a row; none where it may, or no command of it has come.
+    /// Whether the element at this place presses in a row; none where it may, or no command of it has come, or comes any more.
     pub(super) fn at(&self, place: usize, row: &CheckedRow<'_>) -> Option<bool> {
+        if row.estimate.commands.get(place) == Some(&ChannelHealth::Lost) {
+            return None;
+        }
         let [opens_pa, presses_pa] = *self.limits_pa.get(place).filter(|_| self.heard[place])?;
         let valve_pa = row.estimate.valve_pa[place];
         if valve_pa < opens_pa { Some(false) } else { (valve_pa > presses_pa).then_some(true) }
