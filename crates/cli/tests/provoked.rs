@@ -443,3 +443,14 @@ fn cars_that_are_not_as_their_file_says_are_warned_of() {
     folder.write("higher.csv", text.lines().map(row).collect::<String>());
     warned("higher.csv", "warning: by the shifts the car is outside its error budget, from ");
 }
+
+#[test]
+fn a_vehicle_file_does_not_take_the_place_of_its_gearbox_file() {
+    let folder = Folder::new("one-name");
+    let numbers =
+        ["--mass-kg", "1900", "--wheel-radius-m", "0.33", "--final-ratio", "2.8", "--engine-torque-n-m", "400"];
+    let car = folder.path("8hp.toml");
+    let refusal = refused(&wetclutch(&[&["init", "--gearbox", "8hp", "-o", &car], &numbers[..]].concat()));
+    assert!(refusal.contains("the gearbox file has this name") && refusal.contains("car.toml`"), "{refusal}");
+    assert!(!std::path::Path::new(&car).exists());
+}
