@@ -48,8 +48,9 @@ pub(super) struct InGear<T> {
 impl<T: Real> InGear<T> {
     /// The slip per delay, lags and error of the ratio.
     fn row(&self) -> [T; UNKNOWNS] {
-        let rate = self.ratio * self.rate_rad_s2;
-        [rate, rate / self.output_rad_s, -self.rate_rad_s2 / self.output_rad_s, self.ratio * self.output_rad_s]
+        // In reverse the ratio is negative, and an age is none.
+        let (rate, output) = (self.ratio * self.rate_rad_s2, self.output_rad_s.abs());
+        [rate, rate / output, -rate / (self.ratio.abs() * output), self.ratio * self.output_rad_s]
     }
 }
 
@@ -159,6 +160,7 @@ impl<T: Real> SlipFit<T> {
     /// Whether the lag of the slip in the gear of this ratio has shown itself.
     pub(super) fn shows_lag(&self, ratio: T) -> bool {
         let [_, output, turbine, _] = &self.covariance;
+        let ratio = ratio.abs();
         let lag = self.mean[1] - self.mean[2] / ratio;
         let variance = output[1] - (output[2] + turbine[1]) / ratio + turbine[2] / square(ratio);
         square(lag) > (square(T::of(LAG_SHOWN)) * variance).at_least(square(T::of(LAG_MIN_RAD)))
@@ -236,6 +238,14 @@ mod tests {
         let shows = |lags_rad, variances| fitted(lags_rad, 0.0, &GEARS_RATIOS, variances).shows_lag(4.1);
         assert!(shows([0.1, 0.6], [0.09; 2]));
         assert!(!shows([0.0; 2], [0.09; 2]) && !shows([0.1, 0.6], [0.0; 2]));
+    }
+
+    #[test]
+    fn in_reverse_a_lag_acts_as_forward() {
+        let of = |ratio: f64, output_rad_s: f64, rate_rad_s2: f64| {
+            InGear { slip: 0.0, variance: 0.01, ratio, output_rad_s, rate_rad_s2 }.row()
+        };
+        assert_eq!(of(-3.0, -40.0, -20.0), of(3.0, 40.0, 20.0));
     }
 
     #[test]
