@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Self
 
@@ -95,13 +95,19 @@ def check_range(name: str, value: float | None, low: float, high: float) -> None
 
 def whole(name: str, value: Any) -> int:
     """An argument as a whole number."""
-    if isinstance(value, bool) or value != int(value):
+    try:
+        number = int(value)
+    except (TypeError, ValueError, OverflowError):
+        number = None
+    if number is None or isinstance(value, bool) or value != number:
         raise InputError(f"{name} is {value}, expected a whole number", key=name)
-    return int(value)
+    return number
 
 
 def words(name: str, values: Any) -> list[str]:
     """An argument of one word or several."""
+    if not isinstance(values, Iterable):
+        raise InputError(f"{name} is {values!r}, expected words", hint=f"give a list of words as {name}", key=name)
     given = [values] if isinstance(values, str) else list(values)
     odd = next((value for value in given if not isinstance(value, str)), None)
     if odd is not None:

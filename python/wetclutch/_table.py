@@ -161,8 +161,9 @@ def _native(data: Any) -> native.Table:
     elif hasattr(data, "__arrow_c_array__"):
         return _of_arrow(data)
     if is_pandas:
-        if any(name is not None for name in data.index.names):
-            data = data.reset_index()
+        named = [name for name in data.index.names if name is not None and name not in data.columns]
+        if named:
+            data = data.reset_index(level=named)
         return _of_columns({str(name): data.iloc[:, at] for at, name in enumerate(data.columns)})
     if isinstance(data, Mapping):
         return _of_columns(data)
@@ -184,7 +185,7 @@ def _of_words(data: Any) -> Any:
     """A pandas data frame with words where a column has values of several kinds."""
     import pandas as pd
 
-    mixed = [at for at in range(data.shape[1]) if pd.api.types.infer_dtype(data.iloc[:, at]).startswith(("mixed", "unknown"))]
+    mixed = [at for at in range(data.shape[1]) if pd.api.types.infer_dtype(data.iloc[:, at])in ("mixed", "mixed-integer", "unknown-array")]
     data = data.copy()
     for at in mixed:
         words = [None if _is_missing(value) else str(value) for value in data.iloc[:, at]]
@@ -260,7 +261,7 @@ def _plain_value(value: Any) -> Any:
 
 def _is_missing(value: Any) -> bool:
     # Pandas' NA is not equal to itself, and not unequal either; a masked value of NumPy neither.
-    return value is None or type(value).__name__ in ("NAType", "NaTType", "MaskedConstant") or (isinstance(value, float) and value != value)
+    return value is None or type(value).__name__ in ("NAType", "NaTType", "MaskedConstant") or (isinstance(value, (float, int)) or hasattr(value, "dtype")) and value != value
 
 
 def _plain(table: Table, name: str) -> Any:

@@ -77,7 +77,7 @@ fn a_throttle_that_closes_at_an_upshift_is_no_slip_of_the_clutch_that_holds() {
 
 /// A shift takes both speeds to be seen: without one of them the torques are those of the valve models.
 #[test]
-fn after_a_speed_has_ended_the_estimate_is_no_worse_than_the_valve_models() {
+fn after_a_speed_has_ended_the_estimate_is_about_as_good_as_the_valve_models() {
     let folder = Folder::new("ended-speeds");
     let city = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
     let city = city[city.find("[[segment]]").unwrap()..].to_owned();

@@ -114,7 +114,10 @@ impl Extremes {
         const TURNS: usize = 34;
 
         let octaves = self.octaves();
-        let all: u64 = octaves.iter().skip(TURNS).sum();
+        let turns: u64 = octaves.iter().skip(TURNS).sum();
+        // A log that turns in no other octave than that of its largest values does not turn.
+        let is_one = octaves.iter().skip(TURNS).filter(|count| **count > 0).count() <= 1;
+        let all = if is_one { octaves.iter().sum() } else { turns };
         let (mut above, mut limit) = (0, f64::INFINITY);
         for (size, count) in (0_i32..64).zip(&octaves).rev() {
             if *count == 0 && above > 0 {

@@ -7,7 +7,7 @@ use super::{
 use crate::gearbox::learnt::EDGE;
 use drivetrain::Real;
 
-/// The least inertia that is believed, as a fraction of that of the tables \[chosen\].
+/// The least inertia at the turbine that is believed, as a fraction of that by the tables \[chosen\].
 const LIGHTEST: f64 = 0.5;
 
 impl<T: Real> GearboxFilter<'_, T> {
@@ -44,7 +44,10 @@ impl<T: Real> GearboxFilter<'_, T> {
             let (error, row) = (running.x.mean[INERTIA], rates.rows[TURBINE][INERTIA]);
             let share = self.uncertainty.inertia_share * shift.mass_kg_m2[0][0] * response[0][0];
             let heavier = (T::one() + error * share).at_least(T::of(LIGHTEST));
-            running.rates[TURBINE] = (running.rates[TURBINE] - error * row) / heavier;
+            let turbine = (running.rates[TURBINE] - error * row) / heavier;
+            let change = (turbine - running.rates[TURBINE]) / response[0][0];
+            (running.rates[TURBINE], running.rates[OUTPUT]) =
+                (turbine, running.rates[OUTPUT] + change * response[1][0]);
         }
         if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {
             running.before = None;

@@ -253,6 +253,8 @@ pub struct GearboxState<T> {
     by_torque: Option<ByTorque<T>>,
     /// What the filter knew of its readings when it lost its state.
     felt: Option<Felt<T>>,
+    /// Whether output or wheel speed have ever been negative: their sensors give a sign.
+    has_sign: bool,
     /// Whether a wheel speed ever came: a car without one has not lost it.
     wheel_came: bool,
     running: Option<Running<T>>,
@@ -358,6 +360,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             late: Late::nothing(),
             by_torque: None,
             felt: None,
+            has_sign: false,
             wheel_came: false,
             running: None,
             slipping: None,
@@ -376,6 +379,8 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     /// Takes what came since the step before and returns the estimate for now. Never panics; allocates nothing.
     pub fn step(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> ShiftEstimate<T> {
+        let signed = self.with_signs(state, input);
+        let input = signed.as_ref().unwrap_or(input);
         match state.skew.delays_s() {
             Some(delays_s) => self.later_by(delays_s).step_stated(state, input),
             None => self.step_stated(state, input),
@@ -416,8 +421,6 @@ impl<T: Real> GearboxFilter<'_, T> {
         state.started = true;
         // All that fades has done so, and larger numbers have no square in single precision.
         let dt_s = dt_s.at_most(T::of(LONGEST_S));
-        let signed = self.with_signs(state, input);
-        let input = signed.as_ref().unwrap_or(input);
         let of_one_time = state.skew.taken_off(input, &state.newest, self.uncertainty.output_least_rad_s);
         let input = of_one_time.as_ref().unwrap_or(input);
         let at_ratios = self.at_ratios(state, input);

@@ -272,7 +272,9 @@ impl<T: Real> PhaseMemory<T> {
             // What is above the threshold is judged by itself.
             let limit = times * slip.threshold();
             let value = slip.value.at_least(-limit).at_most(limit);
-            self.mean_rad_s = self.mean_rad_s + fraction * (value - self.mean_rad_s);
+            // Nor does what was below that of a strong clutch make one slip that is strong no more.
+            let mean = self.mean_rad_s.at_least(-limit).at_most(limit);
+            self.mean_rad_s = mean + fraction * (value - mean);
         }
         let std_dev = slip.std_dev * (fraction / (T::of(2.0) - fraction)).sqrt();
         Slip { value: self.mean_rad_s / times, std_dev }.is_over()

@@ -36,9 +36,10 @@ const UNEXPLAINED: f64 = 0.5;
 /// Time constant with which slip and output speed are low-passed twice before they are compared, s \[chosen\]: the noise of the output speed is in slip and
 /// rate, and would look like a skew.
 const SMOOTH_S: f64 = 0.1;
-/// Time between two readings, and the longest one, s \[chosen\]: 20 readings a second are compared.
+/// Time between two readings, and the longest one, s \[chosen\].
 const READ_S: f64 = 0.01;
 const LONGEST_S: f64 = 0.06;
+
 /// What the readings in gears have shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -100,11 +101,13 @@ impl<T: Real> RatioErrors<T> {
 
     /// The error of the ratio of the gear at hand once it is known, and from then on; `largest_rad_s` bounds the root mean square of what it does not explain
     /// of the slip.
-    fn known(&self, place: usize, largest_rad_s: T) -> Option<T> {
+    fn known(&mut self, place: usize, largest_rad_s: T) -> Option<T> {
         let ([error, std_dev], time_s, unexplained) = self.slip.ratio()?;
         let is_found = self.found.get(place).is_some_and(Option::is_some);
         // A comparison with NaN is false.
-        let is_known = unexplained <= square(largest_rad_s)
+        let explains = unexplained <= square(largest_rad_s);
+        self.slip.set_explains(explains);
+        let is_known = explains
             && time_s >= T::of(COMPARED_S)
             && (is_found || std_dev <= T::of(KNOWN).at_least(error.abs() / T::of(SHOWN)))
             && error.abs() <= T::of(LARGEST);
@@ -225,9 +228,10 @@ impl<T: Real> GearboxFilter<'_, T> {
 
     fn compared(&self, state: &mut GearboxState<T>, (place, ratio): (usize, T), dt_s: T) -> Option<T> {
         let before = state.ratios.smooth.take();
+        let taken_s = state.skew.ages_s();
         let fresh = |k: usize| {
             let newest = state.newest[k].as_ref()?;
-            (!newest.refused && newest.age_s <= T::of(LONGEST_S)).then_some(newest)
+            (!newest.refused && newest.age_s - taken_s[k] <= T::of(LONGEST_S)).then_some(newest)
         };
         let (turbine, output) = (fresh(TURBINE)?, fresh(OUTPUT)?);
         if output.value.abs() <= self.uncertainty.output_least_rad_s {
@@ -272,7 +276,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             // A reading that is repeated in faster rows counts once.
             let counts = (dt_s / T::of(READ_S)).at_most(T::one());
             let ratios = &mut state.ratios;
-            ratios.slip.take((place, ratios.others), &at, (dt_s, counts));
+            ratios.slip.take(place, &at, (dt_s, counts));
             let error = ratios.known(place, T::of(UNEXPLAINED) * slip.threshold());
             let taken = ratios.of(u8::try_from(place).ok());
             let rest = at.slip - taken * x - ratios.slip.late_rad_s(&at);
@@ -297,7 +301,7 @@ mod tests {
             let (speed, rate) = (200.0 + 60.0 * (0.5 * time_s).sin(), 30.0 * (0.5 * time_s).cos());
             let slip = slip(time_s, speed, rate);
             let at = InGear { slip, variance: 0.15 * 0.15, ratio: 1.0, output_rad_s: speed, rate_rad_s2: rate };
-            ratios.slip.take((0, 0.0), &at, (0.01, 1.0));
+            ratios.slip.take(0, &at, (0.01, 1.0));
         }
         ratios.known(0, 0.4)
     }
@@ -336,7 +340,7 @@ mod tests {
     fn sensors_without_noise_show_it_too() {
         let mut ratios = RatioErrors::nothing([0.0_f32; 2]);
         let at = InGear { slip: 0.8, variance: 0.0, ratio: 1.0, output_rad_s: 200.0, rate_rad_s2: 0.0 };
-        (0..200).for_each(|_| ratios.slip.take((0, 0.0), &at, (0.01, 1.0)));
+        (0..200).for_each(|_| ratios.slip.take(0, &at, (0.01, 1.0)));
         assert!(ratios.known(0, 0.4).is_some_and(|error| (error - 0.004).abs() < 1e-4));
     }
 

@@ -15,16 +15,16 @@ const MAX_TORQUE_S: f64 = 10.0;
 const LAG_RAD: f64 = 0.3;
 
 impl<T: Real> GearboxFilter<'_, T> {
-    /// The input with output and wheel speeds that turn backward, if they come without a sign: toothed wheels give none, and in a reverse gear both shafts do not
-    /// turn forward.
-    pub(super) fn with_signs(&self, state: &GearboxState<T>, input: &ShiftInput<T>) -> Option<ShiftInput<T>> {
+    /// The input with output and wheel speeds that turn backward, if they come without a sign, as from toothed wheels: out of a steady reverse gear that holds,
+    /// turbine and output do not both turn forward.
+    pub(super) fn with_signs(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> Option<ShiftInput<T>> {
+        let speeds = [input.output_rad_s, input.wheel_rad_s].map(|reading| reading.map_or(T::zero(), |of| of.value));
+        state.has_sign |= speeds.iter().any(|speed| *speed < -T::one());
         let is_reverse = |gear: &GearRow<T>| gear.ratio < T::zero();
-        self.tables.gear(input.gear.to).filter(|gear| input.gear.is_steady() && is_reverse(gear))?;
+        self.tables.gear(input.gear.from).filter(|gear| !state.has_sign && is_reverse(gear))?;
         let turbine = input.turbine_rad_s.map(|reading| reading.value);
         let turbine = turbine.or(state.newest[TURBINE].map(|newest| newest.value))?;
-        let turns_forward = |speed: &Option<Reading<T>>| speed.is_some_and(|reading| reading.value > T::zero());
-        let is_unsigned = turns_forward(&input.output_rad_s) || turns_forward(&input.wheel_rad_s);
-        (turbine > T::zero() && is_unsigned).then(|| {
+        (turbine > T::zero() && speeds.iter().any(|speed| *speed > T::zero())).then(|| {
             let backward = |reading: Reading<T>| Reading { value: -reading.value.abs(), ..reading };
             ShiftInput {
                 output_rad_s: input.output_rad_s.map(backward),

@@ -33,6 +33,8 @@ const CHANGED_S: f64 = 2e-3;
 const APART: f64 = 0.25;
 /// Standard deviation below which what came long ago counts less, s \[chosen\].
 const WHEEL_KNOWN_S: f64 = 1e-3;
+/// Longest time by which lags make a reading older, s \[chosen\]: an older one counts as missing ([`FIRST_S`]).
+const LONGEST_LAG_S: f64 = 0.03;
 /// Longest delay by which speeds may look like a slip and are those of the gear, s \[chosen\]: the longest that is taken off and a fifth of it.
 pub(super) const WIDEST_S: f64 = 1.2 * LONGEST_DELAY_S;
 /// Slip at the turbine below which speeds are near those of a gear, as a fraction of its speed \[chosen\].
@@ -148,7 +150,12 @@ impl<T: Real> Skew<T> {
                 self.late_s[k] + lags_rad[k] / value.map_or(least_rad_s, T::abs).at_least(least_rad_s)
             });
             let earlier_s = turbine_s.min(output_s);
-            (self.taken_s[TURBINE], self.taken_s[OUTPUT]) = (turbine_s - earlier_s, output_s - earlier_s);
+            let longest_s = self.late_s[TURBINE].at_least(self.late_s[OUTPUT]).at_least(T::of(LONGEST_LAG_S));
+            [self.taken_s[TURBINE], self.taken_s[OUTPUT]] =
+                [turbine_s, output_s].map(|late_s| (late_s - earlier_s).at_most(longest_s));
+            // The delay of the wheels is one against the output as it is read.
+            let moved_s = self.taken_s[OUTPUT] - self.late_s[OUTPUT];
+            self.taken_s[WHEEL] = (self.late_s[WHEEL] + moved_s).at_least(T::zero()).at_most(T::of(LONGEST_DELAY_S));
         }
         if self.taken_s == [T::zero(); SPEEDS] {
             return None;
@@ -173,6 +180,11 @@ impl<T: Real> Skew<T> {
         (self.delays_s != [T::zero(); SPEEDS]).then_some(self.delays_s)
     }
 
+    /// What is taken off the newest readings of turbine, output and wheel speed as an age, s.
+    pub(super) fn ages_s(&self) -> [T; SPEEDS] {
+        self.taken_s
+    }
+
     /// All that is taken off the newest readings of turbine, output and wheel speed, s.
     pub(super) fn all_taken_s(&self) -> [T; SPEEDS] {
         core::array::from_fn(|k| self.taken_s[k] + self.delays_s[k])
@@ -182,9 +194,7 @@ impl<T: Real> Skew<T> {
     /// s; it may be longer where it is known well.
     fn take_off(&mut self, slip: &SlipFit<T>, ratio: T, max_s: T) {
         let zero = T::zero();
-        if self.lags_rad.is_some() || slip.shows_lag(ratio) {
-            self.lags_rad = Some(slip.lags_rad());
-        }
+        self.lags_rad = slip.shows_lag(ratio, self.lags_rad.is_some()).then(|| slip.lags_rad());
         let found = slip.delay_s();
         let is_long = found.is_some_and(|[delay_s, std_dev_s]| {
             std_dev_s <= T::of(LONG_STD_DEV_S) && delay_s.abs() > max_s && max_s > zero
@@ -296,7 +306,8 @@ mod tests {
             let (speed, rate) = (30.0 + 8.0 * (0.5 * time_s).sin(), 4.0 * (0.5 * time_s).cos());
             let slip = -turbine_s * 10.0 * rate;
             let at = InGear { slip, variance: 0.1 * 0.1, ratio: 10.0, output_rad_s: speed, rate_rad_s2: rate };
-            fit.take((0, 0.0), &at, (0.01, 1.0));
+            fit.take(0, &at, (0.01, 1.0));
+            fit.set_explains(true);
             let twist = 0.01 * speed + wheel_s * rate;
             skew.wheel.take([speed, rate, twist], 0.01, (TWIST_RAD2_S, 0.01), WHEEL_KNOWN_S);
             skew.take_off(&fit, 10.0, 0.02);
@@ -336,7 +347,8 @@ mod tests {
         let (mut skew, mut fit) = (Skew::nothing(), SlipFit::nothing([0.0; 2]));
         for rate in [0.0, 1e-3, -1e-3] {
             let at = InGear { slip: 0.3, variance: 0.1, ratio: 1.0, output_rad_s: 30.0, rate_rad_s2: rate };
-            fit.take((0, 0.0), &at, (0.01, 1.0));
+            fit.take(0, &at, (0.01, 1.0));
+            fit.set_explains(true);
             skew.wheel.take([30.0, rate, 0.3], 0.01, (TWIST_RAD2_S, 0.01), WHEEL_KNOWN_S);
             skew.take_off(&fit, 1.0, 0.01);
             assert_eq!(skew.late_s(), [0.0; SPEEDS]);
