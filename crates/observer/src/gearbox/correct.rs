@@ -44,10 +44,7 @@ impl<T: Real> GearboxFilter<'_, T> {
             let (error, row) = (running.x.mean[INERTIA], rates.rows[TURBINE][INERTIA]);
             let share = self.uncertainty.inertia_share * shift.mass_kg_m2[0][0] * response[0][0];
             let heavier = (T::one() + error * share).at_least(T::of(LIGHTEST));
-            let turbine = (running.rates[TURBINE] - error * row) / heavier;
-            let change = (turbine - running.rates[TURBINE]) / response[0][0];
-            (running.rates[TURBINE], running.rates[OUTPUT]) =
-                (turbine, running.rates[OUTPUT] + change * response[1][0]);
+            running.rates[TURBINE] = (running.rates[TURBINE] - error * row) / heavier;
         }
         if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {
             running.before = None;
