@@ -244,7 +244,7 @@ def _refuse_gearbox_at(path: str) -> None:
     import tomllib
 
     try:
-        is_gearbox = "element" in tomllib.loads(_text_of(path) or "")
+        is_gearbox = "gear" in tomllib.loads(_text_of(path) or "")
     except tomllib.TOMLDecodeError:
         is_gearbox = False
     if is_gearbox:

@@ -185,7 +185,7 @@ def _of_words(data: Any) -> Any:
     """A pandas data frame with words where a column has values of several kinds."""
     import pandas as pd
 
-    mixed = [at for at in range(data.shape[1]) if pd.api.types.infer_dtype(data.iloc[:, at])in ("mixed", "mixed-integer", "unknown-array")]
+    mixed = [at for at in range(data.shape[1]) if pd.api.types.infer_dtype(data.iloc[:, at]) in ("mixed", "mixed-integer", "unknown-array")]
     data = data.copy()
     for at in mixed:
         words = [None if _is_missing(value) else str(value) for value in data.iloc[:, at]]

@@ -15,8 +15,8 @@ const MAX_TORQUE_S: f64 = 10.0;
 const LAG_RAD: f64 = 0.3;
 
 impl<T: Real> GearboxFilter<'_, T> {
-    /// The input with output and wheel speeds that turn backward, if they come without a sign, as from toothed wheels: out of a steady reverse gear that holds,
-    /// turbine and output do not both turn forward.
+    /// The input with negative output and wheel speeds in a reverse gear, where their sensors give no sign, as toothed wheels do not: while that gear holds,
+    /// turbine and output do not both turn forward. A sensor that has given a negative speed has a sign.
     pub(super) fn with_signs(&self, state: &mut GearboxState<T>, input: &ShiftInput<T>) -> Option<ShiftInput<T>> {
         let speeds = [input.output_rad_s, input.wheel_rad_s].map(|reading| reading.map_or(T::zero(), |of| of.value));
         state.has_sign |= speeds.iter().any(|speed| *speed < -T::one());
